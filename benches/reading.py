@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import formats
-from photogram.formats.colmap.binary import binary_files, read_binary
+from photogram.formats.colmap.files import binary_files, read_model
 from photogram.formats.colmap.content import Camera, Images, Model, Points
 from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
 from photogram.formats.isis.reading import read_network
@@ -67,7 +67,7 @@ def main(records: int) -> None:
         _parquet(place / "images.parquet", photos, points, xy)
         for name, content in binary_files(_model(photos, points, xy)).items():
             (place / name).write_bytes(content)
-        timed("COLMAP, binary", lambda: read_binary(place))
+        timed("COLMAP, binary", lambda: read_model(place))
         timed("  the whole project", lambda: formats.read(place, "colmap"))
         _control_network(place / "network.net", photos, points, xy)
 

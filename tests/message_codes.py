@@ -19,7 +19,7 @@ def phrases(message: Any) -> Iterator[Phrase]:
 
 
 def _plain(value: Any) -> Any:
-    return getattr(value, "code", value)
+    return list(value) if isinstance(value, tuple) else getattr(value, "code", value)
 
 
 def has_code(message: Any, code: str, /, **fields: Any) -> bool:
@@ -28,7 +28,8 @@ def has_code(message: Any, code: str, /, **fields: Any) -> bool:
     A phrase among the fields is compared by its code.
     """
     return any(
-        each.code == code and all(_plain(each.fields[name]) == value for name, value in fields.items())
+        each.code == code
+        and all(_plain(each.fields[name]) == _plain(value) for name, value in fields.items())
         for each in phrases(getattr(message, "phrase", message))
     )
 

@@ -55,7 +55,10 @@ def modules():
     return found
 
 
-COMPOSED = {"document", "statement", "_findings", "_files", "_members", "_table"}
+COMPOSED = {
+    *("document", "statement", "_findings", "_files", "_members", "_table", "_terms", "_determined"),
+    *("_plot_data", "_observables", "_scaled", "_adjust", "_adjust_again", "_snoop", "_check"),
+}
 """Methods of results whose definitions are in the files above that read the results."""
 
 
@@ -112,7 +115,6 @@ KNOWS = {
     "adjustment": {"normals"},
     "normals": set(),
     "geometry": set(),
-    "files": set(),
 }
 """What a folder of the crate may know of the others."""
 

@@ -5,7 +5,6 @@ import pytest
 
 from moving_blocks import rolling, scanned
 from photogram import adjust
-from photogram.plots.picture_data import pictured
 from photogram.results.footprints import footprints
 from photogram.results.weakest import weakest_points
 
@@ -47,7 +46,7 @@ def test_a_rolling_shutter_has_a_frame(drone):
     assert panel.across == "x, px"
     first, last = panel.limits[:, 1]
     assert first > last
-    assert not pictured(drone).scanned.any()
+    assert not drone._plot_data().scanned.any()
 
 
 def test_all_pictures_can_be_drawn(drone, strips, both):

@@ -86,8 +86,9 @@ def test_a_plot_is_drawn_on_axes_or_saved(tmp_path):
         assert (tmp_path / f"{name}.svg").read_bytes() == plot.render()
         plot.save(tmp_path / f"{name}.png")
         assert (tmp_path / f"{name}.png").stat().st_size > 5000
-        with pytest.raises(InputError, match="has 1 panels and needs as many axes, got 2"):
+        with pytest.raises(InputError) as error:
             plot.on(axes)
+        assert error.value.code == "plot.axes"
     three = Figure().subplots(3, 1)
     plot_distortion(result, result.cameras[0]).on(three)
     assert all(axes.has_data() for axes in three)

@@ -17,7 +17,6 @@ from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
 from photogram.plots.cells import cells
-from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Names
 
@@ -68,8 +67,9 @@ def test_plots_are_drawn_on_axes(calibrated):
     calibrated.plot.residuals().on(axes[1, 0])
     calibrated.plot.tests().on(axes[2])
     assert [each.has_data() for each in axes.flat] == [True, False, True, False, True, True]
-    with pytest.raises(InputError, match="2 panels and needs as many axes, got 1"):
+    with pytest.raises(InputError) as error:
         calibrated.plot.redundancy().on(axes[1, 1])
+    assert error.value.code == "plot.axes"
     empty = Figure()
     calibrated.plot.redundancy().on(empty)
     assert len(empty.axes) == 3
@@ -94,14 +94,12 @@ def test_methods_have_the_arguments_and_docstrings_of_their_functions(galveston)
 
 
 def test_plots_without_data_are_refused(galveston):
-    with pytest.raises(InputError, match="no correlations to draw"):
-        galveston.plot.correlations()
-    with pytest.raises(InputError, match="no distortion to draw"):
-        galveston.plot.distortion()
+    for name in ("correlations", "distortion"):
+        with pytest.raises(InputError) as error:
+            getattr(galveston.plot, name)()
+        assert error.value.code == f"plot.{name}"
     with pytest.raises(InputError, match="plane is one of XY, XZ, YZ"):
         galveston.plot.network(plane="up")
-    with pytest.raises(TypeError, match="no pictures of str"):
-        PLOTS["network"]("galveston")
     bare = adjust(galveston.block, covariance=False)
     assert set(bare.plot.available()) == {"network", "residuals"}
 
@@ -114,7 +112,7 @@ def test_the_network_shows_what_it_is_of(galveston):
     assert "2 rays (21)" in said
     assert "semi-axes of error ellipses, 95%" in said
     names = galveston.block.point_ids
-    in_plan = pictured(galveston).covariances(np.arange(len(names)))[:, :2, :2]
+    in_plan = galveston._plot_data().covariances(np.arange(len(names)))[:, :2, :2]
     sizes = np.sqrt(np.linalg.eigvalsh(in_plan)[:, 1])
     worst = int(np.nanargmax(sizes))
     assert f"{2.4477 * sizes[worst]:.3g} m, point {names[worst]}" in said

@@ -13,9 +13,8 @@ from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
-from photogram.show.forms import MAX_ROWS, record, summary, text
+from photogram.show.forms import MAX_ROWS, fact_lines, record, summary, text
 from photogram.show.html import page_html
-from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.page import Cell, Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
 
@@ -33,14 +32,6 @@ def test_components_of_different_units_share_a_column_each_with_its_own_decimals
     assert rows[0] == ["omega, ″", "28.64789", "2.06"]
     assert rows[1] == ["s, mm / m", "0.250000", "held"]
     assert rows[2] == ["b1, mm", "292719", "17.1"]
-    lines = table_lines([*field(VALUES, 10, (".2f", ".3f", ".1f"), "value"), *field(SD, 8, ".2f", "sd")])
-    assert lines == ["     value      sd", "     28.65    2.06", "     0.250    held", "  292719.3   17.10"]
-
-
-def test_numbers_that_are_too_long_do_not_run_into_each_other():
-    wide = Quantity(np.array([[1.0, 123456789012.0]]), (Axis.of("x", "m"), Axis.of("y", "m")), "deviation")
-    assert table_lines(field(wide, 10, ".3f")) == ["       x m       y m", "     1.000   1.2e+11"]
-    assert table_lines(field(wide, 0, ".3f", "{name}")) == ["xy", "1.000123456789012.000"]
 
 
 def test_what_is_to_be_looked_at_is_marked():
@@ -115,12 +106,6 @@ def test_only_columns_with_a_dimension_have_a_unit():
         numbers = {each.name for each in table(result) if each.kind == "number" and each.name}
         named = [name for names in units(table(result)).values() for name in names]
         assert not [name for name in named if name.split("_")[0] in numbers], what
-
-
-def test_columns_are_wider_than_the_longest_name():
-    names = Quantity(np.array(["P1", "P12345678901"], dtype=object), kind="name")
-    lines = table_lines([*field(names, 10, head="point"), *field(names, 8)])
-    assert [line.split() for line in lines] == [["point"], ["P1", "P1"], ["P12345678901"] * 2]
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,8 @@ from photogram.statistics.findings import (
     Agreement,
     Findings,
     GroupFactor,
-    Observations,
     Removed,
     Systematic,
-    by_t,
-    by_w,
 )
 from photogram.statistics.findings import Tested as Group
 from photogram.statistics.verdict import verdict, worst
@@ -42,7 +39,7 @@ def good(seed=1, factor=1.0):
 
 
 def findings(w, variance=1.0, **more):
-    kinds = [by_w(Observations("image coordinates", w, named))]
+    kinds = [Group("image coordinates", w, named)]
     test = global_test(variance * F, F)
     return Findings(
         **{"status": "converged", "observations": kinds, "degrees_of_freedom": F, "global_test": test} | more
@@ -156,7 +153,7 @@ def test_groups_and_singles_are_tested_together():
     v[11] = [4.0, -4.0]
     tests = group_tests(blocks, v)
     groups = Group("images", tests.statistic, lambda index: f"image {index[0]}", "T", tests.dimension)
-    single = by_w(Observations("control", good()[:4], named))
+    single = Group("control", good()[:4], named)
     made = verdict(findings(good(), 2.0, observations=[groups, single]))
     largest = {test.name.partition(":")[0]: test for test in made.tests}
     assert largest["images"].statistic == "T"
@@ -172,7 +169,7 @@ def test_the_level_is_shared_and_stated():
     assert single.level == pytest.approx(0.05 / 240)
     assert single.limits == (pytest.approx(-3.7089, abs=1e-3), pytest.approx(3.7089, abs=1e-3))
     assert statistics_of(made) == ["judged.w"]
-    by_others = findings(good(), observations=[by_t(Observations("images", good(), named), F, F)])
+    by_others = findings(good(), observations=[Group("images", good(), named).studentized(F, F)])
     assert statistics_of(verdict(by_others)) == ["judged.t"]
 
 
@@ -186,7 +183,7 @@ def test_one_observation_that_makes_up_everything_is_found():
     """Internally studentized it would be the root of 8, 2.83: below 3 whatever its size."""
     w = np.zeros((15, 1))
     w[4] = 1000.0
-    tested = by_t(Observations("stations", w, lambda index: f"station {index[0]}"), 1e6, 8)
+    tested = Group("stations", w, lambda index: f"station {index[0]}").studentized(1e6, 8)
     made = verdict(findings(w, observations=[tested], global_test=None, degrees_of_freedom=8))
     assert made.headline.startswith(
         "Not tested as a whole (no a-priori unit weight), but look at: 1) station 4"
@@ -384,7 +381,7 @@ def lens(fall=1e9):
 def checks(*, error=0.0, together=1.0):
     """Return check points of which the second is wrong by so many standard deviations."""
     values = np.array([1.0, 3.0 + error**2, 2.0])
-    own = by_w(Observations("check points", values, lambda place: f"K{place[0]}"))
+    own = Group("check points", values, lambda place: f"K{place[0]}")
     points = replace(own, statistic="T", dimension=np.full(3, 3.0))
     return Agreement(
         points,

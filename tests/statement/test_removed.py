@@ -12,7 +12,7 @@ from golden_statement import BLOCK
 import photogram
 from photogram.collection import simulate
 from photogram.formats import read
-from photogram.results.statement import annexes
+from photogram.results.statement import tables
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_every_removed_observation_has_its_row(snooped, monkeypatch):
     assert [each.reason for each in stated.removed] == ["snooping", *["first values"] * 16, "earlier"]
     said = next(each["text"] for each in stated.assumptions if each["key"] == "assume.removed")
     assert said.startswith("18 ")
-    monkeypatch.setattr(annexes, "LISTED", 5)
+    monkeypatch.setattr(tables, "MAX_REMOVED_OBSERVATIONS", 5)
     assert len(listed(stated)) == 5
     assert stated.texts("table.removed.note", shown=5, all=18) in stated.to_html().decode()
 

@@ -134,7 +134,7 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
         }
         (section,) = [each for each in found.document().sections if each.key == "figures"]
         rows = section.parts[0].rows if count else []
-        shown = {row[0]: row[-1] for row in rows if row[-1]}
+        shown = {row[0].value: row[-1].value for row in rows if row[-1].value}
         of_page = {"plan": "h", "h": "v", "all": "3d"}
         assert shown == {
             found.texts(f"component.{part}"): found.texts(f"asprs.verdict.{verdicts[name]}")
@@ -328,7 +328,7 @@ BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
         (lambda: asprs.remarks([[0.0, 0.0]]), r"differences has the shape \(1, 2\), not \(n, 3\)"),
         (lambda: nssda(None, -1.0, 3), "a root mean square error is not negative: -1"),
         (lambda: nssda([1.0], None, 3), r"moments has the shape \(1,\), not \(2, 2\)"),
-        (lambda: nssda(-np.eye(2), None, 3), "not symmetric and positive semidefinite"),
+        (lambda: nssda(-np.eye(2), None, 3), "symmetric and positive semidefinite"),
         (lambda: length_test([], [], **BAR), r"measured has the shape \(0,\), not \(m,\) with one length"),
         (lambda: length_test([1.0, 2.0], [1.0, -2.0], **BAR), r"calibrated\[1\] is not a length: -2"),
         (

@@ -21,7 +21,7 @@ from photogram.results.features_report import through
 from photogram.results.group_sums import observables
 from photogram.results.observation_kinds import named_observation, parts_of
 from photogram.results.result import adjusted
-from photogram.results.statement import budget, translation
+from photogram.results.statement import budget
 from photogram.results.statement.quantities import component_of
 from photogram.results.statement.texts import LANGUAGES, Texts
 from photogram.statistics.verdict import RULES
@@ -60,16 +60,10 @@ def test_every_kind_of_observation_has_a_word(result):
     assert not lacking("kind", names)
     singles = {budget.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
     assert not lacking("one", singles)
-    assert translation.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
-    assert translation.kind(GERMAN, "images, 2, x") == "Bildpunkte, 2, x"
-    assert (
-        translation.kind(ENGLISH, "smoothness, 4 position coefficients")
-        == "smoothness, 4 position coefficients"
-    )
-    assert (
-        translation.kind(GERMAN, "smoothness, 4 position coefficients")
-        == "Glattheit, 4 Positionskoeffizienten"
-    )
+    assert GERMAN.kind("prior, lever arm") == "Vorwerte, Hebelarm"
+    assert GERMAN.kind("images, 2, x") == "Bildpunkte, 2, x"
+    assert ENGLISH.kind("smoothness, 4 position coefficients") == "smoothness, 4 position coefficients"
+    assert GERMAN.kind("smoothness, 4 position coefficients") == "Glattheit, 4 Positionskoeffizienten"
 
 
 def test_every_component_has_a_word_or_is_a_letter():
@@ -142,7 +136,7 @@ def test_quantities_and_parameters_are_named_in_the_language(result):
     ):
         assert ENGLISH.text(name) == english
         assert GERMAN.text(name) == german
-    assert translation.observation(GERMAN, ("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
+    assert GERMAN.observation(("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
     gradient = {("point", "C01"): [0, 0, 1], ("point", "C02"): [0, 0, -1]}
     found = result.statement(language="de", budgets=(gradient,), standards=("plain",))
     assert any(each["text"].startswith("lineare Funktion von Punkt C01") for each in found.sentences)

@@ -7,12 +7,9 @@
 //! * [`normals`]: block normal equations, ordered, reduced, factored, solved, selectively inverted; knows no observation;
 //! * [`geometry`]: poses, cameras, projection, ellipsoid, refraction: pure functions with their partial derivatives.
 //!
-//! Beside them stands [`files`]: bytes of large files as columns, and back; it knows none of the others, nor they it.
-//!
 //! Vectors and matrices are those of [`nalgebra`]. The crate reads no files, prints nothing and has no global state.
 
 pub mod adjustment;
-pub mod files;
 pub mod geometry;
 pub mod network;
 pub mod normals;

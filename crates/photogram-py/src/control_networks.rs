@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::Stopped;
 use photocore::adjustment::{Event, Phase, Watch};
-use photocore::files::control_network::fields::{Field, Kind, MEASURES, POINT};
-use photocore::files::control_network::{
+use photogram_files::control_network::fields::{Field, Kind, MEASURES, POINT};
+use photogram_files::control_network::{
     Column, Fault, Framing, Header, Names, Place, Points, Reason, Rest, Sparse, Table, Texts, decoded,
     encoded, read_text, text,
 };

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use crate::arrays::Vector;
 use numpy::{PyArray1, PyReadonlyArray1};
-use photocore::files::delimited::{self, Table};
+use photogram_files::delimited::{self, Table};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -28,6 +28,9 @@ pub fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Vector<'py>, bool) {
     (PyArray1::from_vec(py, numbers), whole)
 }
 
+/// Bytes of a short line.
+const LINE: usize = 16;
+
 #[pyclass]
 pub struct TableReader {
     table: Option<Table>,
@@ -40,15 +43,14 @@ impl TableReader {
         Self { table: Some(Table::new(delimiter, &numeric)) }
     }
 
-    fn add(&mut self, py: Python<'_>, lines: &[u8]) -> bool {
-        let table = &mut self.table;
-        py.detach(|| {
-            let regular = table.as_mut().is_some_and(|table| table.add(lines).is_some());
-            if !regular {
-                *table = None;
-            }
-            regular
-        })
+    fn add(&mut self, py: Python<'_>, lines: &[u8]) -> PyResult<bool> {
+        let mut table = self.table.take();
+        let Ok(table) = watched(py, Workers::reading(lines.len() / LINE), None, |pool, _| {
+            let regular = pool.install(|| table.as_mut().and_then(|table| table.add(lines))).is_some();
+            Ok::<_, Infallible>(table.filter(|_| regular))
+        })?;
+        self.table = table;
+        Ok(self.table.is_some())
     }
 
     fn columns<'py>(&mut self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {

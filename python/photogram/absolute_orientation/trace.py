@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.show.lines import padded
-from photogram.show.sections import Section, composed, headline
+from photogram import _photocore
 
 if TYPE_CHECKING:
     from photogram import Orientation
@@ -20,27 +19,28 @@ def trace_text(result: Orientation) -> str:
     """Return what the cycles computed, under the bulletin's names and statement numbers."""
     rows = np.flatnonzero(result.took_part).tolist()
     names = [result.stations.ids[row] for row in rows]
-    sections: list[Section] = []
+    parts = [f"photogram {_photocore.__version__}  absolute orientation  prints under sense switches"]
     kappa, scale = float(result.initial.angles[2]), result.initial.scale
     for number, trace in enumerate(result.traces, 1):
-        sections.append((f"Iteration {number}", _cycle(trace, names, kappa, scale)))
+        title = f"Iteration {number}"
+        parts.append("\n".join([title, "-" * len(title), *_cycle(trace, names, kappa, scale)]))
         kappa, scale = trace.parameters[2], trace.parameters[3]
-    return composed(headline("absolute orientation", "prints under sense switches"), sections)
+    return "\n\n".join(parts) + "\n"
 
 
 def _cycle(trace: Trace, names: list[str], kappa: float, scale: float) -> list[str]:
     places, rows = trace.equations
     normal, auxiliary = trace.normal, trace.auxiliary
     omega, phi, kappa_after, *others = trace.parameters
-    stations = padded((names[station] for station, _ in places), 12)
+    width = max([12, *(1 + len(names[station]) for station, _ in places)])
     return [
         *_print(1, "after statement 2", "tan K", [[math.tan(kappa)]]),
         *_print(2, "before 10", "sin K, S", [[math.sin(kappa), scale]]),
         *_print(3, "after 8", "rotation matrix A", trace.rotation),
         f"sense switch 4, after 27: the eight P-values of {len(places)} equations",
         *(
-            f"  {name} {'123'[axis]}" + _numbers(row)
-            for name, (_, axis), row in zip(stations, places, rows.tolist(), strict=True)
+            f"  {names[station]:<{width}} {'123'[axis]}" + _numbers(row)
+            for (station, axis), row in zip(places, rows.tolist(), strict=True)
         ),
         *_print(
             5,

@@ -43,9 +43,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
-from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result, dropped_points
-from photogram.show.methods import Way
 
 __all__ = [
     "AsPublished",
@@ -317,19 +315,13 @@ def _adjusted(
         return Result.from_solution(block, solution, options, datum, messages, freedom)
 
 
-@Way
 def adjusted_again(
-    block: object, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> AdjustedNetwork:
-    """Adjust a network, of which only weights have changed, from where an adjustment of it has ended.
+    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> Result:
+    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
 
     `options` and `start` are those of the former result, and where it ended: its `options` and `state`.
     """
-    raise NotImplementedError(type(block).__name__)
-
-
-@adjusted_again.register
-def _(block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None) -> Result:
     return _adjusted(block, options, core_threads(threads), start=start)
 
 

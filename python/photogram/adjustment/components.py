@@ -20,32 +20,28 @@ from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
-__all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]
+__all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components"]
 
 NOTHING = 1e-6  # A redundancy that is rounding
 OTHERS = "all other observations"  # What is in no group
+DECREASE = 1e-12  # Relative decrease of the sum of squares by a step that ends the adjustment of a collection
 SHARPER = 1e-2  # Of the tolerance of components, that of the adjustments in standard deviations
-
-
-@Way
-def first_adjusted(network: object, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
-    """Return an adjustment of a block or a collection that is sharp enough for components."""
-    raise InputError(f"no block or collection: {shown(network)}")
-
-
-@first_adjusted.register
-def _(network: Block, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
-    return adjust(network, tolerance=tolerance, threads=threads)
 
 
 class Weighing:
     """A network that is adjusted again and again with other weights, each time from where it stood."""
 
     def __init__(self, network: object, *, threads: int | None, tolerance: float) -> None:
-        self.result = self.first = first_adjusted(network, tolerance=tolerance, threads=threads)
+        self.result: AdjustedNetwork
+        if isinstance(network, Block):
+            self.result = adjust(network, tolerance=tolerance, threads=threads)
+        elif hasattr(network, "_adjust"):
+            self.result = network._adjust(tolerance=DECREASE, threads=threads)
+        else:
+            raise InputError(f"no block or collection: {shown(network)}")
+        self.first = self.result
         self.given: Any = self.result.given
         self.network: Any = self.given
         self.threads = threads
@@ -53,19 +49,17 @@ class Weighing:
     def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
         """Adjust with the variances of (G,) groups multiplied by factors."""
         self.network = scaled(self.given, grouping, factors)
+        again = adjusted_again if isinstance(self.network, Block) else type(self.network)._adjust_again
         options, state = self.result.options, self.result.state
-        self.result = adjusted_again(self.network, options, state, threads=self.threads)
+        self.result = again(self.network, options, start=state, threads=self.threads)
         return self.result
 
 
-@Way
 def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
     """Return a block or collection with the variances of (G,) groups multiplied by factors."""
-    raise InputError(f"no block or collection: {shown(network)}")
-
-
-@scaled.register
-def _scaled_block(block: Block, grouping: Grouping, factors: Floats) -> Block:
+    if not isinstance(network, Block):
+        return network._scaled(grouping, factors)
+    block = network
     roots = np.sqrt(factors)
     of_photos = grouping.factors(roots, grouping.photos)
     of_observations = grouping.factors(factors, grouping.observations)

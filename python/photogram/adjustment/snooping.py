@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -46,7 +47,6 @@ from photogram.results.network_trial import (
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped, recorded
 from photogram.results.suspects import network_trial
-from photogram.show.methods import Way
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
@@ -58,7 +58,6 @@ __all__ = [
     "finished",
     "gone",
     "snoop",
-    "snooped_network",
     "started_by_consensus",
     "used_images",
 ]
@@ -139,8 +138,10 @@ def snoop(
         )
     if whole_number("max_rounds", max_rounds) < 1:
         raise InputError("there must be one round at least")
-    return snooped_network(
-        block,
+    if not isinstance(block, Block) and not hasattr(block, "_snoop"):
+        raise InputError(f"snoop takes a Block or a Collection, not {type(block).__name__}")
+    snoop_network = partial(_snoop_block, block) if isinstance(block, Block) else block._snoop
+    return snoop_network(
         Settings(
             level=family,
             fdr=fdr is not None,
@@ -156,22 +157,6 @@ def snoop(
     )
 
 
-@Way
-def snooped_network(
-    network: object,
-    settings: Settings,
-    *,
-    parts: bool,
-    unit_variance: UnitVariance,
-    threads: int | None,
-    progress: Callable[[Progress], None] | None,
-    **options: Any,
-) -> Snooped:
-    """Take gross errors out of a network of any class; see :func:`snoop`."""
-    raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")
-
-
-@snooped_network.register
 def _snoop_block(
     network: Block,
     settings: Settings,

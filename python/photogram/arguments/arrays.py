@@ -232,6 +232,19 @@ def shown(value: object) -> str:
     return ascii(field)[:80] if isinstance(field, str) else str(field)
 
 
+def argument_error(name: str, code: str, **fields: object) -> InputError:
+    """Return the error of an argument: `code` is that of a message on values without `error.`."""
+    texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
+    return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
+
+
+def probability(name: str, value: float) -> float:
+    """Return a probability between 0 and 1; refuse other numbers."""
+    if not 0 < value < 1:
+        raise argument_error(name, "range", low=0, high=1, value=value)
+    return value
+
+
 def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:
     """Whether a square matrix is one of covariances: symmetric, positive definite.
 

@@ -14,8 +14,8 @@ from rich.markup import escape
 from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_remark, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
-from photogram.cli.options import Quiet, Strict, default_out, out_option
-from photogram.cli.projects import Additions, Example, project_path, read_project
+from photogram.cli.options import Quiet, default_out
+from photogram.cli.projects import Additions, project_path, read_project
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
@@ -27,118 +27,42 @@ EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
 
-ModelPointSd = Annotated[
-    float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
-]
+ModelPointSd = Annotated[float, typer.Option(min=0.0)]
 
 
 @with_job
 def absolute_orientation(
     job: Job,
     *,
-    file: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="FILE", help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I."
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Orient the packaged example instead, with its points.")
-    ] = False,
-    points: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE", help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number."
-        ),
-    ] = None,
-    points_out: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="CSV file for the transformed points. Default: POINTS-transformed.csv in --out.",
-        ),
-    ] = None,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for report.html, report.txt and transformed points. Default: FILE-oriented."),
-    ] = None,
+    file: InputFile = None,
+    example: bool = False,
+    points: InputFile = None,
+    points_out: OutputFile = None,
+    out: OutputFolder = None,
     documents: OfPrograms,
-    trace: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
-            " fill-in).",
-        ),
-    ] = None,
-    reject: Annotated[
-        list[str] | None,
-        typer.Option(metavar="ID", help="Station whose control takes no part; may be repeated."),
-    ] = None,
-    restart: Annotated[
-        InputFile,
-        typer.Option(metavar="FILE", help="Start from a former result: its --json, or its --restart-out."),
-    ] = None,
-    part_two: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the two records that part II reads (TB 19, step 12): A, s, B, identification.",
-        ),
-    ] = None,
-    restart_out: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the record that a new solution starts from (step 12): sines, s, B, identification.",
-        ),
-    ] = None,
-    ident: Annotated[
-        str | None,
-        typer.Option(metavar="WORD", help="Identification on these records. Default: that of the cards."),
-    ] = None,
-    start: Annotated[
-        Literal["auto", "report", "closed-form"] | None,
-        typer.Option(help="Initial values. Default: auto, or report with the report's methods."),
-    ] = None,
-    scale: Annotated[
-        float | None,
-        typer.Option(help="Held: model units per ground unit, where it is known. Default: found."),
-    ] = None,
-    method: Annotated[
-        Literal["rigorous", "report", "fill-in"],
-        typer.Option(help="Least squares by the engine, or the cycles of the report."),
-    ] = "rigorous",
-    unit_variance: Annotated[
-        Literal["estimated", "unity"],
-        typer.Option(
-            metavar="NAME",
-            help="`estimated`: covariances are scaled by sigma0 squared; `unity`: they are not (with standard"
-            " deviations).",
-        ),
-    ] = "estimated",
+    trace: OutputFile = None,
+    reject: list[str] | None = None,
+    restart: InputFile = None,
+    part_two: OutputFile = None,
+    restart_out: OutputFile = None,
+    ident: str | None = None,
+    start: Literal["auto", "report", "closed-form"] | None = None,
+    scale: float | None = None,
+    method: Literal["rigorous", "report", "fill-in"] = "rigorous",
+    unit_variance: Literal["estimated", "unity"] = "estimated",
     point_sd: ModelPointSd = 0.0,
-    decimals: Annotated[
-        int | None, typer.Option(min=0, max=15, help="Decimals of transformed points.")
-    ] = None,
-    format: Annotated[  # noqa: A002  # the name of the option
-        Literal["auto", "csv", "cards"], typer.Option(help="Format of FILE; auto looks for a header.")
-    ] = "auto",
-    zero_missing: Annotated[
-        bool,
-        typer.Option(
-            "--zero-missing", help="In cards a control coordinate of 0 is missing, as in the report."
-        ),
-    ] = False,
-    ground_unit: Annotated[str, typer.Option(help="Name of the unit of the control.")] = "ground unit",
-    model_unit: Annotated[str, typer.Option(help="Name of the unit of the model.")] = "model unit",
-    strict: Strict = False,
+    decimals: Annotated[int | None, typer.Option(min=0, max=15)] = None,
+    format: Literal["auto", "csv", "cards"] = "auto",  # noqa: A002  # the name of the option
+    zero_missing: bool = False,
+    ground_unit: str = "ground unit",
+    model_unit: str = "model unit",
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
-    Prints problems, figures, parameters and residuals; writes reports and transformed points to --out.
-    Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
+    Prints problems, key figures, parameters and residuals; writes reports and transformed points to --out.
+    Stations without control are transformed, too. Exit code 3: no convergence, or control that does not fit.
     """
     if trace and method == "rigorous":
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
@@ -208,22 +132,14 @@ def _summarize(result: Orientation, title: str) -> None:
 def transform(
     job: Job,
     *,
-    result: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="RESULT", help="The --json of an orientation, or the two records of part II."),
-    ],
-    points: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number."),
-    ],
-    out: Annotated[Path, Writes.FILE, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
+    result: Annotated[Path, Reads.FILE],
+    points: Annotated[Path, Reads.FILE],
+    out: Annotated[Path, Writes.FILE],
     point_sd: ModelPointSd = 0.0,
-    decimals: Annotated[int, typer.Option(min=0, max=15, help="Decimals of transformed points.")] = 6,
+    decimals: Annotated[int, typer.Option(min=0, max=15)] = 6,
     quiet: Quiet = False,
 ) -> None:
-    """Transform any number of model points by a former orientation (part II)."""
+    """Transform any number of model points with an earlier orientation (part II)."""
     with job:
         from photogram.absolute_orientation import read_similarity, transform_file
         from photogram.absolute_orientation.cards import read_transformation
@@ -248,23 +164,18 @@ def transform(
 def relative(
     job: Job,
     *,
-    path: Annotated[InputFile, typer.Argument(metavar="PATH", help="A project: a folder or file.")] = None,
-    out: Annotated[
-        OutputFile, typer.Argument(metavar="OUT", help="CSV id,X,Y,Z,x,y,z: stations to be oriented.")
-    ] = None,
-    example: Example = False,
-    photos: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="Photos in the order of the strip. Default: all.")
-    ] = None,
+    path: InputFile = None,
+    out: OutputFile = None,
+    example: bool = False,
+    photos: str | None = None,
     added: Additions,
     quiet: Quiet = False,
 ) -> None:
-    """Orient pairs of photos relatively, and join their models to a strip.
+    """Orient pairs of photos relatively and join their models to a strip.
 
-    Each pair of neighbours is adjusted by its common points in a minimum datum; models are joined by
-    similarities over common points and the projection centre that both have. The control of the project
-    stands beside its points. Exit code 3: a model that has not converged, 4: one that
-    nothing checks.
+    Each pair of neighbours is adjusted in a minimum datum. Similarities over common points and the common
+    projection centre join the models. The table contains the control of the project and the model points.
+    Exit code 3: a model did not converge. Exit code 4: a model without redundancy.
     """
     assert out is not None
     with job:

@@ -5,36 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
-from photogram.cli.choices import Choices, KeepAll
+from photogram.cli.choices import Choices
 from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, Pictures, check_maps
 from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
-from photogram.cli.job import Job, OutputFolder, with_job
-from photogram.cli.options import (
-    Ordering,
-    OrderingName,
-    Quiet,
-    Snooping,
-    Strict,
-    Threads,
-    check_alone,
-    default_out,
-    out_option,
-)
+from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, check_alone, default_out
 from photogram.cli.progress import adjustment_status
-from photogram.cli.projects import (
-    NOTHING,
-    Additions,
-    Example,
-    ProjectPath,
-    described,
-    project_path,
-    read_project,
-)
+from photogram.cli.projects import NOTHING, Additions, described, project_path, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.lazy_dataclasses import replace
 
@@ -55,33 +37,27 @@ if TYPE_CHECKING:
 def adjust(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for reports, tables, and the adjusted project. Default: PATH-adjusted."),
-    ] = None,
+    path: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: Documents,
     added: Additions,
     choices: Choices,
     snooping: Snooping,
-    keep_all: KeepAll = False,
-    statement: Annotated[
-        bool,
-        typer.Option("--statement", help="Also write an accuracy statement, as the project asks for one."),
-    ] = False,
+    keep_all: bool = False,
+    statement: bool = False,
     wanted: OfHead,
     divided: Parts,
-    ordering: Ordering = "auto",
+    ordering: OrderingName = "auto",
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...
+    """Adjust a block of any supported format: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...
 
-    Photos without a pose are oriented first. The report, the tables of photos, points, images and all other
-    observations with their standard deviations, redundancy numbers and test values, and the adjusted project
-    go to --out.
+    Photos without a pose are oriented first. --out receives the report, the tables of photos, points, images
+    and all other observations (standard deviations, redundancy numbers, test values), and the adjusted
+    project.
     """
     path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))

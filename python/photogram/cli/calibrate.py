@@ -10,13 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from photogram.cli.calibration_options import NOT_GOOD_ENOUGH, PriorName, Seen, Uncertainty, distances_of
+from photogram.cli.calibration_options import (
+    NOT_GOOD_ENOUGH,
+    CalibrationInput,
+    PriorName,
+    Uncertainty,
+    distances_of,
+)
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
 from photogram.cli.console import output, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, Snooping, Strict, Threads, check_alone, default_out, out_option
+from photogram.cli.options import Quiet, Snooping, Threads, check_alone, default_out
 from photogram.cli.progress import adjustment_status, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
@@ -53,30 +59,10 @@ TAKEN = (
 class Planned:
     """Whether and for which camera views are planned, with the options that say it."""
 
-    plan_views: Annotated[
-        int | None,
-        typer.Option(
-            "--plan",
-            min=4,
-            metavar="K",
-            help="Plan up to K views of --board for a nominal camera of --size and --field, without PATH;"
-            " fewer where --need is reached.",
-        ),
-    ] = None
-    view_field: Annotated[
-        float | None, typer.Option("--field", metavar="DEG", help="With --plan: horizontal field of view.")
-    ] = None
-    focal: Annotated[
-        float | None, typer.Option(metavar="PX", help="With --plan, for --field: focal length.")
-    ] = None
-    away: Annotated[
-        str | None,
-        typer.Option(
-            metavar="D,D,..",
-            help="With --plan: distances of the board. Default: where it fills 0.9, 0.6 and 0.4 of the"
-            " picture.",
-        ),
-    ] = None
+    plan_views: Annotated[int | None, typer.Option("--plan", min=4)] = None
+    view_field: Annotated[float | None, typer.Option("--field")] = None
+    focal: float | None = None
+    away: str | None = None
 
     @property
     def asked(self) -> bool:
@@ -85,7 +71,7 @@ class Planned:
             raise typer.BadParameter("go with --plan", param_hint="--field, --focal, --away")
         return self.plan_views is not None
 
-    def made(self, job: Job, seen: Seen, uncertainty: Uncertainty) -> ViewPlan:
+    def made(self, job: Job, seen: CalibrationInput, uncertainty: Uncertainty) -> ViewPlan:
         """Return the plan of views of a board for a nominal camera."""
         from photogram.targets import nominal_camera, plan_views
 
@@ -111,7 +97,12 @@ class Planned:
             )
 
     def run(
-        self, job: Job, seen: Seen, uncertainty: Uncertainty, documents: Documents, out: Path | None
+        self,
+        job: Job,
+        seen: CalibrationInput,
+        uncertainty: Uncertainty,
+        documents: Documents,
+        out: Path | None,
     ) -> None:
         """Plan views, and write and tell the plan."""
         target = out or Path("planned-views")
@@ -141,7 +132,7 @@ class Planned:
         )
 
 
-def _board(seen: Seen) -> Board:
+def _board(seen: CalibrationInput) -> Board:
     """Return the board of `--board`, as a file or in numbers."""
     from photogram.targets.board_files import read_board
 
@@ -157,53 +148,26 @@ def _board(seen: Seen) -> Board:
 def calibrate(
     job: Job,
     *,
-    path: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="PATH",
-            help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
-            " board.toml; or a folder with photographs of it (docs/targets.md).",
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
-    ] = False,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for reports, tables, and the adjusted project. Default: PATH-calibrated."),
-    ] = None,
+    path: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: OfPrograms,
-    seen: Seen,
-    loss: Annotated[LossName, typer.Option(help="Robust loss of image coordinates.")] = "none",
+    seen: CalibrationInput,
+    loss: LossName = "none",
     snooping: Snooping,
-    outliers: Annotated[
-        PriorName | None, typer.Option(help="Take corners out as mrcal does, to reproduce its results.")
-    ] = None,
-    to: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FORMAT",
-            help="Write the cameras as opencv_yaml, ros_camera_info, kalibr_camchain or mrcal, too; again for"
-            " each.",
-        ),
-    ] = None,
-    components: Annotated[
-        list[CornerBasisName] | None,
-        typer.Option(
-            help="Estimate variance components of corners: by which factors their standard deviations are"
-            " wrong. Given more than once: of all combinations; level goes with camera alone."
-        ),
-    ] = None,
+    outliers: PriorName | None = None,
+    to: list[str] | None = None,
+    components: list[CornerBasisName] | None = None,
     uncertainty: Uncertainty,
     planned: Planned,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.
+    """Calibrate cameras and rigs with images of a board: cameras with their uncertainty.
 
-    Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
-    go to --out. With --plan it says which pictures to take, before there is one.
+    No initial values are necessary. --out receives the report, the tables of views, points, corners and
+    cameras, and the adjusted project. --plan suggests views before the first photograph.
     """
     with job:
         if planned.asked:

@@ -11,7 +11,7 @@ import typer
 
 from photogram.cli.job import InputFile, Job
 from photogram.cli.options import pair
-from photogram.cli.projects import Deviations, OriginName
+from photogram.cli.projects import OriginName
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -41,86 +41,25 @@ PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
 
 
 @dataclass(frozen=True)
-class Seen:
+class CalibrationInput:
     """What a user says of the board, of images and of the lens, with the options that say it."""
 
-    board: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR|FILE",
-            help="Corners along x and y of a chessboard, or its description: board.toml, Kalibr's target."
-            " Default: what lies in PATH.",
-        ),
-    ] = None
-    spacing: Annotated[
-        float | None, typer.Option(metavar="S", help="With --board CxR: from corner to corner.")
-    ] = None
-    unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.")] = None
-    shape: Annotated[
-        ShapeName | None,
-        typer.Option(help="What of the board is unknown. Default: points with 8 views or more, else held."),
-    ] = None
-    cameras: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATTERN",
-            help="Names of the images of a camera, 'left*.jpg'; again for each camera. What is left of a name"
-            " is its view.",
-        ),
-    ] = None
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Width and height of the pictures, where no file says it."),
-    ] = None
-    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = "name"
-    within: Annotated[
-        float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
-    ] = 0.005
-    sync: Annotated[
-        SyncName,
-        typer.Option(
-            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
-            " whose offsets are unknown."
-        ),
-    ] = "known"
-    offsets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset",
-            metavar="CAMERA=S[,SD]",
-            help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
-        ),
-    ] = None
-    pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
-        "center"
-    )
-    model: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="The lens: opencv4, opencv5, opencv8, opencv12, or a model of docs/cameras.md. Default:"
-            " opencv5 below 90 degrees of field, opencv8 above.",
-        ),
-    ] = None
-    knots: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR",
-            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
-        ),
-    ] = None
-    knot_sd: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R,T",
-            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
-            " stereographic image. Default: 1,0.1.",
-        ),
-    ] = None
-    sd: Deviations = None
-    regularise: Annotated[
-        PriorName | None, typer.Option(help="Weak priors of the lens and of its centre, as mrcal has them.")
-    ] = None
+    board: str | None = None
+    spacing: float | None = None
+    unit: str | None = None
+    shape: ShapeName | None = None
+    cameras: list[str] | None = None
+    size: str | None = None
+    views: ViewName = "name"
+    within: Annotated[float, typer.Option(min=0.0)] = 0.005
+    sync: SyncName = "known"
+    offsets: Annotated[list[str] | None, typer.Option("--offset")] = None
+    pixel_origin: OriginName = "center"
+    model: str | None = None
+    knots: str | None = None
+    knot_sd: str | None = None
+    sd: list[str] | None = None
+    regularise: PriorName | None = None
 
     @property
     def size_of_pictures(self) -> tuple[int, int] | None:
@@ -167,7 +106,7 @@ class Seen:
         from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
-        said = Seen(
+        said = CalibrationInput(
             shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
         )
         if self != said or self.sync == "none":
@@ -243,40 +182,13 @@ DatumName = Literal["corners", "mean-frames", "image", "axes"]
 class Uncertainty:
     """What a user wants to know of the uncertainty of cameras, with the options that ask for it."""
 
-    map_distance: Annotated[
-        str | None,
-        typer.Option(
-            "--distance",
-            metavar="D,D,..",
-            help="Distances of maps of uncertainty, 1,inf. Default: infinity, and the boards' median.",
-        ),
-    ] = None
-    map_datum: Annotated[
-        DatumName, typer.Option("--datum", help="What holds still in them (docs/targets.md).")
-    ] = "corners"
-    noise_only: Annotated[
-        bool, typer.Option("--noise-only", help="Errors of corners alone, not of priors, as mrcal has it.")
-    ] = False
-    need: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            metavar="PX",
-            help="End with exit code 4 where a map is above it within the area where the board was seen.",
-        ),
-    ] = None
-    cross_validate: Annotated[
-        str,
-        typer.Option(
-            metavar="odd|halves|K|none", help="How views are split to be adjusted against each other."
-        ),
-    ] = "odd"
-    compare_with: Annotated[
-        InputFile, typer.Option("--compare", metavar="PATH", help="Another calibration, to be compared.")
-    ] = None
-    suggest: Annotated[
-        int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
-    ] = 0
+    map_distance: Annotated[str | None, typer.Option("--distance")] = None
+    map_datum: Annotated[DatumName, typer.Option("--datum")] = "corners"
+    noise_only: bool = False
+    need: Annotated[float | None, typer.Option(min=0.0)] = None
+    cross_validate: str = "odd"
+    compare_with: Annotated[InputFile, typer.Option("--compare")] = None
+    suggest: Annotated[int, typer.Option(min=0)] = 0
 
     def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""

@@ -17,55 +17,17 @@ if TYPE_CHECKING:
 LossName = Literal["none", "huber", "cauchy"]
 """What is minimised."""
 
-KeepAll = Annotated[
-    bool,
-    typer.Option("--keep-all", help="Begin with all images, those too that first values would set aside."),
-]
-
 
 @dataclass(frozen=True)
 class Choices:
     """What a user chooses where a project says it otherwise, or not at all, with the options that say it."""
 
-    datum: Annotated[
-        Literal["control", "minimum", "inner"] | None,
-        typer.Option(
-            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints."
-        ),
-    ] = None
-    hold: Annotated[
-        str | None,
-        typer.Option(
-            metavar="POINT=AXES,...",
-            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
-        ),
-    ] = None
-    loss: Annotated[
-        LossName | None, typer.Option(help="Robust loss of image coordinates. Default: what PATH says.")
-    ] = None
-    unit_variance: Annotated[
-        UnitVarianceName | None,
-        typer.Option(
-            metavar="NAME",
-            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
-            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
-        ),
-    ] = None
-    iterations: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Largest number of iterations [PATH, else 50; 200 with a loss or free cameras].",
-        ),
-    ] = None
-    self_calibrate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Free camera parameters (f,cx,cy,k1,k2: pinholes get lens terms), or `all` of the model.",
-        ),
-    ] = None
+    datum: Literal["control", "minimum", "inner"] | None = None
+    hold: str | None = None
+    loss: LossName | None = None
+    unit_variance: UnitVarianceName | None = None
+    iterations: Annotated[int | None, typer.Option(min=1)] = None
+    self_calibrate: str | None = None
 
     def datum_of(self, project: Project) -> str | None:
         """Return the name of the datum: what is chosen, else that of the project."""

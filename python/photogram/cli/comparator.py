@@ -15,7 +15,7 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.documents import Documents, PageAndJson
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
-from photogram.cli.options import Quiet, default_out, out_option
+from photogram.cli.options import Quiet, default_out
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
@@ -32,83 +32,27 @@ Hand = Literal["file", "left", "right"]
 def comparator(
     job: Job,
     *,
-    paths: Annotated[
-        list[Path] | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="FILE...",
-            help="Tables (*.csv) of one calibration; or files of decks of cards, one calibration a deck.",
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Calibrate the packaged example instead: four cases on grid 1320."),
-    ] = False,
-    grid: Annotated[
-        list[str] | None,
-        Reads.FILE,
-        typer.Option(
-            metavar="GRID",
-            help="Grid plate: 773, 1320, 778 or a file (point, x_um, y_um); again for more plates."
-            " Default: as the files say.",
-        ),
-    ] = None,
-    hand: Annotated[
-        Hand, typer.Option(help="Handedness of the comparator against the plate; the data must agree.")
-    ] = "file",
-    out: Annotated[
-        OutputFolder,
-        out_option(
-            "Directory for listing, report, correction and grids. Default: FILE-calibrated beside the first"
-            " FILE."
-        ),
-    ] = None,
-    json: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE", help="Write everything as one JSON document (a list of them for several decks)."
-        ),
-    ] = None,
+    paths: Annotated[list[Path] | None, Reads.FILE] = None,
+    example: bool = False,
+    grid: Annotated[list[str] | None, Reads.FILE] = None,
+    hand: Hand = "file",
+    out: OutputFolder = None,
+    json: OutputFile = None,
     documents: Annotated[PageAndJson, Without("json")],
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Write report.pdf instead of report.html (needs the extra `pdf`).")
-    ] = False,
-    plots: Annotated[
-        bool,
-        typer.Option(
-            "--plots/--no-plots", help="Make the report, with its pictures (needs the extra `report`)."
-        ),
-    ] = True,
-    as_published: Annotated[
-        bool,
-        typer.Option(
-            "--as-published", help="Compute as the program of 1971 where it departs from its report."
-        ),
-    ] = False,
-    polynomial: Annotated[
-        bool, typer.Option("--polynomial/--linear-only", help="Fit correction polynomials of fourth degree.")
-    ] = True,
-    estimate_grid: Annotated[
-        bool,
-        typer.Option("--estimate-grid", help="Estimate the accuracy of the grid in the joint adjustment."),
-    ] = False,
-    each_case: Annotated[
-        bool, typer.Option("--each-case", help="Tables and pictures of the polynomials of every case, too.")
-    ] = False,
-    date: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TEXT",
-            help="Date of the run for title page and report. Default: that of SOURCE_DATE_EPOCH, or today.",
-        ),
-    ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Remarks on the measurements are errors.")] = False,
+    pdf: bool = False,
+    plots: Annotated[bool, typer.Option("--plots/--no-plots")] = True,
+    as_published: bool = False,
+    polynomial: Annotated[bool, typer.Option("--polynomial/--linear-only")] = True,
+    estimate_grid: bool = False,
+    each_case: bool = False,
+    date: str | None = None,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a comparator from measurements of a grid plate.
 
-    Writes listing.txt, report.html (pictures), correction.json and the corrected grid of each plate. Where
-    the verdict forbids the use (outliers), correction and grid are withheld, and the exit code is 4.
+    Writes listing.txt, report.html (with plots), correction.json and the corrected grid of each plate. If the
+    verdict forbids their use because of outliers, correction and grid are withheld. The exit code is 4.
     """
     with job:
         from photogram.comparator import Options, calibrate, find_grid, read
@@ -241,31 +185,17 @@ def _summarize(calibrations: list[Calibration]) -> None:
 def correct(
     job: Job,
     *,
-    correction: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="CORRECTION", help="correction.json, or the JSON document of a calibration."),
-    ],
-    measurements: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm)."),
-    ],
-    corrected: Annotated[
-        OutputFile, typer.Argument(metavar="OUT", help="Table to write. Default: standard output.")
-    ] = None,
-    invert: Annotated[
-        bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
-    ] = False,
-    extrapolate: Annotated[
-        bool, typer.Option("--extrapolate", help="Correct points far outside the calibrated range, too.")
-    ] = False,
+    correction: Annotated[Path, Reads.FILE],
+    measurements: Annotated[Path, Reads.FILE],
+    corrected: OutputFile = None,
+    invert: bool = False,
+    extrapolate: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Correct measurements by a calibration.
+    """Correct measurements with a calibration.
 
-    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (what the calibration contributes), and
-    in_range: no where nothing was calibrated. Points far outside are refused.
+    Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (standard deviation of the calibration),
+    and in_range (no outside the calibrated range). Points far outside are rejected.
     """
     with job:
         from photogram.comparator.apply import correct_table
@@ -284,28 +214,19 @@ def correct(
 
 
 @with_job
-def compare(
+def compare_calibrations(
     job: Job,
     *,
-    calibrations: Annotated[
-        list[Path] | None,
-        Reads.FILE,
-        typer.Argument(metavar="JSON...", help="Documents of calibrations: what `--json` writes."),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Compare six simulated calibrations instead: a scale steps.")
-    ] = False,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for report and grids. Default: FILE-compared beside the first FILE."),
-    ] = None,
+    calibrations: Annotated[list[Path] | None, Reads.FILE] = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: PageAndJson,
     quiet: Quiet = False,
 ) -> None:
     """Compare calibrations over years: drift, steps, control charts; adjust their grids together.
 
-    Writes report.html and each plate with the coordinates that all calibrations give it. What has changed is
-    named, and the exit code is 4. Grids with which readings do not agree are withheld.
+    Writes report.html and the coordinates of each plate from all calibrations. Exit code 4: a comparator or
+    grid has changed. Grids that do not agree with their readings are withheld.
     """
     with job:
         from photogram.comparator import compare as compared

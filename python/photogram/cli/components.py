@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
-
-import typer
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from photogram.cli.job import Job
 from photogram.cli.progress import estimation_status
@@ -41,17 +39,6 @@ class Basis(StrEnum):
     POINT_CLASS = "point-class"
     COMPONENT = "component"
     RAYS = "rays"
-
-
-Components = Annotated[
-    list[Basis] | None,
-    typer.Option(
-        "--components",
-        help="Estimate variance components of groups of observations: by which factors their standard"
-        " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
-        " given weights; with --snoop those of the weights that what is left bears out.",
-    ),
-]
 
 
 def _groups(bases: list[Basis]) -> list[str]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import output
-from photogram.cli.job import Job, OutputFolder, Reads, with_job
-from photogram.cli.options import JsonFile, Plots, Quiet, out_option, pair
+from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
+from photogram.cli.options import Quiet, pair
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
@@ -22,35 +22,13 @@ BEYOND_TOLERANCE = 4
 
 
 @dataclass(frozen=True)
-class Fit:
+class LensFit:
     """How a lens is fitted, with the options that say it."""
 
-    radius: Annotated[
-        float,
-        typer.Option(
-            min=1.0,
-            metavar="PX",
-            help="Pixels farther from the middle do not count. Default: all count.",
-            show_default=False,
-        ),
-    ] = math.inf
-    distances: Annotated[
-        str,
-        typer.Option(
-            "--distance",
-            metavar="D,...",
-            help="Where both are compared, m: inf fits a rotation of the axes, 1,100 a translation too.",
-        ),
-    ] = "inf"
-    intrinsics_only: Annotated[
-        bool, typer.Option("--intrinsics-only", help="The axes of the camera stay where they are.")
-    ] = False
-    knot_grid: Annotated[
-        str,
-        typer.Option(
-            "--knots", metavar="NXxNY", help="Of --to splined_stereographic: along columns and rows."
-        ),
-    ] = "30x20"
+    radius: Annotated[float, typer.Option(min=1.0, show_default=False)] = math.inf
+    distances: Annotated[str, typer.Option("--distance")] = "inf"
+    intrinsics_only: bool = False
+    knot_grid: Annotated[str, typer.Option("--knots")] = "30x20"
 
     def converted(self, camera: Camera, to: str, size: tuple[int, int]) -> Conversion:
         """Fit the lens."""
@@ -75,45 +53,21 @@ class Fit:
 def convert_lens(
     job: Job,
     *,
-    path: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(
-            metavar="IN",
-            help="A camera: a .cameramodel of mrcal, or any project; a calibration with its covariances.",
-        ),
-    ],
-    to: Annotated[
-        str,
-        typer.Option(
-            metavar="MODEL",
-            help="opencv4, opencv5, opencv8, opencv12, opencv_fisheye, splined_stereographic, or another"
-            " model of docs/cameras.md.",
-        ),
-    ],
-    camera: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which camera, where there are several.")
-    ] = None,
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Width and height of the pictures, where no file says it."),
-    ] = None,
-    fit: Fit,
-    tolerance: Annotated[
-        float | None, typer.Option(metavar="PX", help="Exit code 4 where a difference is larger.")
-    ] = None,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for the report, differences, and the camera in the formats that can hold it."),
-    ] = None,
-    json: JsonFile = None,
-    plots: Plots = False,
+    path: Annotated[Path, Reads.FILE],
+    to: str,
+    camera: str | None = None,
+    size: str | None = None,
+    fit: LensFit,
+    tolerance: float | None = None,
+    out: OutputFolder = None,
+    json: OutputFile = None,
+    plots: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fit a lens of another model to what a camera shows, and say what it misses.
+    """Fit a lens of another model to a camera and report the differences.
 
-    Over 60 x 40 pixels: rms and largest difference, where it is, and the motion of the axes. Where the camera
-    has covariances the new one has them too.
+    The report contains root mean square and largest difference of 60 x 40 pixels, the largest one's position,
+    and the motion of the axes. If the camera has covariances, the new camera has covariances, too.
     """
     from photogram.show.forms import summary
 

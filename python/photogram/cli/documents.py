@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from photogram.cli.console import output, print_remark, print_sections
 from photogram.cli.job import Job, OutputFile, OutputFolder, Without
-from photogram.cli.options import JsonFile, PictureFormat, Plots
+from photogram.cli.options import PictureFormat
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
@@ -27,64 +27,22 @@ TEXT, HTML = "report.txt", "report.html"
 NEEDED = ("jinja2", "contourpy")
 """What makes that for the browser: the extra `report`."""
 
-Crs = Annotated[
-    str | None,
-    typer.Option(
-        metavar="CRS",
-        help="Coordinate reference system of results in `in_crs/` and of maps (EPSG:25832 ...).",
-    ),
-]
-
 
 @dataclass(frozen=True)
 class Documents:
     """In which forms a user wants a result, with the options that say it."""
 
-    json: JsonFile = None
-    xlsx: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the tables of the result as an Excel workbook, a sheet each; needs openpyxl.",
-        ),
-    ] = None
-    html: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Where the report for the browser goes. Default: report.html in --out, if there is one.",
-        ),
-    ] = None
-    no_html: Annotated[bool, typer.Option("--no-html", help="Write no report for the browser.")] = False
-    plots: Plots = False
-    plot_format: Annotated[PictureFormat, typer.Option(help="Format of the pictures.")] = "png"
-    parquet: Annotated[
-        OutputFolder,
-        typer.Option(
-            metavar="DIR", help="Write the whole result as Parquet, which photogram.read_result reads."
-        ),
-    ] = None
-    crs: Crs = None
-    map: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write a map, .gpkg or .geojson: photos, footprints, error ellipses, suspicious"
-            " observations.",
-        ),
-    ] = None
-    ply: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE", help="Write the points as a point cloud with standard deviations (PLY)."
-        ),
-    ] = None
-    ply_origin: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(
-            metavar="X Y Z", help="Taken away from the coordinates of --ply: viewers want small ones."
-        ),
-    ] = None
+    json: OutputFile = None
+    xlsx: OutputFile = None
+    html: OutputFile = None
+    no_html: bool = False
+    plots: bool = False
+    plot_format: PictureFormat = "png"
+    parquet: OutputFolder = None
+    crs: str | None = None
+    map: OutputFile = None
+    ply: OutputFile = None
+    ply_origin: tuple[float, float, float] | None = None
 
     def place(self, out: Path | None) -> Path | None:
         """Return where the report for the browser goes, of results in a directory; None where to none."""

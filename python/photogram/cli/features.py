@@ -8,15 +8,13 @@ import typer
 
 from photogram.cli.adjust import result_at
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, OutputFolder, with_job
-from photogram.cli.options import JsonFile, Quiet, Strict, Threads, out_option
-from photogram.cli.projects import Additions, Example, ProjectPath
+from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, with_job
+from photogram.cli.options import Quiet, Threads
+from photogram.cli.projects import Additions
 from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.results.features import Definition
-
-Given = list[str] | None
 
 
 def _option(kind: str, what: str) -> Any:
@@ -24,17 +22,15 @@ def _option(kind: str, what: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class FeatureOptions:
     """Features, with the options that say what they go through; all may be given more than once."""
 
-    distance: Annotated[Given, _option("distance", "Between two points.")] = None
-    line: Annotated[Given, _option("line", "Through 2 or more points: axis, straightness.")] = None
-    plane: Annotated[Given, _option("plane", "Through 3 or more: normal, flatness.")] = None
-    circle: Annotated[
-        Given, _option("circle", "Through 3 or more: diameter, centre, normal, roundness; bore='hole-*'.")
-    ] = None
-    sphere: Annotated[Given, _option("sphere", "Through 4 or more: diameter, centre, sphericity.")] = None
-    cylinder: Annotated[Given, _option("cylinder", "Through 6 or more: diameter, axis, cylindricity.")] = None
+    distance: list[str] | None = None
+    line: list[str] | None = None
+    plane: list[str] | None = None
+    circle: list[str] | None = None
+    sphere: list[str] | None = None
+    cylinder: list[str] | None = None
 
     def definitions(self) -> dict[str, Definition]:
         """Return what is asked for, by its name."""
@@ -54,31 +50,23 @@ class Wanted:
 def features(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    wanted: Wanted,
-    k: Annotated[float, typer.Option("-k", metavar="K", min=0.01, help="Coverage factor: U = k sd.")] = 2.0,
-    coverage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P",
-            min=0.01,
-            max=0.999999,
-            help="A probability in place of -k: 0.95. k is Student's where the unit weight is estimated.",
-        ),
-    ] = None,
-    out: Annotated[OutputFolder, out_option("Directory for tables of values and of deviations.")] = None,
-    json: JsonFile = None,
+    path: InputFile = None,
+    example: bool = False,
+    wanted: FeatureOptions,
+    k: Annotated[float, typer.Option("-k", min=0.01)] = 2.0,
+    coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None,
+    out: OutputFolder = None,
+    json: OutputFile = None,
     added: Additions,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
 
-    PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
-    --example is that of `photogram new --kind metrology`.
-    Those that the project declares are fitted where no option names others.
+    PATH is a result of `photogram adjust --parquet`, or a project that is adjusted first. Features of the
+    project are fitted if no option defines features. --example is the project of `photogram new --kind
+    metrology`.
     """
     path = job.packaged("flange") if path is None else path
     with job:

@@ -10,21 +10,19 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
-from photogram.cli.components import COMPONENTS, Components, Found, UnitVarianceName, snooped
+from photogram.cli.components import COMPONENTS, Basis, Found, UnitVarianceName, snooped
 from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
 from photogram.cli.options import (
     AirModel,
-    Ordering,
+    OrderingName,
     Quiet,
     Snooping,
-    Strict,
     Threads,
     WaterModel,
     check_alone,
     default_out,
-    out_option,
 )
 from photogram.cli.progress import adjustment_status
 from photogram.lazy_dataclasses import dataclass, replace
@@ -40,44 +38,16 @@ RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 
 
 @dataclass(frozen=True)
-class How:
-    """How a project is adjusted where COMMON does not say it, with the options that do."""
+class GiantOptions:
+    """How a GIANT project is adjusted if COMMON does not specify it."""
 
-    as_published: Annotated[
-        bool,
-        typer.Option(
-            "--as-published",
-            help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
-        ),
-    ] = False
-    unit_variance: Annotated[
-        UnitVarianceName | None,
-        typer.Option(
-            metavar="NAME",
-            help="What the variance of unit weight is based on: all weighted values (`constrained`),"
-            " redundancy numbers, or 1. Default: as COMMON says, with redundancy numbers for cameras that are"
-            " free; with --as-published the rule of 1987 for these.",
-        ),
-    ] = None
-    components: Components = None
-    ordering: Ordering = "auto"
-    air_refraction: Annotated[
-        AirModel | None,
-        typer.Option(
-            help="Refraction in air by the guide (to 9,000 m), by a standard atmosphere, or none, whatever"
-            " COMMON asks for. Default where it does: giant."
-        ),
-    ] = None
-    water_refraction: Annotated[
-        WaterModel | None,
-        typer.Option(
-            help="Refraction in water by the guide or by Snell's law, below the level in COMMON, or none,"
-            " whatever COMMON asks for. Default where it does: giant."
-        ),
-    ] = None
-    water_index: Annotated[
-        float | None, typer.Option(min=1, help="Refractive index of the water. Default: 1.340.")
-    ] = None
+    as_published: bool = False
+    unit_variance: UnitVarianceName | None = None
+    components: list[Basis] | None = None
+    ordering: OrderingName = "auto"
+    air_refraction: AirModel | None = None
+    water_refraction: WaterModel | None = None
+    water_index: Annotated[float | None, typer.Option(min=1)] = None
 
     def basis(self, common: Common) -> UnitVariance:
         """Return what the variance of unit weight is based on."""
@@ -89,55 +59,22 @@ class How:
 def giant(
     job: Job,
     *,
-    directory: Annotated[
-        Path | None,
-        Reads.PROJECT,
-        typer.Argument(
-            metavar="DIR",
-            help="Directory of COMMON, CAMERAS, IMAGES, FRAMES, GROUND (any letter case, any extension).",
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option(
-            "--example", help="Adjust the packaged example instead: 20 photographs at Galveston Bay."
-        ),
-    ] = False,
-    out: Annotated[
-        OutputFolder,
-        out_option(
-            "Directory for adjusted stations and points and report. Default: DIR-adjusted beside DIR."
-        ),
-    ] = None,
+    directory: Annotated[Path | None, Reads.PROJECT] = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: Annotated[Documents, Without("xlsx", "crs")],
-    listing: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the printout of the 1987 program, page by page, as COMMON asks for it.",
-        ),
-    ] = None,
-    how: How,
+    listing: OutputFile = None,
+    how: GiantOptions,
     threads: Threads = None,
     snooping: Snooping,
-    limits: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N1=..,N6=..",
-            help="Limits of the 1987 program: N1 stations, N2 points, N3 control, N4 photographs of a point,"
-            " N5 cameras, N6 bandwidth. Default: none.",
-        ),
-    ] = None,
-    strict: Strict = False,
+    limits: str | None = None,
+    strict: bool = False,
     quiet: Quiet = False,
-    overwrite: Annotated[
-        bool,
-        typer.Option("--overwrite", help="Allow --out to be a directory with another GIANT project in it."),
-    ] = False,
+    overwrite: bool = False,
 ) -> None:
     """Adjust a GIANT project: photographs, points and their covariances.
 
-    Writes FRAMES and GROUND (adjusted, when converged), RESTART (stations of the last iteration), report.html
+    Writes FRAMES and GROUND (adjusted, if converged), RESTART (stations of the last iteration), report.html
     and report.txt.
     """
     with job:
@@ -227,7 +164,7 @@ def _result_files(
 
 
 def _project_and_block(
-    job: Job, directory: Path, limits: str | None, how: How
+    job: Job, directory: Path, limits: str | None, how: GiantOptions
 ) -> tuple[Project, Block, Limits | None]:
     """Read a project, with what is remarked on it, its block as it is adjusted, and the limits of 1987."""
     from photogram.formats.planes import plane_remarks
@@ -240,7 +177,7 @@ def _project_and_block(
     return replace(project, messages=remarks), block, allowed
 
 
-def _refracted(block: Block, common: Common, how: How) -> Block:
+def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
     """Give the block of a project the refraction of COMMON and the options."""
     from photogram.giant.assembly import job_refraction
 
@@ -252,7 +189,7 @@ def _refracted(block: Block, common: Common, how: How) -> Block:
 
 
 def _adjusted_project(
-    job: Job, project: Project, block: Block, how: How, threads: int | None, snooping: Snooping
+    job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
 ) -> Found[Result]:
     """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
     from photogram.diagnosis.after_adjustment import errors_explained
@@ -278,7 +215,7 @@ def _adjusted_project(
 def _snooped(
     project: Project,
     block: Block,
-    how: How,
+    how: GiantOptions,
     threads: int | None,
     snooping: Snooping,
     progress: Callable[[Progress], None] | None,
@@ -295,7 +232,11 @@ def _snooped(
 
 
 def _adjusted(
-    project: Project, block: Block, how: How, threads: int | None, progress: Callable[[Progress], None] | None
+    project: Project,
+    block: Block,
+    how: GiantOptions,
+    threads: int | None,
+    progress: Callable[[Progress], None] | None,
 ) -> Found[Result]:
     """Adjust the block by the rules of today, or those of 1987."""
     from photogram import AsPublished, adjust

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -32,36 +32,12 @@ TAKEN = frozenset(
 class Parts:
     """How a user divides an adjustment, with the options that say it."""
 
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS|local",
-            help="Adjust in parts on a Dask cluster: its scheduler, or `local` for workers on this machine.",
-        ),
-    ] = None
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Workers of a local cluster; one for each processor.")
-    ] = None
-    parts: Annotated[
-        int | None, typer.Option(metavar="P", help="Parts. Default: some for each worker, that fit.")
-    ] = None
-    memory: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SIZE",
-            help="Memory of a worker, or of this process (4GB, 1.5GiB): what takes more goes in parts.",
-        ),
-    ] = None
-    run: Annotated[
-        OutputFolder,
-        typer.Option(
-            metavar="DIR",
-            help="Keep parts and states there, for all workers: the same command takes up a run that died.",
-        ),
-    ] = None
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Print parts, work, memory, traffic and time, and adjust nothing.")
-    ] = False
+    cluster: str | None = None
+    workers: int | None = None
+    parts: int | None = None
+    memory: str | None = None
+    run: OutputFolder = None
+    plan: bool = False
 
     @property
     def division(self) -> Division | None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, with_job
-from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.projects import Additions, Example, ProjectPath, described, project_path, read_project
+from photogram.cli.job import InputFile, Job, OutputFile, with_job
+from photogram.cli.options import Quiet
+from photogram.cli.projects import Additions, described, project_path, read_project
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
@@ -22,15 +22,15 @@ CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 def info(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    json: JsonFile = None,
+    path: InputFile = None,
+    example: bool = False,
+    json: OutputFile = None,
     added: Additions,
     quiet: Quiet = False,
 ) -> None:
-    """Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks.
+    """Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.
 
-    A project that asks for an accuracy statement is told with what that would be about.
+    If the project requests an accuracy statement, the command describes the subject of the statement.
     """
     with job:
         from photogram.io.json import to_json

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
+from photogram.cli.command_classes import declared
 from photogram.cli.console import errors, failures, print_remark, print_report, print_written
 from photogram.messages import Message, printable
 
@@ -306,17 +307,17 @@ class Without:
 
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
-    """Return what the options and arguments of a command name that is read or written.
+    """Return the roles of options and arguments of a command that are paths.
 
     Raises
     ------
     TypeError
-        One of them is a path, and does not say which.
+        A path has no role, or several.
     """
     found: dict[str, Reads | Writes] = {}
     for parameter in _options(command)[0]:
-        kind, *metadata = get_args(parameter.annotation) or (parameter.annotation,)
-        marks = [each for each in metadata if isinstance(each, Reads | Writes)]
+        kind, *metadata = get_args(parameter.annotation)
+        marks = [mark for mark in metadata if isinstance(mark, Reads | Writes)]
         if len(marks) == 1:
             found[parameter.name] = marks[0]
         elif marks or _holds_path(kind):
@@ -329,19 +330,20 @@ def _holds_path(kind: object) -> bool:
 
 
 def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[str]]]]:
-    """Return options and arguments of a command, and those that it takes as one value of a class."""
-    found: list[Parameter] = []
+    """Return options and arguments of a command, and its parameters that are classes of options."""
+    options: list[Parameter] = []
     grouped: dict[str, tuple[type, list[str]]] = {}
     for parameter in signature(command, eval_str=True).parameters.values():
         kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
-        own = [parameter]
         if isinstance(kind, type) and is_dataclass(kind):
             without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
             fields = signature(kind, eval_str=True).parameters.values()
-            own = [each for each in fields if each.name not in without]
-            grouped[parameter.name] = kind, [each.name for each in own]
-        found += [each.replace(kind=Parameter.KEYWORD_ONLY) for each in own if each.name != "job"]
-    return found, grouped
+            own = [declared(field, kind.__name__) for field in fields if field.name not in without]
+            grouped[parameter.name] = kind, [field.name for field in own]
+            options += own
+        elif parameter.name != "job":
+            options.append(declared(parameter, command.__name__))
+    return options, grouped
 
 
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
@@ -356,8 +358,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     TypeError
         A path among the parameters is marked neither as read nor as written.
     """
-    marked = roles(command)
     own, grouped = _options(command)
+    marked = roles(command)
 
     @wraps(command)
     def with_one(**values: Any) -> None:

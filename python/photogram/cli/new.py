@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
-
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import Quiet
 from photogram.cli.projects import EXAMPLE
@@ -30,29 +28,19 @@ SOURCES = {
 @with_job
 def new(
     job: Job,
-    out: Annotated[
-        Path,
-        Writes.DIRECTORY,
-        typer.Argument(metavar="DIR", help="Folder for the project; it is made if need be."),
-    ],
-    kind: Annotated[
-        Kind,
-        typer.Option(
-            help="block: photos of a drone with control. metrology: targets and scale bars, no control."
-            " survey: check points enough to state an accuracy. rolling: photos of a drone with a rolling"
-            " shutter. archive: scanned film with fiducial marks. night: exposures of stars. board: corners"
-            " of a chessboard in pictures."
-        ),
-    ] = "block",
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a project that is there already.")
-    ] = False,
+    out: Annotated[Path, Writes.DIRECTORY],
+    kind: Kind = "block",
+    overwrite: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a small real project as tables, with comments that say what may stand there.
+    """Write a small real project as tables with comments on their contents.
 
-    Replace the tables by your own; `photogram adjust DIR` adjusts it, `photogram stellar-camera exposures
-    DIR/night.toml` a night, `photogram calibrate DIR` a camera that sees a board.
+    Replace the tables by your own. `photogram adjust DIR` adjusts the project, `photogram stellar-camera
+    exposures DIR/night.toml` a night, `photogram calibrate DIR` views of a board.
+
+    Kinds: block: photos of a drone with control. metrology: targets and scale bars without control. survey:
+    enough check points for an accuracy statement. rolling: photos of a drone with a rolling shutter. archive:
+    scanned film with fiducial marks. night: exposures of stars. board: corners of a chessboard.
     """
     with job:
         from photogram.errors import InputError

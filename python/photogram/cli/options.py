@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.job import Job, OutputFile
+from photogram.cli.job import Job
 from photogram.lazy_dataclasses import dataclass
 
 PictureFormat = Literal["png", "pdf", "svg"]
@@ -18,58 +18,18 @@ OrderingName = Literal["auto", "input", "rcm", "amd", "dissection", "graph-disse
 AirModel = Literal["giant", "standard", "none"]
 WaterModel = Literal["giant", "snell", "none"]
 
-JsonFile = Annotated[
-    OutputFile, typer.Option(metavar="FILE", help="Write the whole result as one JSON document.")
-]
-Plots = Annotated[
-    bool, typer.Option("--plots", help="Write the plots to --out, too (png and pdf need matplotlib).")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-Strict = Annotated[
-    bool, typer.Option("--strict", help="End with exit code 4 also where the verdict is a warning.")
-]
-Ordering = Annotated[
-    OrderingName,
-    typer.Option(metavar="NAME", help=f"Order of the photographs: {', '.join(get_args(OrderingName))}."),
-]
-Threads = Annotated[
-    int | None,
-    typer.Option(min=1, metavar="N", help="Threads; the results do not depend on it. Default: all."),
-]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q")]
+Threads = Annotated[int | None, typer.Option(min=1)]
 
 
 @dataclass(frozen=True)
 class Snooping:
     """Whether and how gross errors are taken out, with the options that say it."""
 
-    snoop: Annotated[
-        bool,
-        typer.Option(
-            "--snoop", help="Take gross errors out one after the other, and write what was taken out and why."
-        ),
-    ] = False
-    level: Annotated[
-        float,
-        typer.Option(
-            min=1e-9,
-            max=0.5,
-            metavar="P",
-            help="With --snoop: chance that any good observation is taken out (Bonferroni).",
-        ),
-    ] = 0.05
-    fdr: Annotated[
-        float | None,
-        typer.Option(
-            min=1e-9, max=0.5, metavar="P", help="With --snoop: a false discovery rate in place of --level."
-        ),
-    ] = None
-    unit_weight: Annotated[
-        UnitWeight,
-        typer.Option(
-            metavar="known|unknown",
-            help="With --snoop: whether standard deviations are right, or but for a common factor.",
-        ),
-    ] = "known"
+    snoop: bool = False
+    level: Annotated[float, typer.Option(min=1e-09, max=0.5)] = 0.05
+    fdr: Annotated[float | None, typer.Option(min=1e-09, max=0.5)] = None
+    unit_weight: UnitWeight = "known"
 
     @property
     def options(self) -> dict[str, Any]:

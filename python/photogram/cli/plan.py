@@ -13,7 +13,7 @@ from photogram.cli.check import EXAMPLE as GALVESTON
 from photogram.cli.console import output, print_remark
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, example_out, out_option
+from photogram.cli.options import Quiet, example_out
 from photogram.cli.simulation_options import Control, MotionOptions, NetworkOptions
 from photogram.lazy_dataclasses import replace
 
@@ -27,37 +27,19 @@ def plan(
     *,
     network: NetworkOptions,
     moves: MotionOptions,
-    projects: Annotated[
-        list[Path] | None,
-        Reads.PROJECT,
-        typer.Argument(
-            metavar="DIR",
-            help="GIANT projects, with fictitious or measured images, to be put side by side instead of"
-            " simulated networks.",
-        ),
-    ] = None,
-    packaged: Annotated[
-        bool, typer.Option("--example", help="Predict the packaged block of `photogram giant --example`.")
-    ] = False,
-    against: Annotated[
-        Control, typer.Option(help="Where the control points of the second pattern are.")
-    ] = "corners",
-    against_spacing: Annotated[
-        int | None, typer.Option(help="As --control-spacing, for the second pattern. Default: the same.")
-    ] = None,
-    against_position_sd: Annotated[
-        float | None, typer.Option(help="As --position-sd, for the second pattern. Default: the same.")
-    ] = None,
-    out: Annotated[
-        OutputFolder, out_option("Directory for report.html and report.txt. Default: no files.")
-    ] = None,
+    projects: Annotated[list[Path] | None, Reads.PROJECT] = None,
+    packaged: Annotated[bool, typer.Option("--example")] = False,
+    against: Control = "corners",
+    against_spacing: int | None = None,
+    against_position_sd: float | None = None,
+    out: OutputFolder = None,
     documents: OfPrograms,
     quiet: Quiet = False,
 ) -> None:
-    """Predict the accuracy of a network before it is flown: two patterns of control side by side.
+    """Predict the accuracy of a network before the flight for two patterns of control.
 
-    No measurements are needed or made: expected standard deviations of points by number of rays and by
-    location, of photographs, and the gross errors that can be found.
+    No measurements are necessary. The report contains expected standard deviations of points by number of
+    rays and by location, of photographs, and the detectable gross errors.
     """
     with job:
         from photogram.planning.networks import plan as predict

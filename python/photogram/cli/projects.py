@@ -23,131 +23,34 @@ EXAMPLE = ("project",)
 
 OriginName = Literal["corner", "center"]
 """Which place of the first pixel is 0, 0."""
-ProjectPath = Annotated[
-    InputFile,
-    typer.Argument(
-        metavar="PATH", help="A project: a folder or file of any format that docs/formats.md lists."
-    ),
-]
-Example = Annotated[
-    bool, typer.Option("--example", help="Take the packaged example instead, that of `photogram new`.")
-]
-Deviations = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--sd",
-        metavar="TABLE=S[,S,S]",
-        help="Standard deviations where PATH has none: images=0.5, control=0.02,0.02,0.03, gnss=...",
-    ),
-]
-PhotosCrs = Annotated[
-    str | None,
-    typer.Option(
-        "--photos-crs",
-        metavar="CRS",
-        help="System of these, also of heights, where it is not said: EPSG:4326+geoid=46.5.",
-    ),
-]
-MrkAntenna = Annotated[bool, typer.Option("--mrk-antenna", help=".MRK positions are of antennas.")]
 
 
 @dataclass(frozen=True)
 class Additions:
     """What a user adds to a project, with the options that say it."""
 
-    file_format: Annotated[
-        str | None, typer.Option("--format", metavar="NAME", help="Format of PATH. Default: found out.")
-    ] = None
-    control: Annotated[InputFile, typer.Option(metavar="FILE", help="Table of control and check points.")] = (
-        None
-    )
-    control_crs: Annotated[
-        str | None,
-        typer.Option(metavar="CRS", help="CRS of --control (EPSG:25832 ...), where it is not that of PATH."),
-    ] = None
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COLUMN=HEADING,..",
-            help="What the columns of control are: point=Name,x=East,y=-South; -=Heading is not read;"
-            " point,y,x,z or PNEZD without a header.",
-        ),
-    ] = None
-    roles: Annotated[
-        str | None,
-        typer.Option(metavar="WORD=ROLE,..", help="What words of control mean: KP=check, PP=control, X=off."),
-    ] = None
-    images: Annotated[
-        InputFile, typer.Option(metavar="FILE", help="Further measurements: photo, point, column, row.")
-    ] = None
-    names: Annotated[InputFile, typer.Option(metavar="FILE", help="Other names of points: point, name.")] = (
-        None
-    )
-    camera: Annotated[
-        InputFile, typer.Option(metavar="FILE", help="Table of cameras, for formats that have none.")
-    ] = None
-    sd: Deviations = None
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="What project.toml is to say: film.model=affine, adjust.loss=huber.",
-        ),
-    ] = None
-    photos_dir: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="DIR",
-            help="Photographs: positions in their files (EXIF, XMP, .MRK, geo.txt) are observations.",
-        ),
-    ] = None
-    photos_crs: PhotosCrs = None
-    gnss: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Positions of photos: table, geo.txt, .MRK, RTKLIB events.",
-        ),
-    ] = None
-    gnss_crs: Annotated[
-        str | None,
-        typer.Option(metavar="CRS", help="CRS of --gnss. Default: of PATH."),
-    ] = None
-    gnss_antenna: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z[,SD]",
-            help="Antenna: right, up, back of the camera (m; SD 0).",
-        ),
-    ] = None
-    mrk_antenna: MrkAntenna = False
-    pixel_origin: Annotated[
-        OriginName | None,
-        typer.Option(help="Corner or center of the first pixel is 0, 0, in tables of pixels."),
-    ] = None
-    model: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="N", help="Which of several models of a file, from 0. Default: the largest."
-        ),
-    ] = None
-    angles: Annotated[
-        Literal["deg", "gon", "rad"] | None, typer.Option(help="Unit of angles in files that do not say it.")
-    ] = None
-    keep_repeated: Annotated[
-        bool,
-        typer.Option(
-            "--keep-repeated",
-            help="Second images of a point on a photo count too: their mean with the first.",
-        ),
-    ] = False
-    cubes: Annotated[InputFile, typer.Option(metavar="LIST", help="Cubes or ISDs of a control network.")] = (
-        None
-    )
-    jigsaw: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE ...", help="Settings of jigsaw, in quotes, or a file.")
-    ] = None
+    file_format: Annotated[str | None, typer.Option("--format")] = None
+    control: InputFile = None
+    control_crs: str | None = None
+    columns: str | None = None
+    roles: str | None = None
+    images: InputFile = None
+    names: InputFile = None
+    camera: InputFile = None
+    sd: list[str] | None = None
+    settings: Annotated[list[str] | None, typer.Option("--set")] = None
+    photos_dir: InputFile = None
+    photos_crs: str | None = None
+    gnss: InputFile = None
+    gnss_crs: str | None = None
+    gnss_antenna: str | None = None
+    mrk_antenna: bool = False
+    pixel_origin: OriginName | None = None
+    model: Annotated[int | None, typer.Option(min=0)] = None
+    angles: Literal["deg", "gon", "rad"] | None = None
+    keep_repeated: bool = False
+    cubes: InputFile = None
+    jigsaw: str | None = None
 
 
 NOTHING = Additions()

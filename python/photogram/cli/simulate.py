@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
@@ -27,31 +26,25 @@ if TYPE_CHECKING:
 def simulate(
     job: Job,
     *,
-    out: Annotated[
-        Path,
-        Writes.DIRECTORY,
-        typer.Argument(metavar="DIR", help="Directory for the project; it is made if need be."),
-    ],
+    out: Annotated[Path, Writes.DIRECTORY],
     network: NetworkOptions,
     moves: MotionOptions,
-    check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
-    blunders: Annotated[int, typer.Option(help="Image points with a gross error.")] = 0,
-    blunder_size: Annotated[float, typer.Option(help="Size of the gross errors, mm.")] = 0.2,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a project that is there already.")
-    ] = False,
+    check_points: int = 20,
+    blunders: int = 0,
+    blunder_size: float = 0.2,
+    overwrite: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.
+    """Write a simulated block as a GIANT project, or as tables if cameras move, with its truth.
 
-    The GIANT files hold what would have been measured; truth.json holds the true positions and attitudes
-    (rad) of the photographs, the true positions of the points, and the gross errors. FRAMES has one set of
-    stations: with --position-sd or --attitude-sd the observed ones, and for what is not observed then the
-    initial ones with their errors as standard deviations; every weight counts in the unit variance (COMMON
-    column 12). Without, the initial ones with the weak default standard deviations of the files.
+    The GIANT files contain simulated measurements. truth.json contains true positions and attitudes (rad) of
+    photographs, true positions of points, and gross errors. FRAMES has one set of stations. With --position-
+    sd or --attitude-sd these are the observed values; components that are not observed have initial values
+    with their errors as standard deviations. Every weight counts in the unit variance (COMMON column 12).
+    Otherwise FRAMES has initial values with the weak default standard deviations.
 
-    With --readout or --scanner the cameras move while they look, which GIANT files cannot say: tables for
-    `photogram adjust DIR`, and true motions and trajectories in truth.json.
+    With --readout or --scanner the cameras move during the exposure. GIANT files cannot contain motion, so
+    the command writes tables for `photogram adjust DIR`; truth.json contains true motions and trajectories.
     """
     with job:
         from photogram.giant import Project

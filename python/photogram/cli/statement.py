@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from photogram.cli.adjust import result_at
-from photogram.cli.choices import Choices, KeepAll
+from photogram.cli.choices import Choices
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.documents import Crs
-from photogram.cli.job import Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, Strict, Threads, default_out, out_option
-from photogram.cli.projects import Additions, Example, ProjectPath
-from photogram.cli.statement_output import Wanted, stated, statement_files
+from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.options import Quiet, Threads, default_out
+from photogram.cli.projects import Additions
+from photogram.cli.statement_output import StatementOptions, stated, statement_files
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -25,26 +24,24 @@ if TYPE_CHECKING:
 def statement(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    out: Annotated[
-        OutputFolder, out_option("Directory for the page, PDF, JSON and tables. Default: PATH-statement.")
-    ] = None,
-    wanted: Wanted,
-    crs: Crs = None,
+    path: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
+    wanted: StatementOptions,
+    crs: str | None = None,
     added: Additions,
     choices: Choices,
-    keep_all: KeepAll = False,
+    keep_all: bool = False,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.
+    """Write an accuracy statement of a block by published standards: page, PDF, JSON document, tables.
 
-    PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
-    Of a result in the folder of its project, what the project asks for is taken.
-    Check points need standard deviations of their survey: in the table of control, or --sd check=0.01.
-    --example is that of `photogram new --kind survey`.
+    PATH is a result of `photogram adjust --parquet`, or a project that is adjusted first. A result in the
+    folder of its project uses the settings of the project. Check points need standard deviations of their
+    survey, in the table of control or by --sd check=0.01. --example is the project of `photogram new --kind
+    survey`.
     """
     source = job.packaged("survey") if path is None else path
     target = out or (Path("example-statement") if example else default_out(source, "-statement"))

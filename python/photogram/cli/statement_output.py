@@ -25,47 +25,26 @@ def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
     return typer.Option(f"--{name}", metavar=metavar, help=what)
 
 
-Word = str | None
-
-
 @dataclass(frozen=True)
-class Wanted:
+class StatementOptions:
     """What is asked of a statement, with the options that say it; a project may say it too."""
 
-    standard: Annotated[
-        Word, _text("standard", "plain, asprs-2023, nssda, vdi-2634, iso-19157.", "NAME,..")
-    ] = None
-    class_h: Annotated[Word, _text("class-h", "Horizontal accuracy class: 5cm.", "LENGTH")] = None
-    class_v: Annotated[Word, _text("class-v", "Vertical accuracy class: 10cm.", "LENGTH")] = None
-    class_3d: Annotated[Word, _text("class-3d", "Three-dimensional accuracy class.", "LENGTH")] = None
-    area: Annotated[
-        Word, _text("area", "Area of the product: 12.5km2. Default: hull of the adjusted points.", "AREA")
-    ] = None
-    without: Annotated[
-        list[str] | None,
-        _text("without", "Give figures without a check point beside, with the reason.", "POINT=REASON"),
-    ] = None
-    independent: Annotated[
-        Literal["yes", "same-base", "no"] | None,
-        typer.Option(help="Declare whether check points are independent of the block."),
-    ] = None
-    language: Annotated[Literal["en", "de"] | None, typer.Option(help="Of the page. Default: en.")] = None
-    text: Annotated[InputFile, typer.Option(metavar="FILE", help="Sentences of a firm: TOML, by key.")] = None
-    budget: Annotated[
-        list[str] | None,
-        _text("budget", "Take a quantity apart: 'point C08 z', 'distance C01 C30' ..", "QUANTITY"),
-    ] = None
-    coverage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P", min=0.01, max=0.999999, help="Probability of expanded uncertainties. Default: 0.95."
-        ),
-    ] = None
-    project: Annotated[Word, _text("project", "Project, for the head of the page.")] = None
-    client: Annotated[Word, _text("client", "Client.")] = None
-    firm: Annotated[Word, _text("firm", "Firm.")] = None
-    surveyor: Annotated[Word, _text("surveyor", "Who signs.")] = None
-    date: Annotated[Word, _text("date", "Date of the statement (2026-11-25). Default: today.")] = None
+    standard: str | None = None
+    class_h: str | None = None
+    class_v: str | None = None
+    class_3d: str | None = None
+    area: str | None = None
+    without: list[str] | None = None
+    independent: Literal["yes", "same-base", "no"] | None = None
+    language: Literal["en", "de"] | None = None
+    text: InputFile = None
+    budget: list[str] | None = None
+    coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None
+    project: str | None = None
+    client: str | None = None
+    firm: str | None = None
+    surveyor: str | None = None
+    date: str | None = None
 
     def check_alone(self) -> None:
         """Refuse these options of a command that makes no statement."""
@@ -111,7 +90,7 @@ class Wanted:
 
 
 OfHead = Annotated[
-    Wanted,
+    StatementOptions,
     Without(
         "standard", "class_3d", "area", "without", "independent", "language", "text", "budget", "coverage"
     ),

@@ -14,17 +14,12 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
-from photogram.cli.options import Quiet, Strict, Threads, out_option
+from photogram.cli.options import Quiet, Threads
 
 if TYPE_CHECKING:
     from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
-
-Out = Annotated[
-    OutputFolder,
-    out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),
-]
 
 
 Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
@@ -44,27 +39,18 @@ class Effect(StrEnum):
 def stellar_camera(
     job: Job,
     *,
-    deck: Annotated[
-        InputFile,
-        typer.Argument(metavar="DECK", help="Card deck, or a calibration in plain form (a .toml file)."),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Calibrate the packaged example instead: 75 stars in three groups."),
-    ] = False,
-    out: Out = None,
+    deck: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: OfPrograms,
-    as_published: Annotated[
-        bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
-    ] = False,
-    strict: Strict = False,
+    as_published: bool = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
 
-    Where the verdict is that the result must not be used, camera.json is withheld.
-
-    `photogram stellar-camera exposures` does so by digital exposures of the sky.
+    If the verdict forbids the use of the result, camera.json is withheld. `photogram stellar-camera
+    exposures` calibrates a digital camera by exposures of the sky.
     """
     with job:
         from photogram.statistics.verdict import worst
@@ -104,50 +90,20 @@ def stellar_camera(
 def exposures(
     job: Job,
     *,
-    night: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="FILE",
-            help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Calibrate the packaged example instead: five exposures of a night."),
-    ] = False,
-    lens: Annotated[
-        Lens | None,
-        typer.Option(help="Model of the lens; auto: the data choose. Default: what the file says."),
-    ] = None,
-    common_scale: Annotated[
-        bool | None,
-        typer.Option(
-            "--common-scale/--two-scales",
-            help="One principal distance (fx = fy), or two. Default: what the file says.",
-        ),
-    ] = None,
-    without: Annotated[
-        list[Effect] | None,
-        typer.Option(help="Leave an effect out of the places of the stars; may be said more than once."),
-    ] = None,
-    any_roll: Annotated[
-        bool, typer.Option("--any-roll", help="The rolls that are given are not to be relied on.")
-    ] = False,
-    blind: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            metavar="LEAST MOST",
-            help="Neither attitudes nor field of view are known: the smallest and largest horizontal field of"
-            " view, degrees (needs tetra3rs).",
-        ),
-    ] = None,
-    out: Out = None,
+    night: InputFile = None,
+    example: bool = False,
+    lens: Lens | None = None,
+    common_scale: Annotated[bool | None, typer.Option("--common-scale/--two-scales")] = None,
+    without: list[Effect] | None = None,
+    any_roll: bool = False,
+    blind: tuple[float, float] | None = None,
+    out: OutputFolder = None,
     documents: OfPrograms,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
+    """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
     with job:
         from photogram.errors import InputError
         from photogram.stellar.night_calibration import calibrate_night
@@ -176,32 +132,17 @@ def exposures(
 @with_job
 def places(
     job: Job,
-    out: Annotated[
-        Path,
-        Writes.FILE,
-        typer.Argument(metavar="OUT", help="Table of stars to write, as a plate in plain form takes it."),
-    ],
-    utc: Annotated[
-        str,
-        typer.Option(metavar="TIME", help="UTC, such as 1966-03-01T21:03:05; before 1960 universal time."),
-    ],
-    catalogue: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Stars as exposures take them (id, ra_deg, dec_deg, pm_ra_mas ...). Default: Hipparcos.",
-        ),
-    ] = None,
-    epoch: Annotated[
-        float, typer.Option(metavar="YEAR", help="Of the places in FILE, Julian year.")
-    ] = 2000.0,
-    faintest: Annotated[float, typer.Option(metavar="MAGNITUDE", help="Stars up to this magnitude.")] = 6.0,
+    out: Annotated[Path, Writes.FILE],
+    utc: str,
+    catalogue: InputFile = None,
+    epoch: float = 2000.0,
+    faintest: float = 6.0,
     quiet: Quiet = False,
 ) -> None:
-    """Compute apparent places of stars for a plate (needs pyerfa).
+    """Compute apparent positions of stars for a plate (needs pyerfa).
 
-    Geocentric, true equator and equinox of date: proper motion, parallax, light deflection, annual
-    aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
+    Positions are geocentric, true equator and equinox of date: proper motion, parallax, light deflection,
+    annual aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
     """
     with job:
         from photogram.io.csv_text import csv_text

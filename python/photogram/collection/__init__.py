@@ -20,17 +20,3 @@ __all__ = [
 ]
 
 check_arguments(globals(), set(__all__) - {"AdjustedCollection", "PARAMETERS", "Simulation"})
-
-WAYS = {
-    "adjusted_again": ("adjust",),
-    "check_of": ("checking",),
-    "core_network": ("core_arrays",),
-    "determined": ("tables",),
-    "first_adjusted": ("components",),
-    "observables": ("components",),
-    "pictured": ("picture_data",),
-    "scaled": ("components",),
-    "snooped_network": ("snooping",),
-    "terms_of": ("tables",),
-}
-"""The files that show results and work on collections, by the names of ways: see `photogram.show.methods`."""

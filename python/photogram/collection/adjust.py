@@ -11,7 +11,6 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import (
     Ordering,
     Progress,
-    adjusted_again,
     check_iteration,
     core_threads,
     teller,
@@ -134,13 +133,6 @@ def adjusted(
         options=options,
         state=solution.state,
     )
-
-
-@adjusted_again.register
-def _(
-    block: Collection, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> AdjustedCollection:
-    return adjusted(block, options, threads=threads, start=start)
 
 
 def _messages(solution: _photocore.CollectionSolution, collection: Collection) -> list[Message]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from photogram.collection.adjust import adjust
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
-from photogram.diagnosis.diagnose import Manner, check_block, check_of
+from photogram.diagnosis.diagnose import Manner, check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
 
 
-@check_of.register
-def _(network: Collection, threads: int | None) -> Diagnosis:
+def check(network: Collection, threads: int | None) -> Diagnosis:
+    """Check a collection."""
     section = Section("Start", "Values of a collection may be far off: a robust adjustment comes first.")
     try:
         adjusted = adjust(network, loss="huber", covariance=False, threads=threads)

@@ -19,6 +19,14 @@ from photogram.network.observations import Observation
 from photogram.network.tables import numbered
 from photogram.show.summary import Brief, Rows
 
+if TYPE_CHECKING:
+    from photogram import Snooped
+    from photogram.collection import AdjustedCollection
+    from photogram.diagnosis import Diagnosis
+    from photogram.network.core_arrays import CoreOptions
+    from photogram.results.grouping import Grouping, Observables
+    from photogram.statistics.snooping.taking_out import Settings
+
 __all__ = ["PARAMETERS", "Collection"]
 
 
@@ -187,6 +195,36 @@ class Collection(Valued, Brief):
     def replace(self, **changes: Any) -> Self:
         """Return the collection with other arrays in place of the named ones."""
         return replace(self, **changes)
+
+    def _observables(self) -> Observables:
+        from photogram.collection.components import collection_observables
+
+        return collection_observables(self)
+
+    def _scaled(self, grouping: Grouping, factors: Floats) -> Collection:
+        from photogram.collection.components import scaled_collection
+
+        return scaled_collection(self, grouping, factors)
+
+    def _adjust(self, **options: Any) -> AdjustedCollection:
+        from photogram.collection.adjust import adjust
+
+        return adjust(self, **options)
+
+    def _adjust_again(self, options: CoreOptions, **more: Any) -> AdjustedCollection:
+        from photogram.collection.adjust import adjusted
+
+        return adjusted(self, options, **more)
+
+    def _snoop(self, settings: Settings, **options: Any) -> Snooped:
+        from photogram.collection.snooping import snoop_collection
+
+        return snoop_collection(self, settings, **options)
+
+    def _check(self, threads: int | None) -> Diagnosis:
+        from photogram.collection.checking import check
+
+        return check(self, threads)
 
     def computed_xy(self) -> Floats:
         """Return (m, 2) the image coordinates that the present parameters and positions give."""

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram.adjustment.components import first_adjusted, scaled
 from photogram.arguments.types import Floats
-from photogram.collection.adjust import adjust
 from photogram.collection.collection import Collection
-from photogram.collection.result import AdjustedCollection
-from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping, Observables
 
-DECREASE = 1e-12
-"""Part of the sum of squares by which steps still lower it: components want adjustments that are sharp."""
 
-
-@observables.register
 def collection_observables(collection: Collection) -> Observables:
     """Return what a collection has observations of: photos and points are called by their numbers."""
     photos = len(collection.photo_parameters)
@@ -34,7 +26,6 @@ def collection_observables(collection: Collection) -> Observables:
     )
 
 
-@scaled.register
 def scaled_collection(collection: Collection, grouping: Grouping, factors: Floats) -> Collection:
     """Return a collection with the variances of groups multiplied by factors."""
     roots = np.sqrt(factors)
@@ -43,9 +34,3 @@ def scaled_collection(collection: Collection, grouping: Grouping, factors: Float
         point_sd=collection.point_sd * grouping.factors(roots, grouping.points),
         photo_sd=collection.photo_sd * grouping.factors(roots, grouping.photos),
     )
-
-
-@first_adjusted.register
-def _(network: Collection, *, tolerance: float, threads: int | None) -> AdjustedCollection:
-    del tolerance
-    return adjust(network, tolerance=DECREASE, threads=threads)

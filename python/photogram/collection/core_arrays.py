@@ -13,7 +13,7 @@ from photogram.collection.collection import POSE, Collection
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.messages import listed
-from photogram.network.core_arrays import CoreOptions, core_network
+from photogram.network.core_arrays import CoreOptions
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
 from photogram.words import Phrase
 
@@ -21,7 +21,6 @@ ROUGH, EXACT = 1e-7, 1e-12
 """A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
 
 
-@core_network.register
 def collection_network(given: Collection, options: CoreOptions) -> _photocore.CollectionNetwork:
     """Return a collection as the core adjusts it, and answers questions about it afterwards."""
     return _photocore.collection_network(

@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.network.cameras import Camera
-from photogram.plots.picture_data import Correlated, Curve, Curves, Pictured, Plan, pictured
+from photogram.plots.picture_data import Correlated, Curve, Curves, Plan
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
 from photogram.results.picture_data import PicturedNetwork
 
@@ -134,8 +134,3 @@ class PicturedCollection(PicturedNetwork):
         values = self.result.photo_parameters[photo, len(POSE) :].tolist()
         given = dict(zip(collection.parameters[len(POSE) :], values, strict=True))
         return radial_part(Camera(collection.camera, given))
-
-
-@pictured.register(AdjustedCollection)
-def _pictured(result: AdjustedCollection) -> Pictured:
-    return PicturedCollection(result)

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from photogram import _photocore
     from photogram.io.writing import Content
+    from photogram.plots.picture_data import Pictured
+    from photogram.results.axes import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
@@ -68,7 +71,7 @@ class AdjustedCollection(AdjustedNetwork):
         """Return the table of one kind of thing as a data frame; pandas takes long to import."""
         import pandas as pd
 
-        from photogram.results.network_tables import TABLES
+        from photogram.results.tests import TABLES
         from photogram.show.quantity import frame
 
         return pd.DataFrame(frame(TABLES[what](self)))
@@ -137,6 +140,24 @@ class AdjustedCollection(AdjustedNetwork):
 
     def _refused(self, error: Failure) -> Exception:
         return named(*error.args)
+
+    def _core_network(self) -> _photocore.CollectionNetwork:
+        return collection_network(self.collection, self.options)
+
+    def _terms(self) -> Terms:
+        from photogram.collection.tables import collection_terms
+
+        return collection_terms(self)
+
+    def _determined(self) -> Determined:
+        from photogram.collection.tables import determined
+
+        return determined(self)
+
+    def _plot_data(self) -> Pictured:
+        from photogram.collection.picture_data import PicturedCollection
+
+        return PicturedCollection(self)
 
     def _trial(self) -> NetworkTrial:
         options = replace(self.options, covariance=True, loss=None)

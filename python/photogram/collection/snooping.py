@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, core_threads
 from photogram.adjustment.robust import LossName, loss_row
-from photogram.adjustment.snooping import finished, gone, snooped_network, used_images
+from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
@@ -37,9 +37,8 @@ FAR = 5.0
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 
-@snooped_network.register
-def _snoop_collection(
-    network: Collection,
+def snoop_collection(
+    collection: Collection,
     settings: Settings,
     *,
     parts: bool,
@@ -48,7 +47,7 @@ def _snoop_collection(
     progress: Callable[[Progress], None] | None,
     **options: Any,
 ) -> Snooped:
-    collection = network
+    """Remove gross errors from a collection; see :func:`photogram.snoop`."""
     one_of("unit_variance", unit_variance, ("constrained",))
 
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:

@@ -7,14 +7,12 @@ import numpy as np
 from photogram import _photocore
 from photogram.collection.collection import POSE
 from photogram.collection.result import AdjustedCollection
-from photogram.results.axes import image_axes
-from photogram.results.network_tables import Terms, terms_of
-from photogram.results.weakest import Determined, determined
+from photogram.results.axes import Determined, Terms, image_axes
 from photogram.show.quantity import Axis, Quantity
 
 
-@terms_of.register(AdjustedCollection)
-def _terms(result: AdjustedCollection) -> Terms:
+def collection_terms(result: AdjustedCollection) -> Terms:
+    """Return names and components of photos, points and images of a collection."""
     given = result.collection
     named = zip(given.parameters, given.units, strict=True)
     return Terms(
@@ -39,9 +37,8 @@ def _terms(result: AdjustedCollection) -> Terms:
     )
 
 
-@determined.register
 @np.errstate(invalid="ignore")
-def _(result: AdjustedCollection) -> Determined:
+def determined(result: AdjustedCollection) -> Determined:
     """Turn w and t of P = R(w) X + t into the station and a turn about the axes of the photo.
 
     In w and t a photo far from the origin would look badly determined, whatever sees it.

@@ -17,10 +17,8 @@ from photogram.messages import Message, counted
 
 CORRECTED = ("corrected_x_um", "corrected_y_um", "sd_x_um", "sd_y_um", "in_range")
 READINGS = ("reading_x_um", "reading_y_um", "in_range")
-EDGE = 1.25
-"""In half ranges from the middle: nearer than this polynomials extrapolate with a remark."""
-ROUNDING = 1e-6
-"""Of places on the edge, in half ranges."""
+EDGE = 1.25  # In half ranges from the middle: nearer than this polynomials extrapolate with a remark
+ROUNDING = 1e-6  # Of places on the edge, in half ranges
 
 
 def correct_table(
@@ -31,8 +29,6 @@ def correct_table(
     The standard deviations are what the calibration contributes; those of the readings come on top. The
     column `in_range` says whether the calibration measured there. With `invert` coordinates are corrected
     ones, and readings are added; `extrapolate` corrects points far outside the calibrated range, too.
-
-    Raises InputError: a row without coordinates, or no row; points far outside the calibrated range.
     """
     places = []
     for row in table.records.rows():

@@ -15,31 +15,19 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.reduction import GridErrors, Reduction
 from photogram.lazy_dataclasses import dataclass
 
-SAME_PLACE = 0.25
-"""Locations nearer to each other than this part of the spacing of the plate are one."""
+SAME_PLACE = 0.25  # Locations nearer to each other than this part of the spacing of the plate are one
 
 
 @dataclass(frozen=True, eq=False)
 class LocationAverages:
-    """Average comparator residuals of the cases in which the plate lay at one place of the comparator.
+    """Average comparator residuals of the cases in which the plate lay at one place of the comparator."""
 
-    Attributes
-    ----------
-    cases
-        Numbers of these cases.
-    locations
-        (m,) numbers of the comparator locations: those of the plate with corner 1 nearest the comparator's
-        zero.
-    xy_um
-        (m, 2) where they are: mean comparator coordinates.
-    residuals_um
-        (m, 2) averages of the comparator residuals there.
-    """
-
-    cases: tuple[int, ...]
+    cases: tuple[int, ...]  # Numbers of these cases
+    # (m,) numbers of the comparator locations: those of the plate with corner 1 nearest the
+    # comparator's zero
     locations: Indices
-    xy_um: Floats
-    residuals_um: Floats
+    xy_um: Floats  # (m, 2) where they are: mean comparator coordinates
+    residuals_um: Floats  # (m, 2) averages of the comparator residuals there
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,39 +36,20 @@ class PlateAverages:
 
     X and Y are exchanged against the axes of the plate where that case is left-handed (`left_handed`), as the
     report prints them.
-
-    Attributes
-    ----------
-    plate
-        Number of the plate.
-    left_handed
-        Whether X and Y are exchanged.
-    cases
-        Numbers of the cases.
-    points
-        (l,) points of the plate that were measured.
-    counts
-        (l,) in how many cases.
-    grid_um
-        (l, 2) averages of the grid residuals by point: the corrections of the grid.
-    squares_um2
-        (2,) sums of squares of all grid residuals in X and in Y.
-    by_location
-        Averages of the comparator residuals, for each place where the plate lay; none where the pattern of
-        the plate does not meet itself when the plate is turned.
-    xy_um
-        (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
-        case; NaN where missing.
     """
 
-    plate: int
-    left_handed: bool
-    cases: tuple[int, ...]
-    points: Indices
-    counts: Indices
-    grid_um: Floats
-    squares_um2: Floats
+    plate: int  # Number of the plate
+    left_handed: bool  # Whether X and Y are exchanged
+    cases: tuple[int, ...]  # Numbers of the cases
+    points: Indices  # (l,) points of the plate that were measured
+    counts: Indices  # (l,) in how many cases
+    grid_um: Floats  # (l, 2) averages of the grid residuals by point: the corrections of the grid
+    squares_um2: Floats  # (2,) sums of squares of all grid residuals in X and in Y
+    # Averages of the comparator residuals, for each place where the plate lay; none where the pattern
+    # of the plate does not meet itself when the plate is turned
     by_location: tuple[LocationAverages, ...]
+    # (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
+    # case; NaN where missing
     xy_um: Floats
 
     @property

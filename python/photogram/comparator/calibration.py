@@ -58,8 +58,8 @@ from photogram.show.page import Document
 from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings
 
+# Bytes that any calibration takes, and what each pointing adds, with listing and document
 BASE, PER_POINTING = 64 << 20, 3500
-"""Bytes that any calibration takes, and what each pointing adds, with listing and document."""
 
 
 @dataclass(frozen=True, eq=False)

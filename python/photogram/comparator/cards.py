@@ -19,8 +19,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 
 SPECIAL_GRID = 3
-CASES = 20
-"""Cases that a header names operators for."""
+CASES = 20  # Cases that a header names operators for
 
 
 @dataclass(frozen=True)
@@ -58,19 +57,15 @@ class _Format:
     plate: tuple[int, int] | None = None
 
 
+# Formats 122 and, with the centre of the range (TRANS, F9.6) behind it, 143
 STANDARD = _Format((3, 7), 8, (9, 10), (12, 21), (22, 31), 8)
-"""Formats 122 and, with the centre of the range (TRANS, F9.6) behind it, 143."""
 TRANS = (61, 69)
-TRANS_ON_CARDS = 15
-"""The comparator whose cards hold it."""
-SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)
-"""Format 146: right stage of the STK1."""
-PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))
-"""Format 123."""
-PSK_RIGHT = _Format((6, 7), 8, (9, 10), (40, 45), (50, 55), 6, plate=(2, 5))
-"""Format 124."""
+TRANS_ON_CARDS = 15  # The comparator whose cards hold it
+SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)  # Format 146: right stage of the STK1
+PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))  # Format 123
+PSK_RIGHT = _Format((6, 7), 8, (9, 10), (40, 45), (50, 55), 6, plate=(2, 5))  # Format 124
+# Subroutine MICRON: unit digits read apart in columns 3 and 4
 LEAST_COUNT = _Format((5, 7), 8, (9, 10), (11, 19), (20, 29), 6)
-"""Subroutine MICRON: unit digits read apart in columns 3 and 4."""
 
 
 def _integer(record: Record, first: int, last: int) -> int:

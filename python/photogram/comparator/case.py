@@ -27,10 +27,8 @@ from photogram.network.neighbours import mutually_nearest
 # listing's KROTC.
 CORNERS = {1: (-1, -1), 4: (1, -1), 3: (1, 1), 2: (-1, 1)}
 TURNS = {1: 0, 4: -1, 3: 2, 2: 1}
-MATCH = 0.05
-"""A turned point must meet another one within this part of the spacing."""
-_SQUARED = 1e150
-"""Micrometres beyond which squares leave the range of double precision."""
+MATCH = 0.05  # A turned point must meet another one within this part of the spacing
+_SQUARED = 1e150  # Micrometres beyond which squares leave the range of double precision
 
 
 @dataclass(frozen=True)
@@ -65,9 +63,6 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
     compares sums of distances of two points each from the comparator's zero (8 and 12 for point 1, and so
     on); here the places of these points follow from the transformation, so that they need not be measured,
     nor be on the plate.
-
-    Raises InputError: the points lie in a line, or fewer than three are there; coordinates whose squares are
-    no numbers.
     """
     plate = grid.xy_um[grid.rows_of(points)]
     largest = np.abs([plate, xy_um]).max(initial=0.0)
@@ -121,8 +116,8 @@ def locations(grid: Grid, corner: int) -> Indices | None:
 
 
 LEGS = (1, 2, 3, 4)
+# Sine of the angle below which lines do not intersect usefully; those of a plate cross at right angles
 PARALLEL = 1e-3
-"""Sine of the angle below which lines do not intersect usefully; those of a plate cross at right angles."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +130,6 @@ class LegPoint:
 
 def intersect_legs(legs_um: Floats) -> Floats:
     """Return where the line through legs 1 and 3 meets the one through legs 2 and 4.
-
-    Raises InputError: the lines are parallel, or two legs of one line coincide.
 
     Parameters
     ----------
@@ -158,9 +151,6 @@ def reduce_legs(case: Case) -> tuple[Case, list[LegPoint], list[Message]]:
     """Put one intersection in the place of the leg readings of each point.
 
     The readings of each leg are averaged first. A point with fewer than four legs is left out, with a remark.
-
-    Raises InputError: lines that are parallel, with the place of the first reading of the point; a point
-    measured both on its intersection and on its legs.
     """
     if not case.legs.any():
         return case, [], []
@@ -199,40 +189,22 @@ def reduce_legs(case: Case) -> tuple[Case, list[LegPoint], list[Message]]:
     return without, reduced, messages
 
 
-SCALES = (0.5, 2.0)
-"""A scale beyond these means that measurements and grid are in different units."""
+SCALES = (0.5, 2.0)  # A scale beyond these means that measurements and grid are in different units
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCase:
-    """A case with its means.
+    """A case with its means."""
 
-    Attributes
-    ----------
-    case
-        The case as it was measured.
-    readings
-        Its points with their means and sums of squares, in the order of the grouping.
-    points, counts
-        (n,) their numbers, and how often each was read.
-    means_um
-        (n, 2) mean comparator coordinates.
-    grid_um
-        (n, 2) grid coordinates, X and Y exchanged where the comparator is left-handed.
-    orientation
-        How the plate lies.
-    from_legs
-        Points that were measured on their legs.
-    """
-
-    case: Case
+    case: Case  # The case as it was measured
+    # Its points with their means and sums of squares, in the order of the grouping
     readings: list[PointReadings]
-    points: Indices
+    points: Indices  # (n,) their numbers, and how often each was read
     counts: Indices
-    means_um: Floats
-    grid_um: Floats
-    orientation: Orientation
-    from_legs: frozenset[int]
+    means_um: Floats  # (n, 2) mean comparator coordinates
+    grid_um: Floats  # (n, 2) grid coordinates, X and Y exchanged where the comparator is left-handed
+    orientation: Orientation  # How the plate lies
+    from_legs: frozenset[int]  # Points that were measured on their legs
 
     @property
     def number(self) -> int:

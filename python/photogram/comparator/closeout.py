@@ -9,14 +9,10 @@ from photogram.comparator.readings import Case
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
-SUSPECT_UM = 2.0
-"""A mean shift beyond this: a shift of the plate is suspected; close on the second point too."""
-REMEASURE_UM = 4.0
-"""A mean shift from here on: the case must be measured again."""
-FEW_READINGS = 9
-"""A case of so few readings that is not closed is not a measurement of the plate."""
-ENOUGH = 3
-"""Pointings that a close-out needs."""
+SUSPECT_UM = 2.0  # A mean shift beyond this: a shift of the plate is suspected; close on the second point too
+REMEASURE_UM = 4.0  # A mean shift from here on: the case must be measured again
+FEW_READINGS = 9  # A case of so few readings that is not closed is not a measurement of the plate
+ENOUGH = 3  # Pointings that a close-out needs
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +49,6 @@ class Closeout:
 
 def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
     """Check the returns to the first point of a case and, where it was visited again, to the second.
-
-    Raises InputError: the case is not closed and has no more than nine pointings: "INSUFFICIENT MEASUREMENTS
-    MADE".
 
     Returns
     -------

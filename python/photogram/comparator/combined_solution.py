@@ -17,25 +17,13 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 @dataclass(frozen=True, eq=False)
 class CombinedLinear:
-    """The linear parameters of all cases.
+    """The linear parameters of all cases."""
 
-    Attributes
-    ----------
-    correction
-        Scales and lack of orthogonality.
-    sigma0_um, degrees_of_freedom
-        Standard error of unit weight and its degrees of freedom (equation 57).
-    covariance
-        (3, 3) of scale x, scale y, lack of orthogonality in radians (equation 58).
-    cases
-        Rigid fit of each case after the correction.
-    """
-
-    correction: Correction
-    sigma0_um: float
+    correction: Correction  # Scales and lack of orthogonality
+    sigma0_um: float  # Standard error of unit weight and its degrees of freedom (equation 57)
     degrees_of_freedom: int
-    covariance: Floats
-    cases: tuple[RigidFit, ...]
+    covariance: Floats  # (3, 3) of scale x, scale y, lack of orthogonality in radians (equation 58)
+    cases: tuple[RigidFit, ...]  # Rigid fit of each case after the correction
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,25 +41,13 @@ class SinglePolynomial:
 
 @dataclass(frozen=True, eq=False)
 class CombinedPolynomial:
-    """The polynomials of all cases.
+    """The polynomials of all cases."""
 
-    Attributes
-    ----------
-    correction
-        Linear parameters and polynomials.
-    sigma_um
-        (2,) standard deviations of the residuals in x and in y (equation 62).
-    degrees_of_freedom
-        Of each of them.
-    cases
-        Rigid fit of each case after the whole correction.
-    """
-
-    correction: Correction
+    correction: Correction  # Linear parameters and polynomials
     polynomial: Polynomial
-    sigma_um: tuple[float, float]
-    degrees_of_freedom: int
-    cases: tuple[RigidFit, ...]
+    sigma_um: tuple[float, float]  # (2,) standard deviations of the residuals in x and in y (equation 62)
+    degrees_of_freedom: int  # Of each of them
+    cases: tuple[RigidFit, ...]  # Rigid fit of each case after the whole correction
 
     @property
     def sigma0_um(self) -> float:
@@ -130,8 +106,7 @@ def _refit(
 def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = False) -> SinglePolynomial:
     """Fit polynomials to the residuals of the linear adjustment of one case (equations 59 to 61).
 
-    `as_listed` turns the residuals into the grid system without the change of sign that they have everywhere
-    else. Raises AdjustmentError: too few points, or too few different coordinates.
+    `as_listed` omits the change of sign of the residuals in the grid system.
     """
     parameters = fit.parameters
     linear = case.means_um @ parameters.linear_matrix.T
@@ -148,10 +123,7 @@ def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = Fal
 def combine_polynomial(
     cases: Sequence[PlacedCase], linear: CombinedLinear, *, as_listed: bool = False
 ) -> CombinedPolynomial:
-    """Fit one pair of polynomials to the residuals that the combined linear parameters leave in all cases.
-
-    Raises AdjustmentError: too few points, or too few different coordinates.
-    """
+    """Fit one pair of polynomials to the residuals that the combined linear parameters leave in all cases."""
     places = np.vstack([fit.residuals.xy_um for fit in linear.cases])
     residuals = np.vstack([fit.residuals.comparator_um for fit in linear.cases])
     polynomial = fit_polynomial(places, residuals)

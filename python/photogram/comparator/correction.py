@@ -104,12 +104,10 @@ class Identity:
         )
 
 
-PARAMETERS = 21
-"""Scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y."""
+PARAMETERS = 21  # Scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y
+# What the model of cameras calls them; scales less 1, coefficients in mm
 MODEL = ("mx", "my", "lean", *(f"{axis}{term}" for axis in "xy" for term in "ABCDEFGHJ"))
-"""What the model of cameras calls them; scales less 1, coefficients in mm."""
-MM = 1000.0
-"""In micrometres."""
+MM = 1000.0  # In micrometres
 STEPS = 20
 
 

@@ -12,10 +12,8 @@ from photogram.io.places import Place
 from photogram.io.rows import Row
 from photogram.messages import nearest, quoted
 
-MICROMETRES = {"um": 1.0, "mm": 1000.0}
-"""Units of coordinates, as the names of columns end."""
-NOTE = "note"
-"""The key of lines that set nothing."""
+MICROMETRES = {"um": 1.0, "mm": 1000.0}  # Units of coordinates, as the names of columns end
+NOTE = "note"  # The key of lines that set nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +25,7 @@ class Setting:
     place: Place
 
     def integer(self) -> int:
-        """Return the whole number that it sets.
-
-        Raises InputError: it is none.
-        """
+        """Return the whole number that it sets."""
         try:
             return whole_number(self.text)
         except ValueError as error:
@@ -50,10 +45,7 @@ class Setting:
             raise self.place.error(f"{self.key} = {error}") from None
 
     def switch(self) -> bool:
-        """Return the yes or no that it sets.
-
-        Raises InputError: it is neither.
-        """
+        """Return the yes or no that it sets."""
         if self.text.lower() not in ("yes", "no"):
             raise self.place.error(f"{self.key} = {quoted(self.text)} is neither yes nor no")
         return self.text.lower() == "yes"
@@ -82,10 +74,7 @@ class Table:
         return self.settings[key].text if key in self.settings else ""
 
     def coordinates_um(self, row: Row) -> tuple[float, float] | None:
-        """Return x and y of a row in micrometres; None where both are blank.
-
-        Raises InputError: one of them is blank, or no number.
-        """
+        """Return x and y of a row in micrometres; None where both are blank."""
         x, y = row.number(f"x_{self.unit}"), row.number(f"y_{self.unit}")
         if x is None and y is None:
             return None
@@ -97,9 +86,6 @@ class Table:
 
 def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -> Table:
     """Read a table with coordinates in micrometres or millimetres.
-
-    Raises InputError: the file cannot be read, has no names of columns, lacks one, or mixes units; a key that
-    nothing reads, or one that is there twice.
 
     Parameters
     ----------

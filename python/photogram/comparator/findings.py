@@ -13,8 +13,7 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-FAR = 3.0
-"""A grid that differs from its values by so many times their standard deviation is another grid."""
+FAR = 3.0  # A grid that differs from its values by so many times their standard deviation is another grid
 
 
 def comparator_findings(calibration: Calibration) -> Findings:

@@ -17,26 +17,15 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals of the points of one case, in the handedness of the comparator.
+    """Residuals of the points of one case, in the handedness of the comparator."""
 
-    Attributes
-    ----------
-    points
-        (n,) numbers of the points.
-    xy_um
-        (n, 2) comparator coordinates that the residuals belong to (X ADJ, Y ADJ), micrometres.
-    comparator_um
-        (n, 2) grid transformed into the comparator system less measured: what to add to the measurement.
-    grid_um
-        (n, 2) measurement transformed into the grid system less given grid: what to add to the given grid.
-    lost
-        Unknowns that a coordinate axis has lost to the adjustment: SIGMA divides by points less this.
-    """
-
-    points: Indices
-    xy_um: Floats
+    points: Indices  # (n,) numbers of the points
+    xy_um: Floats  # (n, 2) comparator coordinates that the residuals belong to (X ADJ, Y ADJ), micrometres
+    # (n, 2) grid transformed into the comparator system less measured: what to add to the measurement
     comparator_um: Floats
+    # (n, 2) measurement transformed into the grid system less given grid: what to add to the given grid
     grid_um: Floats
+    # Unknowns that a coordinate axis has lost to the adjustment: SIGMA divides by points less this
     lost: float
 
     @property
@@ -131,8 +120,7 @@ def decomposition_jacobian(matrix: Floats) -> Floats:
     )
 
 
-RIGID_LOST = 1.5
-"""Half of rotation and two translations: what each axis loses."""
+RIGID_LOST = 1.5  # Half of rotation and two translations: what each axis loses
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,32 +157,19 @@ def fit_rigid(
     )
 
 
-LEAST_POINTS = 4
-"""Three points determine the transformation; the fourth says how good it is."""
+LEAST_POINTS = 4  # Three points determine the transformation; the fourth says how good it is
 AFFINE_LOST = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class AffineFit:
-    """A linear fit of one case.
+    """A linear fit of one case."""
 
-    Attributes
-    ----------
-    coefficients, shift_um
-        (2, 2) and (2,): comparator = coefficients grid + shift (equation 40).
-    parameters
-        Scales, lack of orthogonality, rotation.
-    cofactors
-        (4, 4) of the parameters in that order, per um^2 of the variance of unit weight.
-    residuals
-        In both systems.
-    """
-
-    coefficients: Floats
+    coefficients: Floats  # (2, 2) and (2,): comparator = coefficients grid + shift (equation 40)
     shift_um: Floats
-    parameters: Decomposition
-    cofactors: Floats
-    residuals: Residuals
+    parameters: Decomposition  # Scales, lack of orthogonality, rotation
+    cofactors: Floats  # (4, 4) of the parameters in that order, per um^2 of the variance of unit weight
+    residuals: Residuals  # In both systems
 
     @property
     def covariance(self) -> Floats:
@@ -212,8 +187,6 @@ def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
 
     The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of
     the normal equations.
-
-    Raises AdjustmentError: fewer than four points, or points in one line.
 
     Parameters
     ----------

@@ -16,12 +16,10 @@ from photogram.io.numbers import is_whole_number, whole_number
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief
 
-BUILT_IN = (773, 1320, 778)
-"""The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
+BUILT_IN = (773, 1320, 778)  # The master grids of the program, in the order of its option MASTER (0, 1, 2)
+# What lines above the coordinates of a plate may set
 KEYS = ("grid", "owner", "adopted", "sigma_um", "temperature_c", "expansion_per_k")
-"""What lines above the coordinates of a plate may set."""
-MOST_EXPANSION = 1e-3
-"""A kelvin; steel has 1.2e-5, glass 8e-6."""
+MOST_EXPANSION = 1e-3  # A kelvin; steel has 1.2e-5, glass 8e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)

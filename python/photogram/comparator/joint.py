@@ -26,12 +26,10 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
 
 DEGREE = 4
-OWN_TERMS = 6
-"""Terms of the polynomials that the linear parameters do not repeat: the first six."""
+OWN_TERMS = 6  # Terms of the polynomials that the linear parameters do not repeat: the first six
 ROUNDS = 100
 SETTLED = 1e-6
-LEAST_UM = 1e-3
-"""Standard deviations are not estimated below a nanometre."""
+LEAST_UM = 1e-3  # Standard deviations are not estimated below a nanometre
 
 
 @dataclass(frozen=True)
@@ -55,86 +53,47 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class JointCase:
-    """A case after the joint adjustment.
+    """A case after the joint adjustment."""
 
-    Attributes
-    ----------
-    number
-        Of the case.
-    rotation_rad, translation_um
-        grid = M(rotation) corrected + translation, in the handedness of the comparator.
-    covariance
-        (3, 3) of rotation (rad) and the grid coordinates of the centre of the polynomials' frame (um).
-    residuals
-        In both systems.
-    standardized
-        (n, 2) residuals of measured coordinates over their standard deviations; NaN where nothing checks
-        them.
-    """
-
-    number: int
-    rotation_rad: float
+    number: int  # Of the case
+    rotation_rad: float  # grid = M(rotation) corrected + translation, in the handedness of the comparator
     translation_um: Floats
+    # (3, 3) of rotation (rad) and the grid coordinates of the centre of the polynomials' frame (um)
     covariance: Floats
-    residuals: Residuals
+    residuals: Residuals  # In both systems
+    # (n, 2) residuals of measured coordinates over their standard deviations; NaN where nothing checks
+    # them
     standardized: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class JointPlate:
-    """A plate after the joint adjustment, in its own axes.
+    """A plate after the joint adjustment, in its own axes."""
 
-    Attributes
-    ----------
-    points
-        (l,) points measured.
-    corrections_um
-        (l, 2) adjusted less given coordinates.
-    covariance_um2
-        (l, 2, 2) of the adjusted coordinates.
-    sigma_um, estimated
-        Standard deviation of a given coordinate, and whether it was estimated.
-    variance_ratio
-        Variance of the corrections over the one assumed; near 1 when the latter is right. None for a fixed
-        grid.
-    test
-        Of the corrections against the standard deviation a priori; None where it was estimated or fixed.
-    """
-
-    points: Indices
-    corrections_um: Floats
-    covariance_um2: Floats
-    sigma_um: float
+    points: Indices  # (l,) points measured
+    corrections_um: Floats  # (l, 2) adjusted less given coordinates
+    covariance_um2: Floats  # (l, 2, 2) of the adjusted coordinates
+    sigma_um: float  # Standard deviation of a given coordinate, and whether it was estimated
     estimated: bool
+    # Variance of the corrections over the one assumed; near 1 when the latter is right. None for a
+    # fixed grid
     variance_ratio: float | None
+    # Of the corrections against the standard deviation a priori; None where it was estimated or fixed
     test: GlobalTest | None
 
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """The joint adjustment.
+    """The joint adjustment."""
 
-    Attributes
-    ----------
-    correction
-        Comparator and polynomials with the covariance of all of them.
-    sigma0
-        Standard deviation of unit weight; dimensionless, 1 where weights are right. Covariances are scaled by
-        its square.
-    degrees_of_freedom, iterations
-        Of the last adjustment.
-    random_um
-        Standard deviation of the comparator itself.
-    cases, plates
-        Cases in the order measured, plates by number.
-    """
-
-    correction: Correction
+    correction: Correction  # Comparator and polynomials with the covariance of all of them
+    # Standard deviation of unit weight; dimensionless, 1 where weights are right. Covariances are
+    # scaled by its square
     sigma0: float
-    degrees_of_freedom: int
+    degrees_of_freedom: int  # Of the last adjustment
     iterations: int
-    random_um: float
-    cases: tuple[JointCase, ...]
+    random_um: float  # Standard deviation of the comparator itself
+    cases: tuple[JointCase, ...]  # Cases in the order measured, plates by number
     plates: dict[int, JointPlate]
 
     @property
@@ -167,11 +126,7 @@ def adjust_jointly(
     *,
     polynomial: bool = True,
 ) -> JointFit:
-    """Adjust everything together, from the combined linear adjustment, with or without polynomials.
-
-    Raises AdjustmentError: the measurements do not determine the unknowns, or the adjustment does not
-    converge.
-    """
+    """Adjust everything together, from the combined linear adjustment, with or without polynomials."""
     arrays, points_of = _arrays(cases, grids, linear, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
     grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}

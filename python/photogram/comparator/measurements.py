@@ -20,8 +20,8 @@ from photogram.messages import quoted
 
 T = TypeVar("T")
 
+# What lines above the table may set
 KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
-"""What lines above the table may set."""
 
 
 def read(

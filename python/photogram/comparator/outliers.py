@@ -33,61 +33,35 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
-ROUNDS = 30
-"""Adjustments at most; each takes out what is at least half as far off as the farthest."""
-LEAST_POINTS = 6
-"""A case keeps so many points, or it is not screened any further."""
+ROUNDS = 30  # Adjustments at most; each takes out what is at least half as far off as the farthest
+LEAST_POINTS = 6  # A case keeps so many points, or it is not screened any further
+# Nothing below a nanometre is an outlier: residuals of measurements without error are rounding
 LEAST_UM = 1e-3
-"""Nothing below a nanometre is an outlier: residuals of measurements without error are rounding."""
-MATCH = 0.1
-"""A point measured where another is expected is within this part of their distance of it."""
+MATCH = 0.1  # A point measured where another is expected is within this part of their distance of it
 
 
 @dataclass(frozen=True)
 class FarPointing:
-    """A pointing that does not agree with the others of its case.
+    """A pointing that does not agree with the others of its case."""
 
-    Attributes
-    ----------
-    case, point, row
-        Numbers of case and point; which pointing of the case, from 0.
-    deviation_um
-        From the mean of the point, in the coordinate that is off.
-    ratio
-        The deviation over its standard deviation, by the other pointings of the case.
-    limit
-        Of the ratio.
-    """
-
-    case: int
+    case: int  # Numbers of case and point; which pointing of the case, from 0
     point: int
     row: int
-    deviation_um: float
-    ratio: float
-    limit: float
+    deviation_um: float  # From the mean of the point, in the coordinate that is off
+    ratio: float  # The deviation over its standard deviation, by the other pointings of the case
+    limit: float  # Of the ratio
 
 
 @dataclass(frozen=True)
 class Outlier:
-    """A measured point that does not agree with the adjustment of the others.
+    """A measured point that does not agree with the adjustment of the others."""
 
-    Attributes
-    ----------
-    case, point
-        Numbers.
-    off_um
-        Measured less expected comparator coordinates, by the adjustment without outliers.
-    ratio
-        The residual over its standard deviation when it was taken out.
-    instead
-        The point of the plate that is expected there; None for none.
-    """
-
-    case: int
+    case: int  # Numbers
     point: int
+    # Measured less expected comparator coordinates, by the adjustment without outliers
     off_um: tuple[float, float]
-    ratio: float
-    instead: int | None
+    ratio: float  # The residual over its standard deviation when it was taken out
+    instead: int | None  # The point of the plate that is expected there; None for none
 
     @property
     def distance_um(self) -> float:
@@ -97,31 +71,17 @@ class Outlier:
 
 @dataclass(frozen=True)
 class Screening:
-    """What the search for outliers of the adjustment found.
+    """What the search for outliers of the adjustment found."""
 
-    Attributes
-    ----------
-    outliers
-        Case by case, point by point.
-    limit
-        Of the ratios, for all coordinates together at the level of 5 percent.
-    change_um
-        How much the outliers change corrected coordinates: root mean square over the measured places, free of
-        rotation and translation. 0 without outliers.
-    sigma_um
-        Standard deviation of unit weight of the adjustment without them.
-    ratios
-        Of each case, (k, 2): the test values of all its points before any was taken out, without signs.
-    freedom
-        Degrees of freedom of that adjustment.
-    """
-
-    outliers: tuple[Outlier, ...]
-    limit: float
+    outliers: tuple[Outlier, ...]  # Case by case, point by point
+    limit: float  # Of the ratios, for all coordinates together at the level of 5 percent
+    # How much the outliers change corrected coordinates: root mean square over the measured places,
+    # free of rotation and translation. 0 without outliers
     change_um: float
-    sigma_um: float
+    sigma_um: float  # Standard deviation of unit weight of the adjustment without them
+    # Of each case, (k, 2): the test values of all its points before any was taken out, without signs
     ratios: tuple[Floats, ...]
-    freedom: float
+    freedom: float  # Degrees of freedom of that adjustment
 
     @property
     def harmful(self) -> bool:
@@ -131,24 +91,12 @@ class Screening:
 
 @dataclass(frozen=True, eq=False)
 class PointingTests:
-    """Tests of the pointings of a case against the others of the case.
+    """Tests of the pointings of a case against the others of the case."""
 
-    Attributes
-    ----------
-    case
-        The case.
-    deviations
-        (k, 2) from the mean of the point, or of its leg.
-    ratios
-        (k, 2) externally studentized; 0 for single pointings.
-    freedom
-        Degrees of freedom of the standard deviation in x, and of that in y.
-    """
-
-    case: Case
-    deviations: Floats
-    ratios: Floats
-    freedom: int
+    case: Case  # The case
+    deviations: Floats  # (k, 2) from the mean of the point, or of its leg
+    ratios: Floats  # (k, 2) externally studentized; 0 for single pointings
+    freedom: int  # Degrees of freedom of the standard deviation in x, and of that in y
 
 
 def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
@@ -314,8 +262,7 @@ def _change(
 
 Found = TypeVar("Found", FarPointing, Outlier)
 
-MOST = 40
-"""Outliers of either kind that are named; the largest ones."""
+MOST = 40  # Outliers of either kind that are named; the largest ones
 
 
 def problems(

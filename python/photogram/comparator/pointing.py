@@ -55,8 +55,8 @@ def group_as_listed(points: Indices) -> Indices:
     return np.array(order, dtype=np.int64)
 
 
+# Multiples of the semi-axes for an ellipse that holds so many percent (report; the program draws 39)
 CONFIDENCE_FACTORS = {39: 1.00, 50: 1.18, 95: 2.45, 99: 3.03}
-"""Multiples of the semi-axes for an ellipse that holds so many percent (report; the program draws 39)."""
 
 
 @dataclass(frozen=True)
@@ -82,28 +82,14 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Precision:
-    """Variances of single readings, pooled over one point or many.
+    """Variances of single readings, pooled over one point or many."""
 
-    Attributes
-    ----------
-    readings, points
-        How many went in.
-    degrees_of_freedom
-        Readings less means.
-    variance_um2
-        Of a single reading in x and in y; NaN without degrees of freedom.
-    covariance_um2
-        Of x and y of a single reading.
-    mean_variance_um2
-        Of the mean of a point, in x and in y (equations 4 and 22).
-    """
-
-    readings: int
+    readings: int  # How many went in
     points: int
-    degrees_of_freedom: int
-    variance_um2: tuple[float, float]
-    covariance_um2: float
-    mean_variance_um2: tuple[float, float]
+    degrees_of_freedom: int  # Readings less means
+    variance_um2: tuple[float, float]  # Of a single reading in x and in y; NaN without degrees of freedom
+    covariance_um2: float  # Of x and y of a single reading
+    mean_variance_um2: tuple[float, float]  # Of the mean of a point, in x and in y (equations 4 and 22)
 
     @property
     def sd_um(self) -> tuple[float, float]:
@@ -149,25 +135,13 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class PointReadings:
-    """The readings of one point in one case, summed up.
+    """The readings of one point in one case, summed up."""
 
-    Attributes
-    ----------
-    point, count
-        Number of the point; of its readings.
-    mean_um
-        (2,) their mean (equation 1).
-    squares_um2
-        Sums of (x - mean)^2 and (y - mean)^2.
-    products_um2
-        Sum of (x - mean)(y - mean).
-    """
-
-    point: int
+    point: int  # Number of the point; of its readings
     count: int
-    mean_um: Floats = field(repr=False)
-    squares_um2: tuple[float, float]
-    products_um2: float
+    mean_um: Floats = field(repr=False)  # (2,) their mean (equation 1)
+    squares_um2: tuple[float, float]  # Sums of (x - mean)^2 and (y - mean)^2
+    products_um2: float  # Sum of (x - mean)(y - mean)
 
     @property
     def identical(self) -> bool:

@@ -15,12 +15,10 @@ from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 
-TERMS = ("x^4", "y^4", "x^3", "y^3", "x^2", "y^2", "x", "y", "1")
-"""The terms in the order of the report."""
+TERMS = ("x^4", "y^4", "x^3", "y^3", "x^2", "y^2", "x", "y", "1")  # The terms in the order of the report
 EXPONENTS = np.array([[4, 0], [0, 4], [3, 0], [0, 3], [2, 0], [0, 2], [1, 0], [0, 1], [0, 0]])
 COUNT = len(TERMS)
-UM = 1e6
-"""Micrometres in a metre."""
+UM = 1e6  # Micrometres in a metre
 
 
 @dataclass(frozen=True)
@@ -119,10 +117,7 @@ class Polynomial:
 
 
 def fit_polynomial(xy_um: Floats, residuals_um: Floats) -> Polynomial:
-    """Fit both polynomials to the residuals (n, 2) that the linear adjustment left at places (n, 2).
-
-    Raises AdjustmentError: fewer than ten points, or too few different coordinates.
-    """
+    """Fit both polynomials to the residuals (n, 2) that the linear adjustment left at places (n, 2)."""
     if len(xy_um) <= COUNT:
         raise AdjustmentError(f"{len(xy_um)} points were measured; the polynomials need {COUNT + 1} at least")
     frame = Frame.of(xy_um)

@@ -15,18 +15,16 @@ from photogram.io.places import Place as Place
 from photogram.messages import Message
 from photogram.show.summary import Brief
 
+# A reading this far from the others on its point was taken on another point, or is in another unit
 FURTHEST_UM = 1000.0
-"""A reading this far from the others on its point was taken on another point, or is in another unit."""
 
 
-LARGEST_UM = 1e8
-"""A hundred metres: larger coordinates are no measurements, and their powers would overflow."""
+LARGEST_UM = 1e8  # A hundred metres: larger coordinates are no measurements, and their powers would overflow
 
 
-CENTRE_UM = 125_000.0
-"""Middle of the range of most comparators (TRANS)."""
+CENTRE_UM = 125_000.0  # Middle of the range of most comparators (TRANS)
+# And of those of the program with other ranges: STK1, PSK, other
 CENTRES_UM = {10: 1_000_000.0, 11: 1_500_000.0, 12: 300_000.0, 13: 300_000.0, 14: 1_000_000.0}
-"""And of those of the program with other ranges: STK1, PSK, other."""
 
 
 @dataclass(frozen=True, slots=True)

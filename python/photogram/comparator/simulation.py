@@ -131,8 +131,7 @@ def _readings(
 
 
 DAYS = ("1970-01-15", "1970-07-02", "1971-01-20", "1971-06-28", "1972-01-11", "1972-07-17")
-STEP = 20e-6
-"""Of the x scale, before the fourth calibration."""
+STEP = 20e-6  # Of the x scale, before the fourth calibration
 
 
 def simulated_years() -> list[Calibration]:

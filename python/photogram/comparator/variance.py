@@ -41,33 +41,17 @@ class AxisSigma:
 
 @dataclass(frozen=True)
 class VarianceAnalysis:
-    """The lines of figure 30, standard deviations in micrometres.
+    """The lines of figure 30, standard deviations in micrometres."""
 
-    Attributes
-    ----------
-    before
-        Of the free adjustments: everything.
-    after_linear, after_nonlinear
-        What the linear parameters leave; what the polynomials leave (None without).
-    pointing
-        Of a mean.
-    grid
-        Of a grid coordinate.
-    linear, nonlinear, random
-        Their shares; 0 where the difference of variances is negative (`negative` names it).
-    negative
-        Names of the components whose estimated variance is negative.
-    """
-
-    before: AxisSigma
-    after_linear: AxisSigma
+    before: AxisSigma  # Of the free adjustments: everything
+    after_linear: AxisSigma  # What the linear parameters leave; what the polynomials leave (None without)
     after_nonlinear: AxisSigma | None
-    pointing: AxisSigma
-    grid: float
-    linear: float
+    pointing: AxisSigma  # Of a mean
+    grid: float  # Of a grid coordinate
+    linear: float  # Their shares; 0 where the difference of variances is negative (`negative` names it)
     nonlinear: float
     random: float
-    negative: tuple[str, ...]
+    negative: tuple[str, ...]  # Names of the components whose estimated variance is negative
 
     @property
     def components_um(self) -> dict[str, float]:
@@ -145,29 +129,19 @@ def _pooled(fits: Sequence[RigidFit], dof: float) -> AxisSigma:
     return AxisSigma(math.sqrt(squares[0]), math.sqrt(squares[1]))
 
 
+# Terms that are tested: those of first and zeroth degree belong to the linear parameters as well
 OWN_TERMS = 6
-"""Terms that are tested: those of first and zeroth degree belong to the linear parameters as well."""
 
 
 @dataclass(frozen=True)
 class TermTest:
-    """Student's test of one term, given all others.
+    """Student's test of one term, given all others."""
 
-    Attributes
-    ----------
-    axis, term
-        `x` or `y`, and the term, its argument counted from the middle of the measured range.
-    coefficient_um, sd_um
-        Its effect at the edge of the range, and the standard deviation.
-    probability
-        Of a ratio as large as this (two-sided) without the term; None without scipy.
-    """
-
-    axis: str
+    axis: str  # `x` or `y`, and the term, its argument counted from the middle of the measured range
     term: str
-    coefficient_um: float
+    coefficient_um: float  # Its effect at the edge of the range, and the standard deviation
     sd_um: float
-    probability: float | None
+    probability: float | None  # Of a ratio as large as this (two-sided) without the term; None without scipy
 
     @property
     def ratio(self) -> float:
@@ -177,45 +151,24 @@ class TermTest:
 
 @dataclass(frozen=True)
 class PolynomialTest:
-    """Fisher's test of all terms together, and Student's of each.
+    """Fisher's test of all terms together, and Student's of each."""
 
-    Attributes
-    ----------
-    ratio, degrees_of_freedom
-        F, and its two degrees of freedom.
-    probability
-        Of so large a ratio without polynomials; None without scipy.
-    terms
-        Each term.
-    """
-
-    ratio: float
+    ratio: float  # F, and its two degrees of freedom
     degrees_of_freedom: tuple[int, int]
-    probability: float | None
-    terms: tuple[TermTest, ...]
+    probability: float | None  # Of so large a ratio without polynomials; None without scipy
+    terms: tuple[TermTest, ...]  # Each term
 
 
 @dataclass(frozen=True)
 class CaseVarianceTest:
-    """Tests of equal variances of the cases: Hartley's F-max, as the report says, and two more.
+    """Tests of equal variances of the cases: Hartley's F-max, as the report says, and two more."""
 
-    Attributes
-    ----------
-    f_max
-        Largest variance of unit weight of a single case over the smallest.
-    degrees_of_freedom
-        The fewest of a case.
-    f_max_probability, f_max_limit
-        Of so large a ratio for equal variances, and the ratio of probability 0.05.
-    bartlett_probability, levene_probability
-        Of Bartlett's and Levene's tests.
-    """
-
-    f_max: float
-    degrees_of_freedom: int
+    f_max: float  # Largest variance of unit weight of a single case over the smallest
+    degrees_of_freedom: int  # The fewest of a case
+    # Of so large a ratio for equal variances, and the ratio of probability 0.05
     f_max_probability: float | None
     f_max_limit: float | None
-    bartlett_probability: float | None
+    bartlett_probability: float | None  # Of Bartlett's and Levene's tests
     levene_probability: float | None
 
 

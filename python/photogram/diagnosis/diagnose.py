@@ -46,9 +46,8 @@ from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Way
 
-__all__ = ["Manner", "check_block", "check_of", "diagnose"]
+__all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
@@ -116,19 +115,12 @@ def diagnose(
         if not isinstance(adjusted, Result):
             raise InputError(f"result is the result of a block, not {shown(result)}")
         return diagnosis_of(adjusted)
-    return check_of(network, threads)
-
-
-@Way
-def check_of(network: object, threads: int | None) -> Diagnosis:
-    """Check a network; defined for each class of networks in the files above it."""
-    del threads
-    raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
-
-
-@check_of.register
-def _(network: Block, threads: int | None) -> Diagnosis:
-    return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
+    if isinstance(network, Block):
+        return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
+    if not hasattr(network, "_check"):
+        raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
+    found: Diagnosis = network._check(threads)
+    return found
 
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:

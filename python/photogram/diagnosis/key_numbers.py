@@ -11,7 +11,6 @@ from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
-from photogram.show.methods import findings_of
 from photogram.statistics.evidence import WITHHELD, Evidence
 from photogram.words import Phrase
 
@@ -139,7 +138,7 @@ def held_values(result: Result) -> list[Finding]:
 
 def disagreeing(result: Result) -> list[Finding]:
     """Name check points that disagree with the adjustment, as its verdict does, where nothing explains it."""
-    evidence = Evidence(findings_of(result))
+    evidence = Evidence(result._findings())
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:
         if points := evidence.disagreement(limit):

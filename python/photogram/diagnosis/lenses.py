@@ -15,7 +15,6 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.wider_models import calibrated, calibration_words, freed
 from photogram.results.result import Result
-from photogram.show.methods import findings_of
 from photogram.statistics.evidence import Evidence
 
 RADIAL = re.compile(r"[Kk]([1-6])")
@@ -58,7 +57,7 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
     first = adjusted.converged(block) if can_be else None
     if first is None or first.global_test is None or not first.global_test.problem():
         return block
-    found = findings_of(first)
+    found = first._findings()
     if not Evidence(found).lens:
         return block
     result = adjusted.converged(block.replace(cameras=[calibrated(camera) for camera in block.cameras]))

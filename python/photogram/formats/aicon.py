@@ -54,13 +54,7 @@ class _Found:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the photo coordinates, and what lies beside them: the cameras must.
-
-    Raises
-    ------
-    InputError
-        No file of cameras, lines that hold something else, names that are there twice.
-    """
+    """Read the photo coordinates, and what lies beside them: the cameras must."""
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
     if images is None:

@@ -34,13 +34,7 @@ IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read `image.dat`, and the orientation beside it; angles are in gon unless said otherwise.
-
-    Raises
-    ------
-    InputError
-        No table of cameras, lines that hold something else, rotations by which rays do not meet.
-    """
+    """Read `image.dat`, and the orientation beside it; angles are in gon unless said otherwise."""
     folder = path if path.is_dir() else path.parent
     images = folder / IMAGES if path.is_dir() else path
     table = wishes.cameras or folder / CAMERAS
@@ -111,13 +105,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def _words(project: Project) -> dict[str, str]:
-    """Return names as words of the files.
-
-    Raises
-    ------
-    InputError
-        Two that would be one word, and such as mean something else there.
-    """
+    """Return names as words of the files."""
     found: dict[str, str] = {}
     cameras = reduced_images(project).names
     for names in (project.block.photo_ids, project.block.point_ids, cameras):
@@ -131,13 +119,7 @@ def _words(project: Project) -> dict[str, str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return images, orientation, the table of cameras that reading them needs, and one of control.
-
-    Raises
-    ------
-    InputError
-        Geographic coordinates, names that have no place.
-    """
+    """Return images, orientation, the table of cameras that reading them needs, and one of control."""
     block, reduced, words = project.block, reduced_images(project), _words(project)
     lines: list[str] = []
     owners = [words[reduced.names[row]] for row in reduced.cameras.tolist()]

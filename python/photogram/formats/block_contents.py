@@ -50,13 +50,7 @@ def lost_observations(block: Block, gnss: str) -> list[str]:
 
 
 def check_images(block: Block, title: str) -> None:
-    """Refuse to write what a file would have for images in the frame of a camera, and is something else.
-
-    Raises
-    ------
-    InputError
-        Readings of scanned films or plates; samples and lines of line scanners.
-    """
+    """Refuse to write what a file would have for images in the frame of a camera, and is something else."""
     scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
     if scanned:
         raise InputError(

@@ -63,13 +63,7 @@ def cards(path: Path) -> Iterator[Card]:
 
 
 def names_beside(path: Path) -> dict[str, str]:
-    """Return the names of numbers of a table `number, name`; none where it is not there.
-
-    Raises
-    ------
-    InputError
-        A number that is there twice.
-    """
+    """Return the names of numbers of a table `number, name`; none where it is not there."""
     if not path.is_file():
         return {}
     table = read_columns(path, known=("number", "name"))
@@ -89,13 +83,7 @@ def has_suffix(suffix: str, path: Path) -> bool:
 
 
 def one_file(path: Path, suffix: str) -> Path | None:
-    """Return the file of an ending in a folder, in any case; None without.
-
-    Raises
-    ------
-    InputError
-        There are several.
-    """
+    """Return the file of an ending in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
     if len(found) > 1:
         raise InputError(f"has several files {suffix}: {', '.join(each.name for each in found)}", file=path)

@@ -169,13 +169,7 @@ def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | 
 
 
 def collection_of(project: Project) -> tuple[Collection, list[str]]:
-    """Return the collection of a project, and the names of its photos.
-
-    Raises
-    ------
-    InputError
-        No photo with a pose that shows a point with a position.
-    """
+    """Return the collection of a project, and the names of its photos."""
     from photogram.collection.collection import Collection
 
     block = project.block

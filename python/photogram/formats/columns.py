@@ -56,13 +56,7 @@ _DMS = re.compile(
 
 
 def degrees(text: str) -> float:
-    """Return degrees from `47.37`, `47 22 12.3`, `47°22.205'`, `8°32'24.5" W` or `S 8:32:24.5`.
-
-    Raises
-    ------
-    ValueError
-        Another text; minutes or seconds of 60 or more.
-    """
+    """Return degrees from `47.37`, `47 22 12.3`, `47°22.205'`, `8°32'24.5" W` or `S 8:32:24.5`."""
     match = _DMS.fullmatch(text.strip())
     before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
     values = [float(part.replace(",", ".")) for part in parts if part]
@@ -77,23 +71,15 @@ def degrees(text: str) -> float:
 
 @dataclass(frozen=True)
 class Columns:
-    """What a user says of the columns of a table.
+    """What a user says of the columns of a table."""
 
-    Attributes
-    ----------
-    headings
-        Which heading each column of ours has; `-` before it: with the other sign, `[ft]` behind it: the unit.
-    order
-        Our columns in the order of the table, for one without a header; `-` is not read.
-    ignored
-        Headings that are not read.
-    roles
-        What words of the column `use` mean: control, check, off.
-    """
-
+    # Which heading each column of ours has; `-` before it: with the other sign, `[ft]` behind it: the
+    # unit
     headings: Mapping[str, str] = field(default_factory=dict)
+    # Our columns in the order of the table, for one without a header; `-` is not read
     order: tuple[str, ...] = ()
-    ignored: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()  # Headings that are not read
+    # What words of the column `use` mean: control, check, off
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
@@ -151,13 +137,7 @@ def _places(heading: str, own: Sequence[str]) -> list[int]:
 
 
 def columns_given(columns: str | None, roles: str | None) -> Columns:
-    """Return what `point=Name,x=Rechtswert`, `point,x,y,z,-` or `PNEZD` say, and `KP=check` of roles.
-
-    Raises
-    ------
-    InputError
-        Columns or roles that there are not.
-    """
+    """Return what `point=Name,x=Rechtswert`, `point,x,y,z,-` or `PNEZD` say, and `KP=check` of roles."""
     headings, ignored, order = dict[str, str](), list[str](), list[str]()
     words = [each.strip() for each in (columns or "").split(",") if each.strip()]
     if len(words) == 1 and set(words[0].lower()) <= set(SHORT) and len(words[0]) > 2:
@@ -196,32 +176,7 @@ def settled(
     name: str,
     messages: list[Message],
 ) -> ColumnTable:
-    """Return a table of points with its columns in our units, and roles in our words.
-
-    Parameters
-    ----------
-    table
-        The table, its columns named.
-    columns
-        What a user says of it.
-    known
-        Columns that such a table may have.
-    units
-        Kind and size of the unit of each column.
-    required
-        Columns that it must have.
-    names
-        Points that have images: they say which of several columns has the names; empty if not known.
-    name
-        Of the table.
-    messages
-        Where remarks go.
-
-    Raises
-    ------
-    InputError
-        A column that looks like a role, a coordinate or a standard deviation, and nothing says which.
-    """
+    """Return a table of points with its columns in our units, and roles in our words."""
     missing = [
         each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
     ]
@@ -265,26 +220,7 @@ def in_units(
     messages: list[Message],
     headings: Mapping[str, str] = MappingProxyType({}),
 ) -> ColumnTable:
-    """Return a table with its numbers in our units, by the units and coverage factors of its headings.
-
-    Parameters
-    ----------
-    table
-        The table, its columns named.
-    units
-        Kind and size of the unit of each column.
-    name
-        Of the table.
-    messages
-        Where a remark with the columns and their units goes.
-    headings
-        Headings that a user gives to columns, whose units count before those of the file.
-
-    Raises
-    ------
-    InputError
-        A unit of another kind, a coverage factor of a column without standard deviations.
-    """
+    """Return a table with its numbers in our units, by the units and coverage factors of its headings."""
     ready, remarks = dict(table.ready), list[str]()
     for column, own in table.headings:
         heading = headings.get(column, own)

@@ -35,13 +35,7 @@ class ControlList:
 
 
 def read_control_list(path: Path, project: Project) -> ControlList | None:
-    """Read a list of control points with their measurements; None where a file is a table.
-
-    Raises
-    ------
-    InputError
-        A list that is at fault.
-    """
+    """Read a list of control points with their measurements; None where a file is a table."""
     if path.suffix.lower() == ".json":
         return _of_json(path, project)
     first = next((line.strip() for line in read_lines(path) if line.strip()), "")
@@ -51,13 +45,7 @@ def read_control_list(path: Path, project: Project) -> ControlList | None:
 
 
 def system_of(line: str, place: Place) -> str:
-    """Return the system that the first line of a list names: `WGS84`, `WGS84 UTM 32N`, `EPSG:n`, `+proj=...`.
-
-    Raises
-    ------
-    InputError
-        It names none.
-    """
+    """Return the system of the first line of a list: `WGS84`, `WGS84 UTM 32N`, `EPSG:n`, `+proj=...`."""
     if line.upper() == "WGS84":
         return WGS84
     if line.upper().startswith(("EPSG:", "+PROJ=")):

@@ -40,27 +40,10 @@ def check_systems(
 ) -> list[Message]:
     """Refuse control that fits the photos only after an exchange, or lies far from them all.
 
-    Parameters
-    ----------
-    project
-        Photos with their first poses, without this control.
-    settings, table
-        Those that the control was read with.
-    points
-        (k,) points of the project.
-    values
-        (k, 3) their coordinates as the table has them.
-    free
-        Whether the model of the project may be carried onto control by a similarity.
+    `points`: (k,) points of the project; `values`: (k, 3) their coordinates as the table has them;
+    `free`: whether the model of the project may be carried onto control by a similarity.
 
-    Returns
-    -------
-    A remark where flat control leaves open which of its sides photos look at, and they look from below.
-
-    Raises
-    ------
-    InputError
-        The exchange, and the option that mends it.
+    Returns a remark if photos look at flat control from below, since control does not determine its side.
     """
     known = np.isfinite(values).all(axis=1)
     points, values = points[known], values[known]

@@ -88,11 +88,6 @@ def geocentric(crs: str, xyz: Floats) -> Floats:
     """Return (n, 3) geocentric coordinates (WGS 84) of positions in a system, metres.
 
     `ENU:latitude,longitude[,height]` is the topocentric frame there.
-
-    Raises
-    ------
-    InputError
-        A system that PROJ does not know, heights for which a grid is missing, positions beyond the system.
     """
     local = enu_origin(crs)
     if local is not None:
@@ -111,13 +106,7 @@ def _geoid(crs: str) -> Floats:
 
 
 def has_geoid_heights(crs: str) -> bool:
-    """Whether the heights of a system are above the geoid (or sea level), and not above the ellipsoid.
-
-    Raises
-    ------
-    InputError
-        A system that PROJ does not know.
-    """
+    """Whether the heights of a system are above the geoid (or sea level), and not above the ellipsoid."""
     if enu_origin(crs) is not None:
         return False
     return _GEOID.search(crs) is not None or bool(_system(crs).is_compound)
@@ -230,26 +219,11 @@ def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tupl
 def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     """Carry positions of a frame into a system.
 
-    Parameters
-    ----------
-    crs
-        The system.
-    xyz
-        (n, 3) in the frame; of a geographic one longitude and latitude in radians.
-    frame
-        Topocentric with an origin, geocentric, geographic, or cartesian with a system whose numbers it has.
-        Where the system is its own, nothing is transformed.
+    `xyz`: (n, 3) in the frame; of a geographic one longitude and latitude in radians.
 
-    Returns
-    -------
-    (n, 3) positions: longitude or easting, latitude or northing, height; and (n, 3, 3) what turns vectors
-    along the axes of the frame (of a geographic one east, north and up at each position) into vectors along
-    those of the system.
-
-    Raises
-    ------
-    InputError
-        A frame that has no place on the earth, or as for :func:`geocentric`.
+    Returns (n, 3) positions: longitude or easting, latitude or northing, height; and (n, 3, 3) what turns
+    vectors along the axes of the frame (of a geographic one east, north and up at each position) into
+    vectors along those of the system.
     """
     if frame.kind in ("cartesian", "geographic") and frame.crs == crs and crs:
         own = (
@@ -369,13 +343,7 @@ def _remarks(crs: str) -> list[str]:
 
 
 def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
-    """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame.
-
-    Raises
-    ------
-    InputError
-        A frame that is not topocentric, or as for :func:`geocentric`.
-    """
+    """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame."""
     if frame.kind != "topocentric" or frame.origin is None:
         raise InputError(f"attitudes of {crs} cannot be carried into a frame that is {frame}")
     found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)

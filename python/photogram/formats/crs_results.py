@@ -121,11 +121,6 @@ def check_place(block: Block, crs: str) -> Frame:
 
     Longitudes and latitudes of which only the ellipsoid is known are those of a system on this ellipsoid that
     is asked for: the block has no other datum.
-
-    Raises
-    ------
-    InputError
-        A frame without a place, lengths that are not metres, a system that PROJ does not know.
     """
     frame = frame_of(block)
     if not crs:

@@ -38,11 +38,6 @@ def in_pixels(project: Project) -> Project:
     degrees into positive ones. Pictures whose size is not known get one that holds all images, where
     coordinates do not count from their corners. Rolling shutters, whose rows count as images did, stay
     behind.
-
-    Raises
-    ------
-    InputError
-        Photos of a scanner, which are no pictures.
     """
     block = project.block
     if (strips := np.flatnonzero(scanners(block))).size:
@@ -134,11 +129,6 @@ def in_topocentric(project: Project) -> Project:
     The rays are the same. Standard deviations stay along the local axes, which differ from those of the
     frame by the angle between the verticals; where a point is known in part, it is where its rays meet with
     the components that are known. Observations beside images stay behind.
-
-    Raises
-    ------
-    InputError
-        Photos on trajectories, whose tables are geocentric.
     """
     block = project.block
     if block.spheroid is None:

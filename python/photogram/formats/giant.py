@@ -59,13 +59,7 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the five files.
-
-    Raises
-    ------
-    InputError
-        What GIANT cards cannot say: cameras with distortion or in pixels, observations beside images.
-    """
+    """Return the five files."""
     records = GiantProject.from_block(project.block).records()
     return {name: to_bytes(lines) for name, lines in records.items()}
 

@@ -20,14 +20,7 @@ from photogram.network.cameras import Camera
 def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Floats]) -> Floats:
     """Return (m, 2) image coordinates of which those of each camera are converted by themselves.
 
-    Parameters
-    ----------
-    xy
-        (m, 2) image coordinates.
-    which
-        (m,) the camera of each, by its row; -1: it stays as it is.
-    convert
-        Makes others of some, by the row of their camera.
+    `xy`: (m, 2) image coordinates; `which`: (m,) the camera of each, by its row; -1: it stays as it is.
     """
     found = xy.copy()
     for row in np.unique(which[which >= 0]).tolist():

@@ -73,26 +73,9 @@ def adjusted_on_disk(
 ) -> OnDisk:
     """Adjust a project whose images lie in Parquet; everything goes to a folder, in parts.
 
-    Parameters
-    ----------
-    path, wishes
-        The project (:func:`photogram.formats.plain.batches.streamable`).
-    folder
-        Of the run, on a disk that all workers see: a run that died is taken up there.
-    division
-        Cluster, workers, parts and memory.
-    unit_variance, loss
-        What the variance of unit weight is based on; None: as the project says. The loss of the project: by
-        default what it says.
-    max_iterations
-        Largest number of iterations. When None, the number of the project, else 50; 200 with a loss.
-    threads, progress
-        As of :func:`photogram.adjust_in_parts`.
-
-    Raises
-    ------
-    RankError, AdjustmentError, OutOfMemoryError, InputError
-        As of :func:`photogram.adjust_in_parts`, and as of projects that are read whole.
+    `unit_variance`, `loss`: what the variance of unit weight is based on; None: as the project says. The
+    loss of the project: by default what it says; `max_iterations`: largest number of iterations. When
+    None, the number of the project, else 50; 200 with a loss.
     """
     chosen = (unit_variance, loss, max_iterations)
     with _run(path, wishes, folder, division, chosen, threads) as run:

@@ -19,23 +19,13 @@ _FAMILY = _MIDDLE | {
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera in pixels whose lens is that of OpenCV, y down; p1 belongs to r^2 + 2 y^2 in y.
+    """A camera in pixels whose lens is that of OpenCV, y down; p1 belongs to r^2 + 2 y^2 in y."""
 
-    Attributes
-    ----------
-    fx, fy
-        Principal distances.
-    cx, cy
-        Principal point from the upper-left corner.
-    k1 .. k6, p1, p2
-        Terms; k4 .. k6 are of the denominator.
-    """
-
-    fx: float
+    fx: float  # Principal distances
     fy: float
-    cx: float
+    cx: float  # Principal point from the upper-left corner
     cy: float
-    k1: float = 0.0
+    k1: float = 0.0  # Terms; k4 .. k6 are of the denominator
     k2: float = 0.0
     k3: float = 0.0
     k4: float = 0.0

@@ -28,24 +28,12 @@ AMID = 0.1
 
 @dataclass(frozen=True, eq=False)
 class MicmacMarks:
-    """Fiducial marks of a camera, and what was read of them.
+    """Fiducial marks of a camera, and what was read of them."""
 
-    Attributes
-    ----------
-    places
-        By mark (x, y), mm, y up, counted from amid the marks.
-    readings
-        By photo and mark (column, row).
-    turned
-        Whether y of the file counts down, so that it was turned.
-    remarks
-        What was decided while it was read.
-    """
-
-    places: Mapping[str, Floats]
-    readings: Mapping[str, Mapping[str, Floats]]
-    turned: bool
-    remarks: tuple[str, ...]
+    places: Mapping[str, Floats]  # By mark (x, y), mm, y up, counted from amid the marks
+    readings: Mapping[str, Mapping[str, Floats]]  # By photo and mark (column, row)
+    turned: bool  # Whether y of the file counts down, so that it was turned
+    remarks: tuple[str, ...]  # What was decided while it was read
 
     def tables(self, camera: str) -> dict[str, dict[str, Any]]:
         """Return the tables `fiducials` and `fiducial_images` of a plain project, whose camera this is."""

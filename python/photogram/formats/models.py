@@ -63,19 +63,7 @@ def is_free(project: Project) -> bool:
 
 
 def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, message: Message) -> Project:
-    """Return a project whose model is carried into a frame by a similarity.
-
-    Parameters
-    ----------
-    project
-        The project; nothing of it is held.
-    by
-        The scale, the (3, 3) rotation and the (3,) shift.
-    frame
-        What it is carried into.
-    message
-        What is said of it.
-    """
+    """Return a project whose model is carried into a frame by scale, (3, 3) rotation and (3,) shift."""
     block = project.block
     scale, turn, shift = by
     matrices = attitude_matrices(block)

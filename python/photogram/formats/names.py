@@ -20,13 +20,7 @@ LARGEST = 2**53
 
 
 def with_names(project: Project, path: Path) -> Project:
-    """Return a project with points under other names: a table with the columns `point` and `name`.
-
-    Raises
-    ------
-    InputError
-        Points that are not there, two points of one name.
-    """
+    """Return a project with points under other names: a table with the columns `point` and `name`."""
     table = read_columns(path, known=("point", "name"))
     table.require("point", "name")
     places = {name: row for row, name in enumerate(project.block.point_ids)}
@@ -95,15 +89,7 @@ def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
 
 
 class Colours(Mapping[str, Sequence[int]]):
-    """Red, green and blue of points.
-
-    Parameters
-    ----------
-    names
-        Of the points.
-    values
-        (n, 3) from 0 to 255.
-    """
+    """Red, green and blue of points by name, from 0 to 255."""
 
     def __init__(self, names: Sequence[str], values: Indices) -> None:
         self._names, self._values = names, values

@@ -46,13 +46,7 @@ DIGITS = 6
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the image file, with orientation, control and names where they lie beside it.
-
-    Raises
-    ------
-    InputError
-        Lines that hold something else, rotations by which rays do not meet.
-    """
+    """Read the image file, with orientation, control and names where they lie beside it."""
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
@@ -158,13 +152,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return image file, orientation, control, and names where they are no numbers.
-
-    Raises
-    ------
-    InputError
-        Geographic coordinates.
-    """
+    """Return image file, orientation, control, and names where they are no numbers."""
     block, reduced = project.block, reduced_images(project, DIGITS)
     numbers = numbered([*block.photo_ids, *block.point_ids])
     images: list[str] = []

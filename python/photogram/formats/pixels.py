@@ -36,26 +36,14 @@ _KNOWN = (*_NEEDED, "sd", "sd_column", "sd_row", "camera", "use")
 
 
 def pixel_table(path: Path, messages: list[Message] | None = None) -> ColumnTable:
-    """Read a table of image measurements under all usual names of its columns; `messages` gets remarks.
-
-    Raises
-    ------
-    InputError
-        A column that is missing, or whatever a table refuses.
-    """
+    """Read a table of image measurements under all usual names of its columns; `messages` gets remarks."""
     table = read_columns(path, known=_NEEDED, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
     table.require(*_NEEDED)
     return in_units(table, column_units("images"), "images", [] if messages is None else messages)
 
 
 def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
-    """Return (rows, 2) columns and rows from the upper-left corner.
-
-    Raises
-    ------
-    InputError
-        An empty cell.
-    """
+    """Return (rows, 2) columns and rows from the upper-left corner."""
     found = table.given(_NEEDED[2:])
     return found + 0.5 if pixel_origin == "center" else found
 

@@ -22,21 +22,12 @@ STEP = 100.0
 
 @dataclass(frozen=True)
 class Bend:
-    """What a plane does to a block.
+    """What a plane does to a block."""
 
-    Attributes
-    ----------
-    extent
-        From the middle of the block to its edge, metres.
-    curvature
-        Height of the plane above a level surface at the edge, d^2 / 2R, metres.
-    scale
-        By how much horizontal lengths in the plane exceed those in space, as a part, in the middle and at
-        the edges: least and largest; heights have scale 1. None where the projection is not known.
-    """
-
-    extent: float
-    curvature: float
+    extent: float  # From the middle of the block to its edge, metres
+    curvature: float  # Height of the plane above a level surface at the edge, d^2 / 2R, metres
+    # By how much horizontal lengths in the plane exceed those in space, as a part, in the middle and at
+    # the edges: least and largest; heights have scale 1. None where the projection is not known
     scale: tuple[float, float] | None
 
     def __str__(self) -> str:
@@ -69,14 +60,7 @@ def bend(xyz: Floats, crs: str = "") -> Bend:
 def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> list[Message]:
     """Say by how much the plane bends where a block is adjusted in one, or looks as if it were.
 
-    Parameters
-    ----------
-    block
-        The block, in its frame.
-    path
-        Where it was read.
-    starts
-        (n, 3) where its points are about, if that is known; NaN where not.
+    `starts`: (n, 3) where its points are about, if that is known; NaN where not.
     """
     frame = block.frame
     if frame.kind != "cartesian" or block.geographic:

@@ -66,31 +66,19 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """Second images of points on photos, of which a block has one each.
+    """Second images of points on photos, of which a block has one each."""
 
-    Attributes
-    ----------
-    photos, points
-        Their k names.
-    xy
-        (k, 2) image coordinates, in the unit of the block.
-    """
-
-    photos: tuple[str, ...] = ()
+    photos: tuple[str, ...] = ()  # Their k names
     points: tuple[str, ...] = ()
+    # (k, 2) image coordinates, in the unit of the block
     xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class Unused(Repeated):
-    """Images of a board that were left out (`use` = `off`), which stay with the project.
+    """Images of a board that were left out (`use` = `off`), which stay with the project."""
 
-    Attributes
-    ----------
-    sd
-        (k, 2) standard deviations of image coordinates, in the unit of the block.
-    """
-
+    # (k, 2) standard deviations of image coordinates, in the unit of the block
     sd: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
@@ -225,29 +213,10 @@ def assembled(
     spheroid: Spheroid | None = None,
     photo_to_ground: bool = False,
 ) -> Project:
-    """Put together what a reader has found.
+    """Return the project of a file from its parts.
 
-    Parameters
-    ----------
-    path, title, sizes, pixel_mm, starts, frame, options, lacks, messages, details
-        As in :class:`Project`.
-    centres, matrices
-        (P, 3) positions and (P, 3, 3) attitudes A, photo to object; NaN where unknown.
-    image_sd
-        None where the file says nothing: it is assumed, and so said.
-    name
-        Of the project.
-    cameras, photo_ids, photo_cameras, point_ids, image_photos, image_points, image_xy, observations, mounts,
-    timed, passages
-        As in :class:`photogram.Block`.
-    point_positions, point_sd, point_check_sd, photo_position_sd, photo_attitude_sd, linear_unit, spheroid,
-    photo_to_ground
-        As there.
-
-    Raises
-    ------
-    InputError
-        What a block refuses, with the name of the file.
+    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if the
+    file has none. Errors of the block name the file.
     """
     place, found = Place(path), list(messages)
     if not photo_ids:

@@ -59,13 +59,7 @@ class Reduced:
 def project_of(
     found: Reduced, path: Path, title: str, wishes: Wishes, messages: Sequence[Message]
 ) -> Project:
-    """Return the project.
-
-    Raises
-    ------
-    InputError
-        Photos that are there twice, control without standard deviations.
-    """
+    """Return the project."""
     photos = list(found.photos)
     rows = {name: row for row, name in enumerate(photos)}
     points = list(dict.fromkeys([*(each[1] for each in found.images), *found.control]))
@@ -117,13 +111,7 @@ def project_of(
 
 
 def with_fitting_rotations(project: Project) -> Project:
-    """Return a project whose rotations are transposed where rays meet far better then.
-
-    Raises
-    ------
-    InputError
-        They meet neither way.
-    """
+    """Return a project whose rotations are transposed where rays meet far better then."""
     block = project.block
     if not np.isfinite(block.photo_attitudes).all():
         return project
@@ -172,15 +160,7 @@ class ReducedImages:
 
 
 def reduced_images(project: Project, digits: int | None = None) -> ReducedImages:
-    """Return the images of a project as a perspective camera without distortion would have seen them.
-
-    Parameters
-    ----------
-    project
-        The project.
-    digits
-        To which principal distances are rounded: coordinates are those of the rounded ones.
-    """
+    """Return the images of a project as a perspective camera without distortion would have seen them."""
     block = project.block
     cameras, which = known_cameras(block)
     pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]

@@ -225,30 +225,14 @@ def _fitting(project: Project, chosen: Format) -> Project:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a project is to be written, and in which format.
-
-    Attributes
-    ----------
-    format
-        The format.
-    folder
-        Where its files go.
-    file
-        Name of the first of them, where a user gave it one.
-    """
+    """Where a project is to be written, and in which format."""
 
     format: Format
-    folder: Path
-    file: str | None = None
+    folder: Path  # Parent of its files
+    file: str | None = None  # Name of the first file, if the user specifies it
 
     def files(self, project: Project) -> Mapping[Path, bytes]:
-        """Return the files of a project by their paths; those called as the first one share its new name.
-
-        Raises
-        ------
-        InputError
-            As for :func:`to_files`.
-        """
+        """Return the files of a project by their paths; those called as the first one share its new name."""
         found = to_files(project, self.format.name)
         if self.file is None:
             return {self.folder / name: content for name, content in found.items()}

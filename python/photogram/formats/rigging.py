@@ -15,23 +15,12 @@ from photogram.network.unknowns import Sensor
 
 @dataclass(frozen=True)
 class Rig:
-    """Sensors on one frame.
-
-    Attributes
-    ----------
-    name
-        For reports.
-    reference
-        The sensor that is the frame.
-    sensors
-        The pose of each other sensor.
-    clocks
-        The clocks of sensors on trajectories whose offset is said.
-    """
+    """Sensors on one frame."""
 
     name: str
-    reference: str
-    sensors: Mapping[str, Sensor]
+    reference: str  # The sensor whose axes are the axes of the frame
+    sensors: Mapping[str, Sensor]  # Poses of the other sensors
+    # Clocks of sensors on trajectories
     clocks: Mapping[str, Clock] = field(default_factory=dict)
 
 
@@ -60,14 +49,7 @@ def mounted(
 ) -> tuple[list[Mount], list[Stand]]:
     """Return mounts, and the photos that are missing for them.
 
-    Parameters
-    ----------
-    frames
-        All frames of more than one photo, or without one of the reference camera.
-    photos
-        Names.
-    centres, matrices
-        (P, 3) and (P, 3, 3) poses A, photo to object; NaN where unknown.
+    `centres`, `matrices`: (P, 3) and (P, 3, 3) poses A, photo to object; NaN where unknown.
     """
     mounts: list[Mount] = []
     stands: list[Stand] = []

@@ -19,13 +19,7 @@ def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
 
 
 def checked_rotation(place: Failing, matrix: Floats) -> Floats:
-    """Return a rotation matrix of a file, orthonormal to the last bits.
-
-    Raises
-    ------
-    InputError
-        It is none; names the place.
-    """
+    """Return a rotation matrix of a file, orthonormal to the last bits."""
     if not is_rotation(matrix):
         raise place.error("is no rotation matrix: not orthonormal, or mirrored")
     found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2

@@ -30,21 +30,11 @@ NEARLY_ALL = 0.9
 
 @dataclass(frozen=True)
 class Agreement:
-    """How images agree with positions as they were read.
+    """How images agree with positions as they were read."""
 
-    Attributes
-    ----------
-    median
-        Of the residuals' lengths, in the unit of the images; NaN without any.
-    behind
-        The part of the points that lie behind their photos.
-    images
-        How many images were looked at.
-    """
-
-    median: float
-    behind: float
-    images: int
+    median: float  # Of the residuals' lengths, in the unit of the images; NaN without any
+    behind: float  # The part of the points that lie behind their photos
+    images: int  # How many images were looked at
 
 
 @dataclass(frozen=True)

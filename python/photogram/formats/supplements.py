@@ -48,13 +48,7 @@ SIMILAR = 10.0
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return standard deviations by table from words such as `images=0.5` or `control=0.02,0.02,0.03`.
-
-    Raises
-    ------
-    InputError
-        Other words, a table that has none in plain projects, numbers that are no standard deviations.
-    """
+    """Return standard deviations by table from words such as `images=0.5` or `control=0.02,0.02,0.03`."""
     found = {}
     for each in given:
         name, equals, numbers = each.partition("=")
@@ -157,11 +151,6 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
 
     A camera whose model lacks a named parameter gets the narrowest model with it that contains its own: k1 of
     a pinhole. The parameter f of a model with fx and fy is one unknown if these are equal, and two if not.
-
-    Raises
-    ------
-    InputError
-        A name that no camera has as a parameter.
     """
     if not names:
         return project
@@ -198,19 +187,9 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
-    """Return a project whose datum is coordinates of chosen points, held: 3-2-1 over three of them.
+    """Return a project whose datum is coordinates of chosen points, held: `A=XYZ`, `B=YZ`, `C=Z`.
 
     What was held of points before checks the adjustment.
-
-    Parameters
-    ----------
-    wanted
-        `A=XYZ`, `B=YZ`, `C=Z` ...: a point and the coordinates of it; all three where none is named.
-
-    Raises
-    ------
-    InputError
-        A point that is not there or has no coordinates, what is no axis, a block in geographic space.
     """
     if not wanted:
         return project
@@ -236,13 +215,7 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
 
 
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
-    """Return a project with further image measurements: columns and rows of points in photos, pixels.
-
-    Raises
-    ------
-    InputError
-        Photos that are not there, images that are there already, cameras in millimetres.
-    """
+    """Return a project with further image measurements: columns and rows of points in photos, pixels."""
     messages: list[Message] = []
     found = _with_table(project, path, pixel_table(path, messages), pixel_origin)
     return found.replace(messages=(*found.messages, *messages))
@@ -353,26 +326,7 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    """Return a project with control and check points of a table, carried onto it where its frame is another.
-
-    Parameters
-    ----------
-    project
-        The project; its points bear the names of the table.
-    path
-        A table `control` of the plain project.
-    sd
-        Standard deviations for tables without columns for them.
-    crs
-        Of the table, where it is not the frame of the project.
-    columns
-        What is said of its columns and roles.
-
-    Raises
-    ------
-    InputError
-        A table at fault; none of its points has an image.
-    """
+    """Return a project with control and check points of a table; a free model is carried onto them."""
     from photogram.formats.control_lists import read_control_list
     from photogram.formats.control_system import check_systems
 

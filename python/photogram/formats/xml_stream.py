@@ -149,34 +149,13 @@ def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
 
 
 def check_root(path: Path) -> None:
-    """Reject a file that has the name of an XML document and no root element that can be read.
-
-    Raises
-    ------
-    InputError
-        Names the reason: a packed bomb, damage, declared entities, an encoding that is none.
-    """
+    """Reject a file that has the name of an XML document and no root element that can be read."""
     if path.suffix.lower() in SUFFIXES and not (root := root_of(path)[0]):
         read_stream(path, {}, root)
 
 
 def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:
-    """Read a file; return its root without the elements that were handed over.
-
-    Parameters
-    ----------
-    path
-        The file.
-    take
-        What is called with each element of a name when it ends.
-    root
-        The name of the root element.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no XML or one of another kind, or has more in one piece than is kept.
-    """
+    """Read a file; return its root without the elements that were handed over."""
     stack: list[Element] = []
     before: list[int] = []
     kept = 0

@@ -2,9 +2,6 @@
 
 from photogram.arguments.on_demand import attach_checked
 
-WAYS = {"check_of": ("checking",)}
-"""The file that says how a project is diagnosed: see `photogram.show.methods`."""
-
 __getattr__, __dir__, __all__ = attach_checked(
     __name__, __file__, given={"Camera", "Common", "Frame", "GroundPoint", "Limits"}
 )

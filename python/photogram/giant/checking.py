@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.diagnosis.diagnose import Manner, check_block, check_of
+from photogram.diagnosis.diagnose import Manner, check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
@@ -68,8 +68,3 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
         text = f"{warning.heading.lower()}: {len(warning.names)}"
         files.findings.append(Finding("warning", "look", text, [], warning.names))
     return Diagnosis(project.title, [files, *sections], result)
-
-
-@check_of.register
-def _(network: Project, threads: int | None) -> Diagnosis:
-    return check(network, threads=threads)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
@@ -20,9 +21,17 @@ from photogram.giant.records import Source
 from photogram.io.writing import write_whole
 from photogram.network.block import Block
 
+if TYPE_CHECKING:
+    from photogram.diagnosis import Diagnosis
+
 
 class Project(Contents):
     """A project: the content of the five files, and the way to a block and back."""
+
+    def _check(self, threads: int | None) -> Diagnosis:
+        from photogram.giant.checking import check
+
+        return check(self, threads=threads)
 
     def to_block(self, limits: Limits | None = None) -> Block:
         """Return the block: apply the rules that hold between files (GIANT guide, sections II.B and III).

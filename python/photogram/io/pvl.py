@@ -29,27 +29,15 @@ Value: TypeAlias = str | int | float | list["Value"] | Quantity
 
 @dataclass
 class Group:
-    """A group or an object of a label.
+    """A group or an object of a label."""
 
-    Parameters
-    ----------
-    name
-        What it is called; the label itself has no name.
-    kind
-        `group`, `object`, or `label`.
-    line
-        The line of the file on which it begins, from 1.
-    items
-        Its keys with their values, in the order of the file; a key may be there more than once.
-    inside
-        The groups and objects in it, in the order of the file.
-    """
-
-    name: str
-    kind: str
-    line: int = field(default=1, compare=False)
-    items: list[tuple[str, Value]] = field(default_factory=list)
-    inside: list[Group] = field(default_factory=list)
+    name: str  # Empty for the label itself
+    kind: str  # `group`, `object`, or `label`
+    line: int = field(default=1, compare=False)  # Where it begins, from 1
+    items: list[tuple[str, Value]] = field(
+        default_factory=list
+    )  # In the order of the file, repeated keys too
+    inside: list[Group] = field(default_factory=list)  # Groups and objects, in the order of the file
 
     def get(self, key: str) -> Value | None:
         """Return the first value of a key, None where there is none. Capitals are all one."""

@@ -34,13 +34,7 @@ class Stand(ABC):
 
 
 class Encoder:
-    """Makes plain values; one for a whole document, which knows what it has written.
-
-    Parameters
-    ----------
-    stands
-        What is written for objects of some classes, by these.
-    """
+    """Makes plain values; one for a whole document, which knows what it has written."""
 
     def __init__(self, stands: Mapping[type, Callable[[Any], Stand]] | None = None) -> None:
         self._stands = stands or {}

@@ -94,15 +94,9 @@ def quoted_text(text: str) -> str:
 
 
 class Sections(TomlFile):
-    """A file of sections with keys; all errors are :class:`photogram.InputError` with file, line and text.
+    """A file of sections with keys; errors name file, line and text.
 
-    Parameters
-    ----------
-    path
-        The file.
-    said
-        What a user says of keys in the place of the file: `section.key=value`, the value as in the file; a
-        text may go without its quotation marks.
+    `said` are values that replace those of the file: `section.key=value`, texts with or without quotes.
     """
 
     def __init__(self, path: Path, said: Sequence[str] = ()) -> None:

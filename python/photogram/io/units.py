@@ -18,15 +18,7 @@ def scaled(values: Floats, factor: float) -> Floats:
 
 
 def degrees_typed(radians: Floats, rounding: float = 0.0) -> Floats:
-    """Return angles in degrees, as they were typed if only conversions have changed their last digits.
-
-    Parameters
-    ----------
-    radians
-        Angles.
-    rounding
-        Error of the angles themselves, degrees; that of matrices is `MATRIX_ROUNDING`.
-    """
+    """Return angles in degrees, as they were typed if only conversions have changed their last digits."""
     return _typed(np.degrees(radians), rounding)
 
 

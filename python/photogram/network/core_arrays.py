@@ -18,7 +18,6 @@ from photogram.network.observations import moments
 from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
-from photogram.show.methods import Way
 
 CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
 
@@ -46,13 +45,6 @@ class CoreOptions:
     points_given: bool = False
 
 
-@Way
-def core_network(given: object, options: CoreOptions) -> CoreNetwork:
-    """Return a network of any class as the core adjusts it, and answers questions about it afterwards."""
-    raise NotImplementedError(type(given).__name__)
-
-
-@core_network.register(Block)
 def block_network(
     block: Block, options: CoreOptions, further: Sequence[Unknown] = ()
 ) -> _photocore.BlockNetwork:

@@ -17,6 +17,7 @@ from photogram.network.motion import on_shared
 from photogram.planning.pattern import Pattern
 from photogram.planning.statistics import with_known_readout
 from photogram.show.methods import Documented
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,17 +97,14 @@ def plan(
         A pattern that does not determine all unknowns; its message begins with the name of the pattern.
     """
     if len({(block.linear_unit, block.geographic) for block in patterns.values()}) != 1:
-        raise InputError("a plan needs one block, or several with the same linear unit and kind of space")
+        raise InputError(phrase("plan.spaces"))
     made = []
     for name, block in patterns.items():
         tied = np.isfinite(block.point_sd).any() or np.isfinite(block.photo_position_sd).any()
         # Of trajectories, what is given of them.
         if not (tied or on_shared(block).any()):
             raise RankError(
-                f"{name}: the observations leave position and scale open: a plan needs control, or standard"
-                " deviations for the positions of photos",
-                list(block.photo_ids),
-                [],
+                phrase("error.at", what=name, message=phrase("plan.datum")), list(block.photo_ids), []
             )
         try:
             result = predict(block, threads=threads, progress=progress)
@@ -114,7 +112,9 @@ def plan(
             known = None if other is None else predict(other, threads=threads, progress=progress)
             made.append(Pattern(name, result, known))
         except RankError as error:
-            raise RankError(f"{name}: {error}", error.photos, error.points) from None
+            raise RankError(
+                phrase("error.at", what=name, message=error.phrase or str(error)), error.photos, error.points
+            ) from None
     return Plan(tuple(made))
 
 

@@ -14,6 +14,7 @@ from photogram.show.sketch.layout import labelled
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -28,7 +29,7 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     """Return a picture with a panel for each pattern, in one scale of lengths and one of colours."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
     if heights.size == 0:
-        raise PhotogramError("there are no new points to be shown")
+        raise PhotogramError(phrase("plan.new-points"))
     plan = np.vstack([pattern.point_plan[pattern.result.used_points] for pattern in patterns])
     photos = np.vstack([pattern.photo_plan for pattern in patterns])
     limits = around(np.vstack([plan, photos]), 0.05)

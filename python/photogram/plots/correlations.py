@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import Correlated, pictured
+from photogram.plots.picture_data import Correlated
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
 from photogram.show.sketch.plot import Plot
+from photogram.words import phrase
 
 MAX_CAMERAS = 4
 MAX_WRITTEN_PARAMETERS = 14  # Coefficients of more parameters are not written into the matrix
 SHADES = Shades(-1.0, 1.0, "correlation, -1 to 1", "signed")
 
 
-def correlations(result: object) -> Plot:
+def correlations(result: Any) -> Plot:
     """Plot the correlations of the estimated parameters of cameras.
 
     Raises
@@ -23,9 +26,9 @@ def correlations(result: object) -> Plot:
     InputError
         No camera has two estimated parameters, or there are no covariances.
     """
-    cameras = pictured(result).correlations
+    cameras = result._plot_data().correlations
     if not cameras:
-        raise InputError("there are no correlations to draw: no camera has two estimated parameters")
+        raise InputError(phrase("plot.correlations"))
     shown = cameras[:MAX_CAMERAS]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import Curve, Curves, pictured
+from photogram.plots.picture_data import Curve, Curves
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
+from photogram.words import phrase
 
 MAX_CAMERAS = 3
 
 
-def distortion(result: object) -> Plot:
+def distortion(result: Any) -> Plot:
     """Plot the radial distortion of cameras: the curve, its balanced form, and their standard deviations.
 
     Bands are one standard deviation to either side. Dashed lines are beyond all images.
@@ -27,9 +29,9 @@ def distortion(result: object) -> Plot:
     InputError
         No camera has radial distortion.
     """
-    cameras = pictured(result).distortion[:MAX_CAMERAS]
+    cameras = result._plot_data().distortion[:MAX_CAMERAS]
     if not cameras:
-        raise InputError("there is no distortion to draw: no camera has radial terms, or they are all zero")
+        raise InputError(phrase("plot.distortion"))
     found = side_by_side(cameras)
     width = 6.4 if len(cameras) == 1 else 4.8 * len(cameras)
     return Plot(width, 0.6 + 2.3 * (len(found) // len(cameras)), found, len(cameras), shared=True)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import Deviations, pictured
+from photogram.plots.picture_data import Deviations
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
+from photogram.words import phrase
 
 MAX_FEATURES = 4
 MAX_POINT_NAMES = 40
 
 
-def features(result: object) -> Plot:
+def features(result: Any) -> Plot:
     """Plot the deviations of points from the features that are fitted to them, with U to either side.
 
     Raises
@@ -23,9 +26,9 @@ def features(result: object) -> Plot:
     InputError
         No feature has deviations.
     """
-    every = pictured(result).deviations
+    every = result._plot_data().deviations
     if not every:
-        raise InputError("there are no deviations to draw: no feature is fitted to more than two points")
+        raise InputError(phrase("plot.features"))
     shown = every[:MAX_FEATURES]
     said = f"the first {MAX_FEATURES} of {len(every)} features are drawn" if len(every) > MAX_FEATURES else ""
     panels = [_panel(each, said if each is shown[-1] else "") for each in shown]

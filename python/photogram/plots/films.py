@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import VectorField, pictured
+from photogram.plots.picture_data import VectorField
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK
+from photogram.words import phrase
 
 MAX_FIELDS = 6
 MARGIN = 0.14  # Around the places, as a part of their extent
 LONGEST_VECTOR = 0.11  # As a part of the extent of the places
 
 
-def films(result: object) -> Plot:
+def films(result: Any) -> Plot:
     """Plot residuals of fiducial marks, mean over the photos of each camera, and patterns of films.
 
     Raises
@@ -25,9 +28,9 @@ def films(result: object) -> Plot:
     InputError
         No marks and no patterns.
     """
-    every = pictured(result).films
+    every = result._plot_data().films
     if not every:
-        raise InputError("there are neither residuals of marks nor patterns of films to draw")
+        raise InputError(phrase("plot.films"))
     shown = every[:MAX_FIELDS]
     columns = min(2, len(shown))
     said = f"the first {MAX_FIELDS} of {len(every)} fields are drawn" if len(every) > MAX_FIELDS else ""

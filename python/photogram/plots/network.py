@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.plots.picture_data import Pictured, Plan, pictured
+from photogram.plots.picture_data import Pictured, Plan
 from photogram.show.pictures import round_length
 from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar
@@ -37,7 +39,7 @@ MIN_RAYS_OF_CLASSES = (1, 2, 3, 4, 5, 7, 10, 20)
 PLANES = {"XY": (0, 1, 2), "XZ": (0, 2, 1), "YZ": (1, 2, 0)}
 
 
-def network(result: object, *, plane: str | None = None) -> Plot:
+def network(result: Any, *, plane: str | None = None) -> Plot:
     """Plot photos, footprints, points by number of rays, control and check points, and error ellipses.
 
     The plot shows a part of a large network, and its notes state which part.
@@ -52,7 +54,7 @@ def network(result: object, *, plane: str | None = None) -> Plot:
     InputError
         `plane` is another text.
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     plan = drawn.plan
     seen = _plane(plan, plane)
     limits = _limits(plan, seen, drawn.footprints if seen[2] == 2 else None)
@@ -91,8 +93,7 @@ def _frame(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> Panel:
 def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
     """Return the axes to the right, up, and out of the picture."""
     if plane is not None:
-        if plane not in PLANES:
-            raise InputError(f"plane is one of {', '.join(PLANES)}, not {plane!r}")
+        one_of("plane", plane, tuple(PLANES))
         return PLANES[plane]
     known = plan.points[np.isfinite(plan.points).all(axis=1)]
     if len(known) < 2:

@@ -1,7 +1,6 @@
 """The data of plots: arrays that every adjusted network has, in metric axes.
 
-A plot knows no class of results: `pictured` returns its data. A file `picture_data.py` of each package of
-results defines `pictured` for its class.
+A plot knows no class of results: their method `_plot_data` returns a `Pictured`.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.methods import Way
-from photogram.statistics.findings import Observations
+from photogram.statistics.findings import Tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +154,7 @@ class Pictured(Protocol):
         """The image observations that took part."""
 
     @property
-    def tested(self) -> list[Observations]:
+    def tested(self) -> Sequence[Tested]:
         """All observations with their standardized residuals, by kind."""
 
     @property
@@ -184,16 +182,3 @@ class Pictured(Protocol):
     def films(self) -> list[VectorField]:
         """Mean residuals of the marks of cameras, and patterns of films."""
         return []
-
-
-@Way
-def pictured(result: object) -> Pictured:
-    """Return what pictures draw of a result.
-
-    Raises
-    ------
-    TypeError
-        The result of something else than an adjustment of photos and points.
-    """
-    kind = type(result).__name__
-    raise TypeError(f"there are no pictures of {kind}: they are of adjusted blocks and collections")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.arguments.types import Floats
@@ -9,11 +11,12 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
-from photogram.plots.picture_data import Images, Pictured, pictured
+from photogram.plots.picture_data import Images, Pictured
 from photogram.plots.residuals import frame
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
 from photogram.show.sketch.plot import Plot
+from photogram.words import phrase
 
 MAX_SINGLE_IMAGES = 600  # More image points are drawn as means of cells
 CELLS_OF_FRAME = 16  # Along the longer side
@@ -23,7 +26,7 @@ MAX_PHOTOS = 1000
 SHADES = Shades(0.0, 1.0, "redundancy number, 0 to 1")
 
 
-def redundancy(result: object) -> Plot:
+def redundancy(result: Any) -> Plot:
     """Plot redundancy numbers of images over the frame of all cameras, and of points over the network.
 
     A redundancy number is the part of an error that shows in the residual of its own observation: 0 hides
@@ -34,11 +37,11 @@ def redundancy(result: object) -> Plot:
     InputError
         The adjustment gave no redundancy numbers (`covariance=False`).
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     images = drawn.images
     values = images.redundancy.mean(axis=1)
     if not np.isfinite(values).any():
-        raise InputError("there are no redundancy numbers: adjust with covariance=True")
+        raise InputError(phrase("plot.redundancy"))
     network = replace(_over_network(drawn, values), shades=SHADES)
     return Plot(10.5, 4.9, [_over_frame(images, values), network], 2)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.picture_data import Images, pictured
+from photogram.plots.picture_data import Images
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers
@@ -24,12 +26,12 @@ LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut s
 LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
-def residuals(result: object) -> Plot:
+def residuals(result: Any) -> Plot:
     """Plot image residuals over the frame of each camera: one by one, or means of cells if they are many.
 
     Means that errors by chance would hardly give (1 percent for all cells together) are coloured.
     """
-    images = pictured(result).images
+    images = result._plot_data().images
     cameras, left_out = largest_cameras(images)
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)

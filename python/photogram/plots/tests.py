@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -10,16 +11,16 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, band, bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
+from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram.statistics.findings import Observations
+    from photogram.statistics.findings import Tested
 
 NORMAL = NormalDist()
 MAX_QUANTILES = 1500  # Test values drawn against the normal distribution, with all of the ends
@@ -29,7 +30,7 @@ LEVEL = 0.05
 MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
-def tests(result: object) -> Plot:
+def tests(result: Any) -> Plot:
     """Plot test values w of all observations: their histogram, and their quantiles, against the normal.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal where the given
@@ -40,17 +41,17 @@ def tests(result: object) -> Plot:
     InputError
         The adjustment gave no test values (`covariance=False`).
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
     if len(values) < 2:
-        raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
+        raise InputError(phrase("plot.tests"))
     weight = drawn.unit_weight
     return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
 
 
-def _speaking(group: Observations) -> Observations:
+def _speaking(group: Tested) -> Tested:
     """Return a group without the components that weigh nothing: at 0 they would be a spike, and no test."""
     sizes = np.nan_to_num(np.abs(group.values))
     silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
@@ -86,7 +87,7 @@ def _bell(x: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
-def _quantiles(groups: list[Observations], outlying: list[Bools], unit_weight: float) -> Panel:
+def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: float) -> Panel:
     values = np.concatenate([each.values.ravel() for each in groups])
     tested = np.isfinite(values)
     marked = np.concatenate([each.ravel() for each in outlying])[tested]
@@ -138,7 +139,7 @@ def _rows(n: int) -> Any:
     return np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
 
 
-def _worst(groups: list[Observations], outlying: list[Bools]) -> list[tuple[float, str]]:
+def _worst(groups: Sequence[Tested], outlying: list[Bools]) -> list[tuple[float, str]]:
     """Return the values of outliers and their names, the largest first."""
     found = []
     for each, own in zip(groups, outlying, strict=True):

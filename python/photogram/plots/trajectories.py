@@ -9,10 +9,12 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
+from photogram.messages import unknown_name
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Line, Mark, band, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, GREEN, INK, VERMILION
+from photogram.words import phrase
 
 TIMES_OF_CURVE = 160
 COLOURS = (BLUE, VERMILION, GREEN)
@@ -40,11 +42,11 @@ def trajectory(result: Any, *, name: str | None = None) -> Plot:
     every = result.trajectories
     name = next(iter(every), "") if name is None else name
     if name not in every:
-        raise InputError(f"the block has no trajectory {name}" if name else "the block has no trajectory")
+        raise InputError(unknown_name("trajectory", name, every) if every else phrase("plot.trajectory"))
     own = every[name]
     first, last = own.given.table.span
     if not last > first:
-        raise InputError(f"the trajectory {name} has one record, and so no span of time")
+        raise InputError(phrase("plot.span", name=name))
     times = np.linspace(first, last, TIMES_OF_CURVE)
     corrections, sd = own.corrections(times), own.poses(times).sd
     records = [

@@ -6,15 +6,13 @@ import numpy as np
 
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.network.motion import scanners
-from photogram.results.axes import TURNS, image_axes, point_axes
-from photogram.results.network_tables import Terms, terms_of
+from photogram.results.axes import TURNS, Determined, Terms, image_axes, point_axes
 from photogram.results.result import Result
-from photogram.results.weakest import Determined, determined
 from photogram.show.quantity import Quantity
 
 
-@terms_of.register(Result)
-def _terms(result: Result) -> Terms:
+def block_terms(result: Result) -> Terms:
+    """Return names and components of photos, points and images of a block."""
     block, axes = result.block, point_axes(result.block)
     lengths = None
     if block.geographic and len(result.photo_positions):
@@ -39,14 +37,17 @@ def _terms(result: Result) -> Terms:
             ),
         ),
         kinds=result.kinds.values(),
+        observation_rows=np.array(
+            [row for rows, _ in block.observation_groups for row in rows], dtype=np.int64
+        ),
         lengths=lengths,
         linear_unit=block.linear_unit,
         split=True,
     )
 
 
-@determined.register(Result)
-def _determined(result: Result) -> Determined:
+def determined(result: Result) -> Determined:
+    """Return positions and poses of a block with their cofactors, geocentric if it is geographic."""
     block, points, stations = result.block, result.point_positions, result.photo_positions
     cofactors = result.point_cofactors
     if block.spheroid is not None:

@@ -46,39 +46,22 @@ FAR = 5.0
 
 @dataclass(frozen=True)
 class ParameterTest:
-    """An estimated parameter.
+    """An estimated parameter."""
 
-    Attributes
-    ----------
-    name, unit
-        What it is called and measured in; no unit for numbers.
-    value, sd
-        Adjusted, with its standard deviation.
-    given, given_sd
-        The value it started from, or was observed with; infinite where it was free.
-    test_value
-        (value - reference) / sd.
-    probability
-        Of a test value as large where the reference is right.
-    multiple_correlation
-        R with all other unknowns, 0 to 1.
-    redundancy
-        Redundancy number of its weight; 0 without.
-    gain
-        By how much the weighted sum of squares would rise without the parameter (to first order).
-    """
-
+    # Name and unit; empty for plain numbers
     name: str
     unit: str
+    # Adjusted value and its standard deviation
     value: float
     sd: float
+    # Initial or observed value; its standard deviation, infinite if free
     given: float
     given_sd: float
-    test_value: float
-    probability: float
-    multiple_correlation: float
-    redundancy: float
-    gain: float
+    test_value: float  # (value - reference) / sd
+    probability: float  # Of a test value this large if the reference is right
+    multiple_correlation: float  # R with all other unknowns, 0 to 1
+    redundancy: float  # Redundancy number of its weight; 0 without
+    gain: float  # Increase of the weighted sum of squares without the parameter (first order)
 
     @property
     def change(self) -> float:
@@ -113,21 +96,11 @@ class ParameterTest:
 
 @dataclass(frozen=True)
 class GroupTest:
-    """Terms of a lens tested together.
+    """Terms of a lens tested together."""
 
-    Attributes
-    ----------
-    names
-        The parameters.
-    test_value
-        p' Q^-1 p / (g sigma0^2).
-    probability
-        Of a test value as large where all are zero.
-    """
-
-    names: tuple[str, ...]
-    test_value: float
-    probability: float
+    names: tuple[str, ...]  # The parameters
+    test_value: float  # p' Q^-1 p / (g sigma0^2)
+    probability: float  # Of a test value this large if all are zero
 
     @property
     def significant(self) -> bool:
@@ -151,22 +124,13 @@ class Correlation:
 
 @dataclass(frozen=True)
 class PoseCorrelation:
-    """A parameter that is correlated with one component of the poses of photos.
+    """A parameter that is correlated with one component of the poses of photos."""
 
-    Attributes
-    ----------
-    parameter, component
-        Their names; a component is a coordinate, or omega, phi or kappa.
-    photos
-        The photos where the correlation is above 0.95, the largest first.
-    coefficient
-        The largest.
-    """
-
+    # Names of the parameter and of the component: a coordinate, omega, phi or kappa
     parameter: str
     component: str
-    photos: tuple[str, ...]
-    coefficient: float
+    photos: tuple[str, ...]  # Photos with correlations above 0.95, the largest first
+    coefficient: float  # The largest
 
 
 @dataclass(frozen=True, eq=False)

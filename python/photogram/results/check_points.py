@@ -27,36 +27,17 @@ MOST = 1000
 
 @dataclass(frozen=True, eq=False)
 class CheckPoints:
-    """The k check points of a result.
+    """The k check points of a result."""
 
-    Attributes
-    ----------
-    rows
-        (k,) among all points.
-    names
-        What they are called.
-    differences
-        (k, 3) adjusted minus given, in the units of the block; NaN where nothing is given.
-    sd
-        (k, 3) standard deviations of the adjusted coordinates.
-    given_sd
-        (k, 3) standard deviations of the given ones; where none were given, those that are assumed.
-    assumed
-        (k,) whether those of a point are assumed.
-    untested
-        Why there is no test; empty where there is one.
-    agreement
-        The tests; None where there are none.
-    """
-
-    rows: Indices
-    names: tuple[str, ...]
-    differences: Floats
-    sd: Floats
+    rows: Indices  # (k,) among all points
+    names: tuple[str, ...]  # Names of the points
+    differences: Floats  # (k, 3) adjusted minus given, in the units of the block; NaN if not given
+    sd: Floats  # (k, 3) standard deviations of the adjusted coordinates
+    # (k, 3) standard deviations of the given coordinates; assumed values if none were given
     given_sd: Floats
-    assumed: Bools
-    untested: str
-    agreement: Agreement | None = None
+    assumed: Bools  # (k,) whether the given deviations are assumed
+    untested: str  # Reason for a missing test; empty with a test
+    agreement: Agreement | None = None  # Tests, if any
 
     @cached_property
     def statistics(self) -> tuple[Floats, Floats]:

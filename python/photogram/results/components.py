@@ -10,7 +10,7 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components_table import components_table, statement
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Documented, Judged, findings_of
+from photogram.show.methods import Documented, Judged
 from photogram.show.quantity import members, records
 from photogram.show.summary import Brief
 from photogram.statistics.components import Component, Estimate
@@ -89,11 +89,11 @@ class VarianceComponents(Judged, Documented, Brief):
             for each in self.components
             if not each.held
         ]
-        given = findings_of(self.first)
+        given = self.first._findings()
         first = statement(self)[0]
         told = [f"{first[:1].upper()}{first[1:]}."]
         return replace(
-            findings_of(self.result),
+            self.result._findings(),
             global_test=given.global_test,
             components=estimated,
             if_usable=told,

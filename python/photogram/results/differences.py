@@ -20,17 +20,10 @@ _KINDS = ("photo", "point", "camera", "unknown")
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of differences.
+    """The largest of differences."""
 
-    Attributes
-    ----------
-    size
-        How large; 0 where nothing differs.
-    kind, name, component
-        Of what; empty where nothing differs.
-    """
-
-    size: float = 0.0
+    size: float = 0.0  # 0 if nothing differs
+    # Empty if nothing differs
     kind: str = ""
     name: str = ""
     component: str = ""

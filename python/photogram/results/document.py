@@ -31,7 +31,7 @@ from photogram.results.network_sections import (
     control_section,
     stations_section,
 )
-from photogram.results.network_tables import control, terms_of
+from photogram.results.network_tables import control
 from photogram.results.tables import (
     camera_parameters,
     check_points,
@@ -220,7 +220,7 @@ def rms_of(values: Floats) -> float:
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
     """Write differences in the components, those that are angles also as lengths."""
-    axes, lengths, unit = point_axes(result.block), terms_of(result).lengths, result.block.linear_unit
+    axes, lengths, unit = point_axes(result.block), result._terms().lengths, result.block.linear_unit
     return [
         f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
         + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")

@@ -36,25 +36,15 @@ HELD = 1e-6
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two names that are exchanged.
+    """Two names that are exchanged."""
 
-    Attributes
-    ----------
-    photos
-        On this photo; several where the images do not tell on which of them.
-    points
-        The names.
-    as_named, exchanged
-        T of both points as they are named, and with the names exchanged on the first of the photos.
-    dimension
-        Degrees of freedom of both.
-    """
-
-    photos: tuple[str, ...]
+    photos: tuple[str, ...]  # several if the images do not show on which photo
     points: tuple[str, str]
+    # as_named, exchanged: T of both points as they are named, and with the names exchanged on the first of
+    # the photos
     as_named: float
     exchanged: float
-    dimension: int
+    dimension: int  # degrees of freedom of both
 
     @property
     def sentence(self) -> Phrase:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest
+from photogram.messages import nearest, unknown_name
 from photogram.statistics.distributions import LEVEL
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -189,13 +190,7 @@ def directions(kind: str) -> tuple[str, ...]:
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order in which they are asked for.
-
-    Raises
-    ------
-    InputError
-        A name that is not there, or a pattern that none has.
-    """
+    """Return points by names and patterns, each once, in the order in which they are asked for."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:
@@ -203,8 +198,9 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
             continue
         matching = [name for name in names if fnmatchcase(name, each)]
         if not matching:
-            there = nearest(each, names) if len(names) < 10_000 and not {*"*?["} & {*each} else ""
-            raise InputError(f"there is no point {each!r}{there if 'mean' in there else ''}")
+            if {*"*?["} & {*each} or len(names) > 10_000:
+                raise InputError(phrase("error.absent", kind="point", name=each))
+            raise InputError(unknown_name("point", each, names))
         found |= dict.fromkeys(matching, True)
     return list(found)
 

@@ -16,12 +16,11 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.core_arrays import core_network
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
@@ -29,14 +28,14 @@ from photogram.network.strips import strips_of
 from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
-from photogram.show.methods import Documented, Way
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
 from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,22 +62,14 @@ TOGETHER = 32
 
 @dataclass(frozen=True)
 class Probing:
-    """How sums over R are found.
+    """How sums over R are found."""
 
-    Attributes
-    ----------
-    exact
-        Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
-        network of 1,000 observations.
-    vectors
-        Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that.
-    seed
-        Of the signs; the same seed gives the same bits.
-    """
-
+    # Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
+    # network of 1,000 observations
     exact: int | None = None
+    # Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that
     vectors: int = 32
-    seed: int = 1
+    seed: int = 1  # of the signs; equal seeds give equal bits
 
     def options(self, observations: int) -> dict[str, Any]:
         """Return what the core takes, for a network of so many observations."""
@@ -88,25 +79,16 @@ class Probing:
 
 @dataclass(frozen=True)
 class GroupSum:
-    """A group of observations after the adjustment.
-
-    Attributes
-    ----------
-    name
-        The group.
-    count, squares, redundancy
-        Observations, their weighted sum of squares q, the sum r of their redundancy numbers.
-    spread
-        s: q has the variance 2 s where the standard deviations are right.
-    test
-        Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5.
-    """
+    """A group of observations after the adjustment."""
 
     name: str
+    # count, squares, redundancy: Observations, their weighted sum of squares q, the sum r of their redundancy
+    # numbers
     count: int
     squares: float
     redundancy: float
-    spread: float
+    spread: float  # s: the variance of q is 2 s if the standard deviations are right
+    # Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5
     test: GlobalTest | None
 
     @property
@@ -191,13 +173,7 @@ class GroupSums(Documented, Brief):
 
 
 class Left:
-    """What an adjustment leaves of groups of its observations, and of all others as one more group.
-
-    Attributes
-    ----------
-    counts, squares, redundancy
-        (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
-    """
+    """What an adjustment leaves of groups of its observations, and of all others as one more group."""
 
     def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
@@ -235,20 +211,17 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
         "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
         "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
     }
-    if isinstance(result, Result):
-        count = len(result.block.observations)
-        of_observations, own = np.full(count, np.nan), np.full(count, np.nan)
-        for kind in result.kinds.values():
-            of_observations[kind.rows] = kind.squares
-            own[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
-        squares["observations"] = of_observations
-        redundancy["observations"] = np.where(np.isfinite(of_observations), own, np.nan)
+    kinds = [*result._terms().kinds]
+    size = sum(len(kind.rows) for kind in kinds)
+    of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
+    for kind in kinds:
+        of_observations[kind.rows] = kind.squares
+        shares[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
+        components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
+    squares["observations"] = of_observations
+    redundancy["observations"] = np.where(np.isfinite(of_observations), shares, np.nan)
     ones = {name: np.where(np.isfinite(values), 1.0, np.nan) for name, values in redundancy.items()}
-    if isinstance(result, Result):
-        components = np.ones(len(result.block.observations))
-        for kind in result.kinds.values():
-            components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
-        ones["observations"] *= components
+    ones["observations"] *= components
     counts = np.round(grouping.summed(ones)).astype(np.int64)
     return counts, grouping.summed(squares), grouping.summed(redundancy)
 
@@ -257,13 +230,17 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
     return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
 
 
-@Way
 def observables(network: object) -> Observables:
     """Return what a block, a collection or an adjusted one has observations of."""
-    raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+    given = network.given if isinstance(network, AdjustedNetwork) else network
+    if isinstance(given, Block):
+        return block_observables(given)
+    if not hasattr(given, "_observables"):
+        raise argument_error("network", "kind", kind=phrase("groups.network"), value=value_field(network))
+    found: Observables = given._observables()
+    return found
 
 
-@observables.register
 def block_observables(block: Block) -> Observables:
     """Return what a block has observations of."""
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
@@ -298,14 +275,9 @@ def _strips(block: Block) -> list[Indices]:
     return [*(others[strip] for strip in found), *(np.array(rows, dtype=np.int64) for rows in flown.values())]
 
 
-@observables.register
-def _(result: AdjustedNetwork) -> Observables:
-    return observables(result.given)
-
-
 def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
     """Return the factor of the normal equations of an adjusted network."""
-    return core_network(result.given, result.options).covariances(result.state, threads=0, progress=None)
+    return result._core_network().covariances(result.state, threads=0, progress=None)
 
 
 def group_sums(
@@ -335,9 +307,9 @@ def group_sums(
         No adjusted network, none with covariances, groups that there are not.
     """
     if not isinstance(result, AdjustedNetwork):
-        raise InputError(f"not the result of an adjustment: {shown(result)}")
+        raise argument_error("result", "kind", kind=phrase("groups.result"), value=value_field(result))
     if not np.isfinite(result.redundancy[result.used_images]).all():
-        raise InputError("the result has no redundancy numbers: adjust with covariance=True")
+        raise InputError(phrase("groups.no-redundancy"))
     grouping = grouped(observables(result), groups)
     counts, squares, redundancy = sums_of(result, grouping)
     spread = np.clip(_spread(result, grouping, counts, probing or Probing()), 0.0, redundancy)

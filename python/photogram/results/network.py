@@ -21,7 +21,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message
-from photogram.network.core_arrays import CoreOptions, core_network
+from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
     from photogram.io.writing import Content
     from photogram.plots import Plots
+    from photogram.plots.picture_data import Pictured
+    from photogram.results.axes import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
@@ -239,6 +241,22 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return global_test(*self.sum_and_freedom)
 
     @abstractmethod
+    def _core_network(self) -> CoreNetwork:
+        """Return the network for the core."""
+
+    @abstractmethod
+    def _terms(self) -> Terms:
+        """Return names and components of photos, points and images."""
+
+    @abstractmethod
+    def _determined(self) -> Determined:
+        """Return positions and poses with their cofactors."""
+
+    @abstractmethod
+    def _plot_data(self) -> Pictured:
+        """Return the data of the plots."""
+
+    @abstractmethod
     def _trial(self) -> NetworkTrial:
         """Return the network as tests ask it, where the adjustment has ended."""
 
@@ -413,7 +431,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         KeyboardInterrupt
             Ctrl-C.
         """
-        network = core_network(self.given, self.options)
+        network = self._core_network()
         return Covariances(
             self._adjusted(),
             lambda: network.covariances(self.state, threads=0, progress=None),
@@ -478,6 +496,16 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def image_table(self) -> pd.DataFrame:
         """Return image observations as a data frame: residuals, redundancy numbers, test values."""
         return self._table("image")
+
+    def test_table(self) -> pd.DataFrame:
+        """Return the tests of all observations as a data frame, a row for each component.
+
+        Columns are the type (`image`, `control`, `station`, ...), row, photo and point of the observation,
+        component and unit, residual, standard deviation, redundancy number, smallest error that the test
+        detects (level 0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) with its
+        probability `p`, and whether the verdict considers the observation an outlier.
+        """
+        return self._table("test")
 
     def control_table(self) -> pd.DataFrame:
         """Return control as a data frame: residuals of held components, redundancy numbers, test values."""

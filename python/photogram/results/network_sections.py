@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.messages import counted, listed
-from photogram.results.axes import point_axes
+from photogram.results.axes import Terms, point_axes
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import (
-    Terms,
     control,
     images,
     part,
@@ -22,7 +21,6 @@ from photogram.results.network_tables import (
     plan_deviations,
     points,
     stations,
-    terms_of,
 )
 from photogram.results.tables import check_points, observations
 from photogram.results.weakest import WeakestPhoto, WeakestPoint
@@ -184,7 +182,7 @@ def _compared(key: str, title: str, columns: Sequence[Quantity]) -> list[Table]:
 def stations_section(result: AdjustedNetwork) -> Section:
     """Return what was given of photos as observations, layer by layer."""
     tables: list[Table] = []
-    layers = terms_of(result).layers
+    layers = result._terms().layers
     for caption, of in layers.items():
         given = result.stations
         columns = [part(column, of) if column.axes else column for column in stations(result)]
@@ -248,7 +246,7 @@ def chosen_rows(count: int, named: Iterable[int], orders: Sequence[Indices]) -> 
 
 def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
     """Return photos, those `named` elsewhere first: their unknowns, and how their images fit, in layers."""
-    terms, fit = terms_of(result), _fit_of_photos(result, terms_of(result))
+    terms, fit = result._terms(), _fit_of_photos(result, result._terms())
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
     rows, every = chosen_rows(len(terms.photos), named, orders)
     some = (
@@ -301,7 +299,7 @@ def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
 
 def points_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
     """Return points with their standard deviations, those `named` by other tables first."""
-    terms, used = terms_of(result), np.flatnonzero(result.used_points)
+    terms, used = result._terms(), np.flatnonzero(result.used_points)
     # What makes lengths of angles, near enough to sort by.
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)
@@ -329,7 +327,7 @@ def weakest_tables(
     result: AdjustedNetwork, points: Sequence[WeakestPoint], photos: Sequence[WeakestPhoto]
 ) -> tuple[Table, Table]:
     """Return the points and photos with the weakest determination; without rows if there are no cofactors."""
-    called = int if terms_of(result).identity == "number" else str
+    called = int if result._terms().identity == "number" else str
     of_points, of_photos = ([each.row for each in things] for things in (points, photos))
     ratio = (
         "The ratio of the standard deviations is in any directions: above 10,000 rays are nearly parallel."

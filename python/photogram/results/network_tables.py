@@ -2,52 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
+from photogram.results.axes import Terms
 from photogram.results.iteration_text import iteration_table
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.results.observation_kinds import ObservedKind
-from photogram.show.methods import Way
 from photogram.show.quantity import Axis, Link, Quantity
 
 _FREE = {np.inf: "free", 0.0: "fixed"}
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """What the photos, points and images of a network are called and measured in."""
-
-    photos: np.ndarray  # (P,), (n,) names, or numbers from 0
-    points: np.ndarray
-    photo_axes: tuple[Axis, ...]  # Unknowns of a photo, coordinates of a point, image coordinates
-    point_axes: tuple[Axis, ...]
-    image_axes: tuple[Axis, ...]
-    photo_values: Floats  # (P, k) adjusted unknowns
-    # What the unknowns of a photo consist of: how people call it, and JSON documents
-    layers: Mapping[str, slice]
-    parts: Mapping[str, slice]
-    of_photos: tuple[Quantity, ...] = ()  # What tables tell first: of photos, of points that took part
-    of_points: tuple[Quantity, ...] = ()
-    kinds: Iterable[ObservedKind] = ()  # Observations beside images
-    lengths: Floats | None = None  # (3,) of the units of coordinates, where two of them are angles
-    linear_unit: str = ""
-    split: bool = False  # Whether JSON documents tell differences of positions from those of attitudes
-
-    @property
-    def identity(self) -> str:
-        """How JSON documents call the name or number of a thing."""
-        return "number" if self.points.dtype.kind == "i" else "id"
-
-
-@Way
-def terms_of(result: AdjustedNetwork) -> Terms:
-    """Return what the photos, points and images of a network are called and measured in."""
-    raise NotImplementedError(type(result).__name__)
 
 
 def names(terms: Terms, kind: str, rows: Indices, member: str = "", *, here: bool = False) -> Quantity:
@@ -71,7 +38,7 @@ def part(each: Quantity, of: slice) -> Quantity:
 
 def photos(result: AdjustedNetwork) -> list[Quantity]:
     """Return adjusted photos: names, values, standard deviations."""
-    terms = terms_of(result)
+    terms = result._terms()
     rows = np.arange(len(terms.photos))
     return [
         names(terms, "photo", rows, "id" if terms.identity == "id" else "", here=True),
@@ -85,7 +52,7 @@ def photos(result: AdjustedNetwork) -> list[Quantity]:
 
 def points(result: AdjustedNetwork) -> list[Quantity]:
     """Return the points that took part: names, rays, coordinates, standard deviations."""
-    terms, used = terms_of(result), np.flatnonzero(result.used_points)
+    terms, used = result._terms(), np.flatnonzero(result.used_points)
     rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
     return [
         names(terms, "point", used, terms.identity, here=True),
@@ -98,7 +65,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
 
 def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantity]:
     """Return the images that took part, or some: residuals, redundancy numbers, test values."""
-    terms, used = terms_of(result), np.flatnonzero(result.used_images) if rows is None else rows
+    terms, used = result._terms(), np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
         names(terms, "photo", result.given.image_photos[used], "photo"),
@@ -126,14 +93,14 @@ def iterations(result: AdjustedNetwork) -> list[Quantity]:
 
 def control(result: AdjustedNetwork) -> list[Quantity]:
     """Return points as observations of their own coordinates."""
-    terms, own = terms_of(result), result.control
+    terms, own = result._terms(), result.control
     values = result.point_positions, result.point_sd
     return _observed("point", terms, own, terms.point_axes, result.given.point_positions[own.rows], *values)
 
 
 def stations(result: AdjustedNetwork) -> list[Quantity]:
     """Return photos as observations of their own unknowns."""
-    terms, own = terms_of(result), result.stations
+    terms, own = result._terms(), result.stations
     given = (terms.photo_values + result.photo_residuals)[own.rows]
     return _observed("photo", terms, own, terms.photo_axes, given, terms.photo_values, result.photo_sd)
 

@@ -41,26 +41,14 @@ T = TypeVar("T")
 
 
 class NetworkTrial:
-    """A network tried without some of its observations.
-
-    Parameters
-    ----------
-    core
-        The network in the core.
-    suspects
-        Its groups of observations.
-    supported
-        (P,) whether what is known of the pose of a photo determines it without images.
-    rough, exact
-        When the adjustment of a round is over, the latter where R of all rows is used; see the core.
-    """
+    """A network tried without some of its observations."""
 
     def __init__(
         self, core: _photocore.NetworkTrial, suspects: Suspects, supported: Bools, rough: float, exact: float
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.suspects.deviations
-        self._supported = supported
+        self._supported = supported  # (P,) whether the pose of a photo is determined without images
         self._is_image = np.asarray(core.suspects.subjects[0] == IMAGE)
         starts = suspects.row_starts
         sizes = np.diff(starts)
@@ -255,19 +243,6 @@ class NamedSuspects(ABC):
 
     It keeps arrays, not the core, so that names last longer than what was tested. Classes of networks say
     what may go alone, and what else than images, control and poses there is.
-
-    Parameters
-    ----------
-    given
-        The network.
-    core
-        The same in the core.
-    apart
-        Whether parts of a control point or of a station may go alone.
-    components
-        What the coordinates of points, and the components of positions and attitudes, are called.
-    lengths
-        Units of coordinates and of positions.
     """
 
     def __init__(

@@ -16,7 +16,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import terms_of
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
@@ -67,7 +66,7 @@ def patterns(
     # ~v = w sqrt(r), of w that are clipped; 0 where nothing is tested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
-    given, (axis, _) = result.given, terms_of(result).image_axes
+    given, (axis, _) = result.given, result._terms().image_axes
     # By photo the coordinates are those that were measured: of a scanner, samples and lines.
     image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
     scale = factor * given.image_sd[used].mean(axis=0) * axis.factor

@@ -21,7 +21,6 @@ from photogram.plots.picture_data import (
     Pictured,
     Plan,
     VectorField,
-    pictured,
 )
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
@@ -31,8 +30,8 @@ from photogram.results.film_pictures import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.results.tested_observations import outlying, tested_observations
-from photogram.statistics.findings import Observations
+from photogram.results.tests import Tests
+from photogram.statistics.findings import Tested
 
 
 class PicturedNetwork(Pictured):
@@ -68,15 +67,19 @@ class PicturedNetwork(Pictured):
         """(P,) which photos are strips of a scanner, whose images are samples and lines."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
+    @cached_property
+    def _tests(self) -> Tests:
+        return Tests(self.result)
+
     @property
-    def tested(self) -> list[Observations]:
+    def tested(self) -> Sequence[Tested]:
         """All observations with their standardized residuals."""
-        return tested_observations(self.result)
+        return self._tests.normal
 
     @property
     def outlying(self) -> list[Bools]:
         """Which of them are outliers of the verdict."""
-        return [outlying(self.result.verdict, each) for each in self.tested]
+        return self._tests.outliers
 
     @property
     def unit_weight(self) -> float:
@@ -225,8 +228,3 @@ def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
             Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
         ],
     )
-
-
-@pictured.register(Result)
-def _pictured(result: Result) -> Pictured:
-    return PicturedBlock(result)

@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of
+from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
@@ -47,26 +46,16 @@ SEARCHED = 100
 
 @dataclass(frozen=True)
 class Inseparable:
-    """Two groups of observations whose errors cannot be told apart.
+    """Two groups of observations whose errors cannot be told apart."""
 
-    Attributes
-    ----------
-    first, second
-        What they are called.
-    groups
-        Their numbers among all.
-    correlation
-        Largest canonical correlation of their residuals: an error of one moves the test of the other by this
-        share.
-    factor
-        How many minimal detectable errors an error must have to be attributed to the right one of the two in
-        95 of 100 cases; infinite where nothing tells them apart.
-    """
-
-    first: str
+    first: str  # names
     second: str
-    groups: tuple[int, int]
+    groups: tuple[int, int]  # their numbers among all
+    # Largest canonical correlation of their residuals: an error of one moves the test of the other by this
+    # share
     correlation: float
+    # How many minimal detectable errors an error must have to be attributed to the right one of the two in 95
+    # of 100 cases; infinite where nothing tells them apart
     factor: float
 
     def __str__(self) -> str:
@@ -75,25 +64,13 @@ class Inseparable:
 
 @dataclass(frozen=True)
 class Moved:
-    """The unknown that an undetected error moves most.
+    """The unknown that an undetected error moves most."""
 
-    Attributes
-    ----------
-    observation, component
-        Whose minimal detectable error it is.
-    unknown
-        Kind, number and component of the unknown.
-    effect
-        By how much it moves, in its unit.
-    in_sd
-        The same in its standard deviations (a priori unit weight).
-    """
-
-    observation: str
+    observation: str  # the one with the minimal detectable error
     component: str
-    unknown: tuple[str, int, int]
-    effect: float
-    in_sd: float
+    unknown: tuple[str, int, int]  # Kind, number and component of the unknown
+    effect: float  # By how much it moves, in its unit
+    in_sd: float  # The same in its standard deviations (a priori unit weight)
 
 
 class Reliability:
@@ -397,17 +374,10 @@ def reliability_of(
     power: float,
     unit_weight: str,
 ) -> Reliability:
-    """Return the reliability of a network that is adjusted, with checked options.
-
-    Raises
-    ------
-    InputError
-        Options that cannot be.
-    """
+    """Return the reliability of a network that is adjusted, with checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     for name, value in (("level", level), ("power", power)):
-        if not 0 < number(name, value) < 1:
-            raise InputError(f"{name} is a probability between 0 and 1, not {value:g}")
+        probability(name, number(name, value))
     known = unit_weight == "known"
     return Reliability(trial, covariances, level=level, power=power, known=known)
 

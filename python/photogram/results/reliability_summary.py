@@ -37,91 +37,47 @@ APART = 1 / (1 + LIMIT)
 
 @dataclass(frozen=True)
 class KindReliability:
-    """The groups of observations of one kind: images, control points, positions ...
-
-    Attributes
-    ----------
-    kind
-        Its name.
-    groups, components
-        How many take part, and their rows.
-    redundancy
-        Sum of the redundancy numbers of these.
-    unchecked
-        Groups whose errors no other observation shows.
-    one_sided
-        Groups with a direction in which an error shows in no residual, among those that are checked.
-    """
+    """The groups of observations of one kind: images, control points, positions ..."""
 
     kind: str
-    groups: int
+    groups: int  # number of groups and of their rows
     components: int
-    redundancy: float
-    unchecked: int
+    redundancy: float  # Sum of the redundancy numbers of these
+    unchecked: int  # groups that no other observation checks
+    # Groups with a direction in which an error shows in no residual, among those that are checked
     one_sided: int
 
 
 @dataclass(frozen=True)
 class WeakObservation:
-    """A group of observations whose undetected error does most among those of its kind.
-
-    Attributes
-    ----------
-    kind, name
-        What it is.
-    redundancy
-        The least of a direction that shows.
-    detectable_sd
-        Largest half-axis of its minimal detectable error, in standard deviations.
-    external_sd
-        By how many standard deviations that moves anything at the most when it is not found.
-    own_point
-        By how much the minimal detectable error of its worst component moves its own point, in the unit of
-        the object space (of geographic coordinates the height); NaN without one.
-    """
+    """A group of observations whose undetected error does most among those of its kind."""
 
     kind: str
     name: str
-    redundancy: float
-    detectable_sd: float
-    external_sd: float
+    redundancy: float  # The least of a direction that shows
+    detectable_sd: float  # Largest half-axis of its minimal detectable error, in standard deviations
+    external_sd: float  # By how many standard deviations that moves anything at the most when it is not found
+    # By how much the minimal detectable error of its worst component moves its own point, in the unit of the
+    # object space (of geographic coordinates the height); NaN without one
     own_point: float
 
 
 @dataclass(frozen=True, eq=False)
 class ReliabilitySummary:
-    """The reliability of a network in a few lines.
+    """The reliability of a network in a few lines."""
 
-    Attributes
-    ----------
-    level, power, known
-        Of the tests, and whether the unit weight is known.
-    kinds
-        By kind of observation.
-    weakest
-        Of each kind those whose undetected errors do most.
-    two_rays
-        Points on two photos: which of their images is wrong nothing tells.
-    pairs
-        Pairs of observations on other points that cannot be told apart, the most alike first.
-    pairs_found
-        How many of these there are among the points that were looked into.
-    points_looked_into
-        How many points these are: those with little redundancy, `LOOKED_INTO` at the most.
-    suspects, tests
-        All groups, and their tests.
-    """
-
-    level: float
+    level: float  # of the tests
     power: float
     known: bool
     kinds: tuple[KindReliability, ...]
-    weakest: tuple[WeakObservation, ...]
-    two_rays: int
+    weakest: tuple[WeakObservation, ...]  # of each type those with the largest undetected effect
+    two_rays: int  # points on two photos: the wrong image cannot be identified
+    # Pairs of observations on other points that cannot be told apart, the most alike first
     pairs: tuple[Inseparable, ...]
-    pairs_found: int
+    pairs_found: int  # number of these pairs among the examined points
+    # Number of examined points: those of the least redundancy, at most `LOOKED_INTO`
     points_looked_into: int
-    suspects: Suspects
+    suspects: Suspects  # all groups, and their tests
     tests: Tests
 
     @property

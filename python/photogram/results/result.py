@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram.io.writing import Content
+    from photogram.plots.picture_data import Pictured
+    from photogram.results.axes import Determined, Terms
     from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
@@ -216,12 +218,30 @@ class Result(OnFilm, AdjustedNetwork):
         return adjusted(self)
 
     def _refused(self, error: Failure) -> Exception:
-        return refused(self.block, block_network(self.block, self.options), self.state, error)
+        return refused(self.block, self._core_network(), self.state, error)
+
+    def _core_network(self) -> _photocore.BlockNetwork:
+        return block_network(self.block, self.options)
+
+    def _terms(self) -> Terms:
+        from photogram.results.block_terms import block_terms
+
+        return block_terms(self)
+
+    def _determined(self) -> Determined:
+        from photogram.results.block_terms import determined
+
+        return determined(self)
+
+    def _plot_data(self) -> Pictured:
+        from photogram.results.picture_data import PicturedBlock
+
+        return PicturedBlock(self)
 
     def _trial(self) -> NetworkTrial:
         from photogram.results.suspects import network_trial
 
-        core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
+        core = self._core_network().trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
@@ -284,7 +304,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     def _in(self, row: DatumRow) -> Self:
         block = self.block
-        network = block_network(block, self.options)
+        network = self._core_network()
         try:
             solution = network.in_datum(self.state, row, threads=0, progress=None)
         except _photocore.BlockError as error:

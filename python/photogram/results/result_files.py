@@ -42,29 +42,17 @@ _ROWS = ("photo_ids", "point_ids", "image_photos", "image_points")
 
 @dataclass(frozen=True)
 class Part:
-    """An array of a result, or of what was adjusted, as columns of a table.
+    """An array of a result, or of what was adjusted, as columns of a table."""
 
-    Attributes
-    ----------
-    field
-        Its name; of what was adjusted behind the name of that: `block.image_xy`.
-    names, units
-        Of its columns, or of the components of a matrix or a list.
-    description
-        Of all of them; `{}` stands for the name of the component.
-    form
-        `columns`; `matrix`: lower triangles of symmetric matrices, which are cofactors in the result and
-        scaled in the table; `list`: all of a row in one cell; `derived`: columns that are not read again.
-    prefix
-        Before the names of columns; the name of the one column of a matrix or list.
-    """
-
-    field: str
+    field: str  # Path of the attribute, such as `block.image_xy`
+    # Of columns, or of the components of a matrix or list
     names: tuple[str, ...]
     units: tuple[str, ...]
-    description: str
+    description: str  # Of all columns; `{}` is the name of the component
+    # `columns`; `matrix`: lower triangles of symmetric matrices, which are cofactors in the result and scaled
+    # in the table; `list`: one cell for each row; `derived`: columns that are not read again
     form: str = "columns"
-    prefix: str = ""
+    prefix: str = ""  # Before the names of columns; the name of the one column of a matrix or list
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
         """Return its columns; none where the array is None."""

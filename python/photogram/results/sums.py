@@ -9,24 +9,13 @@ __all__ = ["Redundancies", "SumsByKind", "SumsOfSquares"]
 
 @dataclass(frozen=True)
 class SumsByKind:
-    """Sums over kinds of observations.
+    """Sums over kinds of observations."""
 
-    Attributes
-    ----------
-    camera
-        Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras.
-    ground
-        Of the held components of control.
-    plates
-        Of the image coordinates.
-    observations
-        Of the observations beside images.
-    """
-
+    # Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras
     camera: float
-    ground: float
-    plates: float
-    observations: float = 0.0
+    ground: float  # Of the held components of control
+    plates: float  # Of the image coordinates
+    observations: float = 0.0  # Of the observations beside images
 
     @property
     def measured(self) -> float:

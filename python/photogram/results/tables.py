@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.results import network_tables
+from photogram.results import tests
 from photogram.results.axes import component_axis, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
@@ -21,7 +21,6 @@ from photogram.results.network_tables import (
     difference,
     names,
     redundancy,
-    terms_of,
     test_value,
 )
 from photogram.results.observation_kinds import ObservedKind
@@ -88,7 +87,7 @@ def unheld(result: Result) -> list[Quantity]:
 
 
 def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floats) -> list[Quantity]:
-    terms, axes, sd = terms_of(result), point_axes(result.block), result.point_sd[rows]
+    terms, axes, sd = result._terms(), point_axes(result.block), result.point_sd[rows]
     with np.errstate(all="ignore"):
         tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
     return [
@@ -234,7 +233,7 @@ def _quantities(columns: Mapping[str, Any]) -> list[Quantity]:
 
 
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    **network_tables.TABLES,
+    **tests.TABLES,
     "check": check_points,
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),

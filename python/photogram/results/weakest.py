@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.axes import Determined
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Way
 
 WORST = 10
 NEAR = 1e-3
@@ -42,33 +42,13 @@ class WeakestPhoto:
     images: int  # Number of its images
 
 
-@dataclass(frozen=True, eq=False)
-class Determined:
-    """Where the points and photos of an adjusted network are, and how well that is known."""
-
-    stations: Floats  # (P, 3), (n, 3) places, with axes of equal units
-    points: Floats
-    poses: Floats  # (P, 6, 6) cofactors of position and attitude
-    ranks: Indices  # (P,) how many unknowns of a pose are not fixed
-    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
-    # (P,) which photos are no stations: scanners, of which each line is taken from another place; None
-    # for none
-    moving: Bools | None = None
-
-
-@Way
-def determined(result: AdjustedNetwork) -> Determined:
-    """Return where points and photos are, and how well that is known."""
-    raise NotImplementedError(type(result).__name__)
-
-
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPoint]:
     """Return the points of the largest ratios, and those nearest to a station, the worst first.
 
     None without cofactors.
     """
-    network = determined(result)
+    network = result._determined()
     cofactors = network.point_cofactors
     known = np.isfinite(cofactors).all(axis=(1, 2)) & result.used_points
     ratio = np.full(len(known), np.nan)
@@ -98,7 +78,7 @@ def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
 
     Fixed unknowns of a photo do not count; those of which all are fixed are left out.
     """
-    network = determined(result)
+    network = result._determined()
     names, photos = result.given.photo_ids, result.given.image_photos
     images = np.bincount(photos[result.used_images], minlength=len(names))
     known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)

@@ -16,3 +16,10 @@ def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, floa
     scale: int = 10**decimals
     minutes, units = divmod(round(math.degrees(abs(angle)) * 3600 * scale), 60 * scale)
     return minutes // 60, minutes % 60, units / scale
+
+
+def degrees_written(angle: float, decimals: int) -> str:
+    """Return an angle in degrees, minutes and seconds with decimals."""
+    degrees, minutes, seconds = degrees_minutes_seconds(angle, decimals)
+    width = decimals + 3 if decimals else 2
+    return f"{'-' if angle < 0 else ''}{degrees} {minutes:02d} {seconds:0{width}.{decimals}f}"

@@ -12,8 +12,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.show import quantity
-from photogram.show.lines import degrees_written, unit_of
-from photogram.show.page import Cell, Column, Table, decimals_of, fixed, significant
+from photogram.show.angles import degrees_written
+from photogram.show.page import Cell, Column, Table, decimals_of, fixed, probability_written, significant
 from photogram.show.quantity import Axis, Quantities, Quantity, chosen, long
 
 _SIGNS = {
@@ -82,7 +82,7 @@ def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Writt
     found = []
     own = [None] * len(each.axes) if by is None else _decimals(each, by)
     for k, (axis, count) in enumerate(zip(each.axes, own, strict=True)):
-        column = _column(each, each.head.format(axis.name), _unit(each, axis), count)
+        column = _column(each, each.head.format(axis.label or axis.name), _unit(each, axis), count)
         marks = None if marked is None else marked[:, k]
         found.append((column, _numbers(each, values[:, k], [axis] * len(values), [count], marks)))
     return found
@@ -100,7 +100,7 @@ def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Colum
 def _unit(each: Quantity, axis: Axis) -> str:
     if each.kind == "value" and axis.angle == "dms":
         return "° ′ ″"
-    return unit_written(unit_of(each, axis))
+    return unit_written(each.unit(axis))
 
 
 def _decimals(each: Quantity, by: Floats) -> list[int | None]:
@@ -127,6 +127,9 @@ def _decimals(each: Quantity, by: Floats) -> list[int | None]:
 
 def _cells(each: Quantity) -> list[Written]:
     """Write names, and numbers that have no axis."""
+    if each.kind == "probability":
+        values = np.asarray(each.values, dtype=float).tolist()
+        return [Cell(probability_written(p), sorts=p) if math.isfinite(p) else None for p in values]
     if each.kind != "name":
         values = np.asarray(each.values)
         return [*(values if each.seen is None else np.where(each.seen, values, np.nan)).tolist()]

@@ -10,8 +10,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import replace
 from photogram.show.cells import written
-from photogram.show.lines import fact_lines
-from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
+from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Section, Table, Text
 
 WIDTH = 100  # characters of a line of prose
 MAX_ROWS = 40  # of a table in a summary
@@ -151,3 +150,15 @@ def table_text(table: Table) -> list[str]:
         for layout in [f"{'<' if column.text else '>'}{max(map(len, texts))}"]
     ]
     return ["  ".join(row).rstrip() for row in zip(*padded, strict=True)]
+
+
+def fact_lines(facts: Sequence[Fact]) -> list[str]:
+    """Return figures, one under the other, with their units, and notes in parentheses."""
+    names = [
+        fact.name if fact.name[1:2].isupper() else fact.name[:1].lower() + fact.name[1:] for fact in facts
+    ]
+    width = max([35, *map(len, names)])
+    return [
+        f"{name:<{width}} {f'{fact.value} {fact.unit}'.rstrip()}{f' ({fact.note})' if fact.note else ''}"
+        for name, fact in zip(names, facts, strict=True)
+    ]

@@ -35,27 +35,13 @@ LEAST_PROBABILITY = 1e-99
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell that is more than its text.
+    """A cell that is more than its text."""
 
-    Attributes
-    ----------
-    value
-        Text, a number, or None for nothing.
-    goes_to
-        The `id` of a cell elsewhere on the page, to which it is a link if that is there.
-    id
-        What others link to.
-    tone
-        Whether it is to be looked at.
-    sorts
-        The number by which a text is sorted.
-    """
-
-    value: str | float | None
-    goes_to: str = ""
-    id: str = ""
-    tone: Tone = ""
-    sorts: float | None = None
+    value: str | float | None  # Text, number, or None for an empty cell
+    goes_to: str = ""  # `id` of the cell that it links to, if the page has one
+    id: str = ""  # Target of links
+    tone: Tone = ""  # Marked cells have the tone `look`
+    sorts: float | None = None  # Sort key of a text
 
 
 Row = Sequence[Cell | str | float | None]
@@ -64,25 +50,15 @@ Row = Sequence[Cell | str | float | None]
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
+    """A column of a table."""
 
-    Attributes
-    ----------
-    head, unit
-        Its name, and the unit of its numbers.
-    decimals
-        Of its numbers in fixed point; None for `significant` figures, as many as `figures` says.
-    figures
-        Significant figures where there are no fixed decimals.
-    text
-        Whether it holds names: set to the left.
-    """
-
+    # Name, and unit of the numbers
     head: str
     unit: str = ""
+    # Of fixed-point numbers; None: `figures` significant figures
     decimals: int | None = None
     figures: int = 4
-    text: bool = False
+    text: bool = False  # Whether the column contains texts, aligned left
 
     def written(self, value: str | float | None) -> str:
         """Return a value as it stands in the column."""
@@ -235,66 +211,33 @@ class Section:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What stands on top of a page: whether the result can be used.
+    """What stands on top of a page: whether the result can be used."""
 
-    Attributes
-    ----------
-    mark
-        In few words.
-    headline, lines
-        A sentence, and others.
-    tone
-        How it is to be taken.
-    on
-        What it is on, where a page has several.
-    """
-
-    mark: str
+    mark: str  # Few words
+    # First sentence, further sentences
     headline: str
     lines: Sequence[str] = ()
     tone: Tone = ""
-    on: str = ""
+    on: str = ""  # Subject, if a page has several judgements
 
 
 @dataclass(frozen=True)
 class Document:
-    """What people and programs read of a result: its report, and its JSON document.
+    """What people and programs read of a result: its report, and its JSON document."""
 
-    Attributes
-    ----------
-    what, title
-        What was done, and the name of the job.
-    judgements
-        One, or one for each thing that was adjusted.
-    advice
-        What to do next, in sentences.
-    highlights
-        Few figures that a reader wants first.
-    sections
-        The others.
-    members
-        Of the JSON document, beside the tables.
-    details
-        Sections of reports as text and of JSON documents that pages omit.
-    phases
-        Seconds that the engine spent in its phases.
-    head
-        For whom and by whom it is.
-    language, first, contents, more, numbers
-        Of its words, what the link to its top and the list of its sections are called, and what stands for
-        how many sentences are folded away: `{}` is their number. `numbers` is at the foot of a sheet.
-    """
-
+    # Kind of the document, and title of the job
     what: str
     title: str
-    judgements: Sequence[Judgement]
-    advice: Sequence[Phrase | str]
-    highlights: Sequence[Fact]
+    judgements: Sequence[Judgement]  # One for each adjusted thing
+    advice: Sequence[Phrase | str]  # Next steps
+    highlights: Sequence[Fact]  # Key figures
     sections: Sequence[Section]
-    members: Mapping[str, object] = field(default_factory=dict)
-    details: Sequence[Section] = ()
-    phases: Mapping[str, float] = field(default_factory=dict)
-    head: Sequence[Fact] = ()
+    members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON besides tables
+    details: Sequence[Section] = ()  # Sections that pages omit
+    phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine
+    head: Sequence[Fact] = ()  # Client, author
+    # Language; names of the link to the top and of the list of sections; text for `{}` hidden sentences;
+    # page numbers
     language: str = "en"
     first: str = "Verdict"
     contents: str = "Sections"

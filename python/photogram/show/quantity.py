@@ -1,7 +1,7 @@
 """Quantities: each declared once, as arrays with a name and a unit, and written everywhere from here.
 
 A table is a list of quantities of the same n things. `frame` makes files of commas and data frames of it,
-`records` JSON documents, `results.saved` Parquet, `show.lines` text, `show.cells` pages for the browser.
+`records` JSON documents, `results.saved` Parquet, `show.forms` text, `show.cells` pages for the browser.
 """
 
 from __future__ import annotations
@@ -21,34 +21,21 @@ from photogram.show.angles import ARCSEC
 if TYPE_CHECKING:
     import pandas as pd
 
-Kind = Literal["value", "deviation", "difference", "number", "name"]
+Kind = Literal["value", "deviation", "difference", "number", "probability", "name"]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A component of positions, attitudes, parameters or image coordinates.
-
-    Attributes
-    ----------
-    name
-        What it is called.
-    unit
-        Of its numbers; empty where it has none.
-    angle
-        How an angle is written for people: in degrees, minutes and seconds (`dms`), in degrees (`deg`), or as
-        it is.
-    suffix
-        What the names of its columns say of the unit.
-    small, factor
-        The unit in which people read its differences and deviations, and what leads to it.
-    """
+    """A component of positions, attitudes, parameters or image coordinates."""
 
     name: str
-    unit: str = ""
-    angle: Literal["", "dms", "deg"] = ""
-    suffix: str = ""
+    unit: str = ""  # Empty without a unit
+    angle: Literal["", "dms", "deg"] = ""  # Notation for people: degrees, minutes, seconds; degrees; radians
+    suffix: str = ""  # Unit in the names of columns
+    # Unit of differences and deviations for people, and its factor
     small: str = ""
     factor: float = 1.0
+    label: str = ""  # Name on pages if it differs from `name`
 
     @classmethod
     def of(cls, name: str, unit: str, suffix: str = "") -> Axis:
@@ -78,57 +65,42 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """What is known of n things: one number or name of each, or k components.
+    """What is known of n things: one number or name of each, or k components."""
 
-    Attributes
-    ----------
-    values
-        (n,), or (n, k) with k axes; (n,), too, with the one axis of all of them.
-    axes
-        The components; also of what has one of them in each row, as `of` says.
-    kind
-        `value`: in the unit of its axis, angles as people write them; `deviation`, `difference`: in its small
-        unit; `number`: without a unit; `name`: text, or the number of a thing.
-    name
-        Of its columns in files and data frames, before the names of the axes; None: it is not there.
-    member
-        Its name in JSON documents, or names of parts of its components; empty: it is not there.
-    about
-        A line for Parquet; `{}` stands for the name of an axis.
-    head, decimals, figures
-        Of its columns on a page; `{}` stands for the name of an axis. Significant figures where decimals are
-        None, and nothing else tells them. Without a head it is not there.
-    words
-        What stands for single numbers: `fixed` for 0.
-    seen
-        Where people see a number, of the form of the values; None: everywhere.
-    marked
-        Which numbers are to be looked at, of the form of the values; None: no one more than others.
-    link
-        What a name leads to on a page.
-    of
-        (n,) which of the axes each row is of.
-    """
-
-    values: Any
-    axes: tuple[Axis, ...] = ()
+    values: Any  # (n,), or (n, k) with k axes; (n,) also with one common axis
+    axes: tuple[Axis, ...] = ()  # The components, also if each row is of one of them (`of`)
+    # `value`: in the unit of its axis, angles in degrees; `deviation`, `difference`: in the small unit;
+    # `number`: without a unit; `name`: text, or the number of a thing
     kind: Kind = "number"
+    # Prefix of columns in files and data frames; None: omitted there
     name: str | None = None
+    # Name in JSON, or names of parts of its components; empty: omitted there
     member: str | Mapping[str, slice] = ""
-    about: str = ""
+    about: str = ""  # Description in Parquet; `{}` is the name of an axis
+    # Columns of pages; `{}` is the name of an axis. `figures` significant figures if nothing fixes the
+    # decimals. A quantity without a head is omitted.
     head: str = ""
     decimals: int | None = None
     figures: int = 3
-    words: Mapping[float, str] | None = None
-    seen: Bools | None = None
+    words: Mapping[float, str] | None = None  # Texts for single numbers, such as `fixed` for 0
+    seen: Bools | None = None  # Which values are visible; None: all
+    # Which values are marked; None: none
     marked: Bools | None = None
-    link: Link | None = None
-    of: Indices | None = None
+    link: Link | None = None  # Target of a name on a page
+    of: Indices | None = None  # (n,) the axis of each row
 
     @property
     def single(self) -> bool:
         """Whether each thing has one value."""
         return not self.axes or self.of is not None or np.ndim(self.values) == 1
+
+    def unit(self, axis: Axis) -> str:
+        """Return the unit of a component for people."""
+        if self.kind == "number":
+            return ""
+        if self.kind == "value":
+            return {"dms": "", "deg": "deg"}.get(axis.angle, axis.unit)
+        return axis.small
 
     def outward(self) -> Floats:
         """Return the numbers that people see, in the units in which they read them.

@@ -17,7 +17,7 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Observations, Systematic, Tested, Text, by_f, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
@@ -45,44 +45,22 @@ Beyond = tuple[float, Tested, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Test:
-    """One test.
+    """One test."""
 
-    Attributes
-    ----------
-    kind, subject
-        What is tested, and the one of its kind; the latter empty if it is one thing.
-    statistic
-        What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals.
-    distribution, dof
-        `chi2`, `F`, `normal`, `t` or another, and its degrees of freedom.
-    value
-        Of the statistic.
-    limits
-        What it may be at least and at most; None where there is no such side.
-    p
-        Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers.
-    log10_p
-        Its decimal logarithm.
-    level
-        What p is compared with.
-    tests
-        Among so many tests: the level is a share of that of all together (Bonferroni).
-    accepted
-        Whether p is no less than the level.
-    """
-
-    kind: Text
+    kind: Text  # type of the tested observations
     subject: Text
-    statistic: str
-    distribution: str
+    statistic: str  # What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
+    distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
+    # What it may be at least and at most; None where there is no such side
     limits: tuple[float | None, float | None]
+    # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
     p: float
-    log10_p: float
-    level: float
-    tests: int
-    accepted: bool
+    log10_p: float  # Its decimal logarithm
+    level: float  # What p is compared with
+    tests: int  # Among so many tests: the level is a share of that of all together (Bonferroni)
+    accepted: bool  # Whether p is no less than the level
 
     @property
     def name(self) -> str:
@@ -210,7 +188,7 @@ class Evidence:
         test = self.test
         assert test is not None
         omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom
-        studentized = [_studentized(each, omega, f) for each in self.found.observations]
+        studentized = [each.studentized(omega, f) for each in self.found.observations]
         return Evidence(replace(self.found, observations=studentized)).beyond()
 
     def _common(self, robust: float) -> float:
@@ -357,13 +335,6 @@ def _relative(tested: Tested) -> Floats:
     for each in np.unique(dimension).tolist():
         medians[dimension == each] = critical_chi_square(0.5, each)
     return np.asarray(np.sqrt(values / medians))
-
-
-def _studentized(tested: Tested, omega: float, f: float) -> Tested:
-    """Return tests with the unit weight that the others give."""
-    if tested.statistic == "w":
-        return by_t(Observations(tested.kind, tested.values, tested.name), omega, f)
-    return by_f(tested, omega, f) if tested.statistic == "T" else tested
 
 
 def _distribution(

@@ -30,19 +30,7 @@ def are_exchanged(
     variance: float = 1.0,
     uncertain: float = 1.0,
 ) -> bool:
-    """Tell whether two things are exchanged; the formula stands above.
-
-    Parameters
-    ----------
-    named, exchanged
-        Chi-square of both, infinite where it cannot be had.
-    dimension
-        Degrees of freedom m of both together.
-    pairs
-        How many pairs are looked at, k.
-    variance, uncertain
-        s^2 and u.
-    """
+    """Return whether two things are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
     if not (math.isfinite(exchanged) and dimension > 0):
         return False
     fits = exchanged < uncertain * variance * critical_chi_square(LEVEL, dimension)

@@ -33,24 +33,13 @@ TESTED = 4.0
 
 @dataclass(frozen=True)
 class Judged:
-    """The hypotheses that explain the residuals best.
+    """The hypotheses that explain the residuals best."""
 
-    Attributes
-    ----------
-    best
-        Their places among those tried, the best first; more than one where these cannot be told apart.
-    likelihood
-        Lambda of the first.
-    fall
-        How many times smaller residuals would be.
-    explained
-        Whether it is sure that one of them is so; else it is possible.
-    """
-
+    # Their places among those tried, the best first; more than one where these cannot be told apart
     best: tuple[int, ...]
-    likelihood: float
-    fall: float
-    explained: bool
+    likelihood: float  # lambda of the first
+    fall: float  # factor by which residuals would be smaller
+    explained: bool  # certain; otherwise possible
 
     @property
     def accepted(self) -> bool:

@@ -103,20 +103,10 @@ class FramePattern:
 def frame_pattern(
     xy: Floats, residuals: Floats, redundancy: Floats, parameters: int = 0
 ) -> FramePattern | None:
-    """Test whether the mean residuals in the bins of a frame are zero.
+    """Test whether the mean residuals (m, 2) in the bins of a frame are zero.
 
-    Parameters
-    ----------
-    xy
-        (m, 2) image coordinates, any unit.
-    residuals, redundancy
-        (m, 2) ~v, on the scale of the other residuals, and r.
-    parameters
-        Of the camera that are estimated: so many degrees of freedom less.
-
-    Returns
-    -------
-    None where no four bins of 5 x 5 have a redundancy of 10 in both axes.
+    The number of estimated camera `parameters` reduces the degrees of freedom. None unless four of 5 x 5 bins
+    have a redundancy of 10 in both axes.
     """
     if not len(xy):
         return None
@@ -165,17 +155,6 @@ def group_patterns(
     Of a photo: film or scanner, an axis that is not as assumed. With b = (1, x, y) centred and scaled it is
     the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes: chi-square with six degrees of
     freedom.
-
-    Parameters
-    ----------
-    groups, count
-        (m,) the group of each row, and how many there are.
-    xy, residuals, redundancy
-        (m, 2) as in :func:`frame_pattern`.
-
-    Returns
-    -------
-    (count,) statistics and p-values; NaN for groups with a redundancy below 10 in an axis.
     """
     numbers = np.bincount(groups, minlength=count)
     means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
@@ -252,11 +231,6 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
     summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
     since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
     0 without a pattern; NaN where nothing has a neighbour.
-
-    Parameters
-    ----------
-    xy, photos, residuals
-        (m, 2), (m,), (m, 2) image coordinates, photo and ~v of each image.
     """
     if not len(xy):
         return math.nan
@@ -289,13 +263,6 @@ def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Fl
 
     summed over x and y; about 2 where the residuals of one photo say nothing of the next, towards 0 where
     they drift. NaN of fewer than three photos.
-
-    Parameters
-    ----------
-    photos, count
-        (m,) the photo of each image, and how many there are.
-    residuals, redundancy
-        (m, 2) ~v and r.
     """
     steps = squares = 0.0
     for v, r in zip(residuals.T, redundancy.T, strict=True):

@@ -11,9 +11,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import Findings, Text
+from photogram.statistics.findings import Findings, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
@@ -132,6 +135,14 @@ class Rule:
     warning: bool = False  # Whether a user should look although the exit code is 0
     grave: Callable[[Evidence], bool] = lambda _: True  # Whether it forbids the use
     also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
+
+
+def marks_of(verdict: Verdict, tests: Tested) -> Bools:
+    """Return which components of observations are outliers of a verdict."""
+    marks = np.zeros(np.shape(tests.values), bool)
+    for place in verdict.outlying.get(tests.kind, ()):
+        marks[place] = True
+    return marks
 
 
 def verdict(found: Findings) -> Verdict:

@@ -33,18 +33,12 @@ def is_board(path: Path) -> bool:
 
 
 def read_board(path: Path) -> Board:
-    """Read a `board.toml`, or a target of Kalibr.
-
-    InputError: keys that there are not, values of another kind, what is no board: names file and line.
-    """
+    """Read a `board.toml`, or a target of Kalibr."""
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
 
 
 def picture_size(path: Path) -> tuple[int, int] | None:
-    """Return width and height of the pictures that a `board.toml` was seen in, where it says them.
-
-    InputError: something else than two whole numbers.
-    """
+    """Return width and height of the pictures that a `board.toml` was seen in, where it says them."""
     if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
         return None
     value = file.content["picture_size"]

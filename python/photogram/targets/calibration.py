@@ -219,8 +219,7 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
     """Return what is to be said of the motion of a board by which offsets between cameras are known.
 
     Its speeds follow from poses that have errors: v = v_true + e. An offset comes out too small by the share
-    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation. RankError: a
-    free offset, where a fifth or more are errors: the board stands still.
+    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation.
     """
     messages = []
     start, result = calibrated.calibration, calibrated.result

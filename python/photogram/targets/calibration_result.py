@@ -110,9 +110,9 @@ class Worth:
 
 
 Part = Literal["cameras", "sensors", "board", "views"]
+# Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
+# that are such steps
 Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats | int]]
-"""Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
-that are such steps."""
 STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vision axes
 
 

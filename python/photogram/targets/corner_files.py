@@ -78,10 +78,7 @@ def is_vnl(path: Path) -> bool:
 
 
 def read_vnl(path: Path, board: Board | None) -> Measured:
-    """Read the text of mrcal: all corners of an image, row by row; `-` for what is missing.
-
-    InputError: an image with another number of rows than the board has points, a cell that is no number.
-    """
+    """Read the text of mrcal: all corners of an image, row by row; `-` for what is missing."""
     table = read_columns(path, known=("filename",), spelling=lambda names: names[:4])
     table.require("filename", "x", "y")
     images = table.names("filename")
@@ -140,8 +137,7 @@ def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
 def read_table(path: Path, board: Board | None) -> Measured:
     """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y.
 
-    It may have camera, view, time, sd or level, and use. InputError: columns that are missing, cells that are
-    no numbers, points that the board does not have.
+    It may have camera, view, time, sd or level, and use.
     """
     table = read_columns(path, known=("image", "time"), numbers=_NUMBERS, spelling=_spelled)
     return _of_table(table, board)

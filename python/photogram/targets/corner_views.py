@@ -56,11 +56,7 @@ class Grouping:
 
 
 def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
-    """Return corners by cameras and views, and remarks.
-
-    InputError: an image that two cameras have or that is twice in a view, times that are asked for and
-    missing, no corners at all.
-    """
+    """Return corners by cameras and views, and remarks."""
     names, keys, keep, messages = _cameras_and_views(measured, how)
     # An image without corners is no picture.
     keep &= np.bincount(measured.image, minlength=len(keep)) > 0

@@ -227,9 +227,7 @@ def detected(
 ) -> Measured:
     """Find a board in photographs; where these lie in several folders, each folder is a camera.
 
-    Errors name `path`, what was asked for; `progress` is told which picture is searched. InputError: OpenCV
-    is absent, a board whose targets nobody knows by their look, a file that is no picture, a board that no
-    picture shows.
+    Errors name `path`, what was asked for; `progress` is told which picture is searched.
     """
     try:
         import cv2

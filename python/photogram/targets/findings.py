@@ -15,7 +15,6 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import KNOTTED
 from photogram.results.findings import block_findings
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
 from photogram.targets.calibration_result import UnknownWeight, Worth, deviation_of_corners
@@ -144,7 +143,7 @@ def _shortfall(worth: Worth | None, need: float | None) -> Phrase | None:
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
-    found = findings_of(calibrated.result)
+    found = calibrated.result._findings()
     shown = showings(calibrated)
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]

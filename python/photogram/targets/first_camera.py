@@ -232,8 +232,7 @@ def first_camera(
 
     `seen` are its pictures, `size` width and height of them in pixels. The model is what is usual at its
     field of view where None is wanted; the `knots` of a splined one, along columns and rows, are fitted to
-    the usual one: many of them are where no corner is. InputError: a model that there is not, or one that
-    cannot show corners that the camera sees.
+    the usual one: many of them are where no corner is.
     """
     used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_PICTURES)))
     trial, adjusted = adjusted_family(used, trials(used, size))

@@ -167,8 +167,7 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
 
     The model is one of `docs/cameras.md`, or a name of `LENS_TERMS`; its terms are free, of a splined one its
     `knots` in place of its parameters: its field holds all pixels of the source, and a tenth more. Name and
-    unit are those of the source, `size` is width and height of its pictures. InputError: a model that there
-    is not, or one that counts no columns and rows of pixels.
+    unit are those of the source, `size` is width and height of its pictures.
     """
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
     models = dict(_photocore.camera_models())
@@ -234,10 +233,9 @@ def fitted(
 
     The sum of squares of the differences over 60 x 40 pixels of the source, within `radius` of the middle of
     the picture, is minimized: first by focal length and principal point, then with the terms of the lens in
-    the order k1, k2, p, all others. `model` and `knots` are those of :func:`lens_of`. Parameters in
-    `held` are fixed: focal length and principal point have the values of the source, terms of the lens
-    are 0. The others are free in the result. InputError: an unknown model or parameter, or a model that
-    shows no pixel.
+    the order k1, k2, p, all others. `model` and `knots` are those of :func:`lens_of`. Parameters in `held`
+    are fixed: focal length and principal point have the values of the source, terms of the lens are 0. The
+    others are free in the result.
     """
     start = lens_of(model, source, size, knots)
     if unknown := sorted({*held} - {*start.names}):

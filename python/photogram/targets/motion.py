@@ -28,10 +28,7 @@ POWERS = 2 * EACH_SIDE  # of time
 
 
 def dated(corners: Corners, tied: Bools) -> Floats:
-    """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without.
-
-    InputError: pictures without times.
-    """
+    """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without."""
     if corners.times is None:
         raise InputError("offsets between cameras need the times of their pictures: a column time")
     found = np.full(corners.view_count, np.nan)
@@ -44,8 +41,7 @@ def moving(poses: Floats, times: Floats, references: Indices) -> Floats:
     """Return (V, 4, 6) c_k and r_k of views: through as many neighbours on each side, two at the most.
 
     Poses are (V, 4, 4) board -> reference, times and references (V,) of views. NaN of views without a
-    neighbour within 0.2 s before and after, 0 for powers that these do not tell. InputError: two views of one
-    time.
+    neighbour within 0.2 s before and after, 0 for powers that these do not tell.
     """
     found = np.full((len(poses), POWERS, 6), np.nan)
     places, attitudes = photo_poses(poses)

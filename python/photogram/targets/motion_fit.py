@@ -61,7 +61,7 @@ def fitted_motion(
     Pixels that one of the two does not see do not count. A translation is fitted where all distances are
     finite, and arbitrary along the rays with one. Weights are of each pixel at each distance, one after the
     other: (D n, 2, 2) W of differences in pixels, (D n,) w of mrcal's criterion; NaN where a pixel does not
-    count, None for equal ones. InputError: the two see too few pixels in common.
+    count, None for equal ones.
     """
     finite = bool(np.isfinite(distances).all())
     towards = points_at(a, pixels, distances)

@@ -41,10 +41,7 @@ SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x
 
 
 def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
-    """Return a camera, held, of its name and numbers in mrcal.
-
-    InputError: a lens that is not taken, or another number of values.
-    """
+    """Return a camera, held, of its name and numbers in mrcal."""
     said = model.removeprefix(PREFIX)
     if splined := SPLINED.fullmatch(said):
         order, nx, ny, fov = map(float, splined.groups())
@@ -86,11 +83,7 @@ INDICES = "indices_frame_camintrinsics_camextrinsics"
 
 
 def read_model(path: Path) -> Calibration:
-    """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start.
-
-    InputError: the file is no such text, holds no corners, or what is not taken: lenses that there are not,
-    points that were observed one by one, cameras that moved, values that were held.
-    """
+    """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start."""
     packed = _content(path).get(KEY)
     if not isinstance(packed, bytes):
         raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
@@ -137,10 +130,7 @@ def read_model(path: Path) -> Calibration:
 
 
 def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
-    """Read the camera of a `.cameramodel`, held, and width and height of its pictures.
-
-    InputError: the file is no such text, or its lens is not taken.
-    """
+    """Read the camera of a `.cameramodel`, held, and width and height of its pictures."""
     content = _content(path)
     try:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)

@@ -76,12 +76,7 @@ class Arrays:
 
 
 def read_arrays(path: Path, data: bytes) -> Arrays:
-    """Read an archive.
-
-    InputError: bytes that are no archive or would grow beyond its limits, damaged headers, or arrays of
-    Python objects, which nothing here unpickles.
-    OutOfMemoryError: it would take more memory than there is.
-    """
+    """Read an archive."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()

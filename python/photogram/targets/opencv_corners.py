@@ -37,11 +37,7 @@ def is_npz(path: Path) -> bool:
 
 
 def read_storage(path: Path, board: Board | None) -> Measured:
-    """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ...
-
-    InputError: matrices that are missing or of another shape, another number of corners than the board has
-    points.
-    """
+    """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ..."""
     suffix = path.suffix.lower()
     if suffix == ".json":
         content = read_json(path)
@@ -148,11 +144,7 @@ def _element(element: ElementTree.Element) -> Any:
 
 
 def read_npz(path: Path, board: Board | None) -> Measured:
-    """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given.
-
-    InputError: no such arrays, those of Python objects, points of the board that are no grid, or differ in
-    views.
-    """
+    """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given."""
     arrays = read_arrays(path, read_bytes(path))
     name = arrays.first("imgpoints", "image_points")
     shape = arrays.arrays[name].shape

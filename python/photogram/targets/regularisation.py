@@ -36,8 +36,7 @@ def regularised(
 ) -> list[Camera]:
     """Return cameras with the priors of mrcal on what is free in them.
 
-    Sizes are width and height of their pictures: an InputError of one that is not known. `observed` is n: two
-    for each corner of the board and picture.
+    Sizes are width and height of their pictures. `observed` is n: two for each corner and picture.
     """
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
@@ -83,8 +82,7 @@ def with_knot_sd(
     """Return cameras whose free knots are observed as zero, radially and tangentially.
 
     Along the radius and across with `knot_sd`, by default `WEAK_KNOT_SD`, unless `regularise` names whose
-    priors cameras have. InputError: standard deviations of knots that are absent, are given twice or are
-    not positive.
+    priors cameras have.
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):

@@ -14,10 +14,9 @@ from photogram.comparator.fits import Decomposition
 from photogram.comparator.joint import JointFit, JointPlate
 from photogram.comparator.listing.forms import angle, centred, nearest, number, residual_lines, triangle
 from photogram.comparator.polynomial import TERMS, Polynomial
-from photogram.comparator.tables import linear, terms, variance
+from photogram.comparator.tables import linear, variance
 from photogram.comparator.variance import CaseVarianceTest, PolynomialTest
 from photogram.show.angles import ARCSEC
-from photogram.show.lines import field, table_lines
 from photogram.show.page import probability_written
 
 if TYPE_CHECKING:
@@ -123,8 +122,7 @@ def combined_polynomial_page(calibration: Calibration) -> list[str]:
     ]
 
 
-STEP_UM = 25_000.0
-"""Distance of the nodes."""
+STEP_UM = 25_000.0  # Distance of the nodes
 ROWS = 9
 
 
@@ -224,15 +222,17 @@ def tests_page(calibration: Calibration) -> list[str]:
 
 def _polynomial(test: PolynomialTest) -> list[str]:
     first, second = test.degrees_of_freedom
-    axis, term, _, coefficient, sd, ratio, p = terms(test).columns
-    row = [*field(axis, 6, head="AXIS", gap="  "), *field(term, 6, head="TERM")]
-    row += [*field(coefficient, 12, ".3f", "COEFFICIENT"), *field(sd, 10, ".3f", "SIGMA")]
-    row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".2g", "PROBABILITY")]
+    rows = [
+        f"  {each.axis:<6}{each.term:<6}{number(each.coefficient_um, 12, 3)}{number(each.sd_um, 10, 3)}"
+        f"{number(each.ratio, 10, 2)}{'-' if each.probability is None else f'{each.probability:.2g}':>14}"
+        for each in test.terms
+    ]
     return [
         f"ALL TERMS TOGETHER: F = {test.ratio:.2f} WITH {first} AND {second} DEGREES OF FREEDOM,"
         f" PROBABILITY {_probability(test.probability)}",
         "EACH TERM, ITS ARGUMENT FROM -1 TO 1 OVER THE MEASURED RANGE (MICRONS)",
-        *table_lines(row),
+        f"  {'AXIS':6}{'TERM':6}{'COEFFICIENT':>12}{'SIGMA':>10}{'T':>10}{'PROBABILITY':>14}",
+        *rows,
     ]
 
 

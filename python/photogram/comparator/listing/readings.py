@@ -19,8 +19,7 @@ from photogram.comparator.pointing import Precision
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, CaseResult, PlateResult
 
-COLUMNS = 3
-"""Readings in a line of the input listing."""
+COLUMNS = 3  # Readings in a line of the input listing
 
 
 def title_page(calibration: Calibration, run_date: str = "") -> list[str]:

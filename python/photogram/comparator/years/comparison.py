@@ -33,13 +33,12 @@ from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
 
 DEGREE = 4
-NODES = 7
-"""In each direction: what is taken apart is a polynomial of fourth degree."""
+NODES = 7  # In each direction: what is taken apart is a polynomial of fourth degree
 PPM = 1e6
 ARCSEC = math.radians(1 / 3600)
 PERCENT = 100.0
+# A comparator that is estimated to be better than this is without error: its logarithm says nothing
 LEAST_UM = 2e-3
-"""A comparator that is estimated to be better than this is without error: its logarithm says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +52,7 @@ class Quantities:
 
 
 def common_range(records: Sequence[RecordedCalibration]) -> Frame:
-    """Return the range of readings that all calibrations measured.
-
-    Raises InputError: there is none.
-    """
+    """Return the range of readings that all calibrations measured."""
     identities = [each.correction.identity for each in records]
     low = np.max([each.low_um for each in identities if each], axis=0)
     high = np.min([each.high_um for each in identities if each], axis=0)

@@ -31,32 +31,18 @@ from photogram.statistics.limits import GlobalTest, global_test
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """The adjustment of all calibrations.
+    """The adjustment of all calibrations."""
 
-    Attributes
-    ----------
-    parameters
-        For each calibration (21,) those of its correction.
-    covariance
-        (k, 21, k, 21) of all of them; zero where a parameter is held.
-    grids
-        The plates as they were given to the first calibration that has each.
-    corrections_um, covariance_um2
-        For each plate (l, 2) adjusted less given coordinates, and (2 l, 2 l) of them, x and y of a point
-        behind each other.
-    standardized
-        For each calibration and case (n, 2) residuals over their standard deviations, unit weight known.
-    test
-        Of all residuals and corrections against their standard deviations.
-    """
-
-    parameters: list[Floats]
-    covariance: Floats
-    grids: dict[int, Grid]
+    parameters: list[Floats]  # For each calibration (21,) those of its correction
+    covariance: Floats  # (k, 21, k, 21) of all of them; zero where a parameter is held
+    grids: dict[int, Grid]  # The plates as they were given to the first calibration that has each
+    # For each plate (l, 2) adjusted less given coordinates, and (2 l, 2 l) of them, x and y of a point
+    # behind each other
     corrections_um: dict[int, Floats]
     covariance_um2: dict[int, Floats]
+    # For each calibration and case (n, 2) residuals over their standard deviations, unit weight known
     standardized: list[list[Floats]]
-    test: GlobalTest
+    test: GlobalTest  # Of all residuals and corrections against their standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +69,7 @@ class _Reduced:
 
 
 def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
-    """Adjust all calibrations in one; see the module.
-
-    Raises InputError: plates of one number with other points or coordinates. AdjustmentError: the
-    measurements do not determine the unknowns. OutOfMemoryError: there is not enough memory for the
-    covariance of all grid points.
-    """
+    """Adjust all calibrations in one; see the module."""
     grids = _grids(records)
     starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))
     size = 2 * sum(len(grid.points) for grid in grids.values())
@@ -150,8 +131,7 @@ def _grids(records: Sequence[RecordedCalibration]) -> dict[int, Grid]:
     return found
 
 
-SAME_UM = 1e-3
-"""Given coordinates of a plate may differ by rounding."""
+SAME_UM = 1e-3  # Given coordinates of a plate may differ by rounding
 
 
 def _joined(own: Grid, other: Grid, new: Bools) -> Grid:

@@ -25,8 +25,7 @@ from photogram.messages import quoted
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
 OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
 _WHAT = "calibration of a comparator"
-FIRST_YEAR = 50
-"""Years of two digits from here on are of the 20th century, those before of the 21st."""
+FIRST_YEAR = 50  # Years of two digits from here on are of the 20th century, those before of the 21st
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +127,7 @@ class RecordedCalibration:
 
 
 def day_of(text: str) -> date:
-    """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it.
-
-    Raises InputError: it says none.
-    """
+    """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it."""
     written = text.strip()
     if found := ISO.match(written):
         year, month, day = (int(part) for part in found.groups())

@@ -1,4 +1,4 @@
-"""What a COLMAP model holds, as its files have it."""
+"""Records of a COLMAP model."""
 
 from __future__ import annotations
 
@@ -9,29 +9,31 @@ from photogram.arguments.types import Floats, Indices
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 
-MODELS: tuple[tuple[str, int], ...] = (
-    ("SIMPLE_PINHOLE", 3),
-    ("PINHOLE", 4),
-    ("SIMPLE_RADIAL", 4),
-    ("RADIAL", 5),
-    ("OPENCV", 8),
-    ("OPENCV_FISHEYE", 8),
-    ("FULL_OPENCV", 12),
-    ("FOV", 5),
-    ("SIMPLE_RADIAL_FISHEYE", 4),
-    ("RADIAL_FISHEYE", 5),
-    ("THIN_PRISM_FISHEYE", 12),
-    ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
-    ("SIMPLE_DIVISION", 4),
-    ("DIVISION", 5),
-    ("SIMPLE_FISHEYE", 3),
-    ("FISHEYE", 4),
-    ("EUCM", 6),
-    ("EQUIRECTANGULAR", 2),
-)
-"""Names in the order of their numbers, with how many parameters; those of the house in small letters."""
+MODELS: dict[str, int] = {
+    "SIMPLE_PINHOLE": 3,
+    "PINHOLE": 4,
+    "SIMPLE_RADIAL": 4,
+    "RADIAL": 5,
+    "OPENCV": 8,
+    "OPENCV_FISHEYE": 8,
+    "FULL_OPENCV": 12,
+    "FOV": 5,
+    "SIMPLE_RADIAL_FISHEYE": 4,
+    "RADIAL_FISHEYE": 5,
+    "THIN_PRISM_FISHEYE": 12,
+    "RAD_TAN_THIN_PRISM_FISHEYE": 16,
+    "SIMPLE_DIVISION": 4,
+    "DIVISION": 5,
+    "SIMPLE_FISHEYE": 3,
+    "FISHEYE": 4,
+    "EUCM": 6,
+    "EQUIRECTANGULAR": 2,
+}
+"""Names in the order of their numbers, and their number of parameters; camera models have small letters."""
 NO_POINT = -1
-CAMERA, IMU = "CAMERA", "IMU"
+CAMERA = "CAMERA"
+SENSORS = (CAMERA, "IMU")
+"""Types of sensors in the order of their numbers."""
 
 
 @dataclass(frozen=True)
@@ -44,66 +46,50 @@ class Pose:
 
 @dataclass(frozen=True)
 class Camera:
-    """A line of cameras."""
+    """A record of cameras."""
 
     number: int
     model: str
     width: int
     height: int
     parameters: tuple[float, ...]
-    place: Place
+    place: Place = Place()
 
 
 @dataclass(frozen=True)
 class Images:
-    """The images: n of them, with all features one after the other.
-
-    Attributes
-    ----------
-    numbers, cameras
-        (n,) ids.
-    quaternions, translations
-        (n, 4) w, x, y, z and (n, 3), world to camera.
-    names
-        Of the files.
-    counts
-        (n,) features of each image.
-    xy, points
-        (f, 2) columns and rows from the corner, and (f,) ids of points, `NO_POINT` without.
-    places
-        Where each stands.
-    """
+    """The n images, with all f features one after the other."""
 
     numbers: Indices
     cameras: Indices
-    quaternions: Floats
+    quaternions: Floats  # (n, 4) w, x, y, z, world to camera
     translations: Floats
     names: list[str]
-    counts: Indices
-    xy: Floats
-    points: Indices
-    places: Sequence[Place]
+    counts: Indices  # (n,) features of each image
+    xy: Floats  # (f, 2) columns and rows from the corner
+    points: Indices  # (f,) ids of points, NO_POINT without
+    places: Sequence[Place] = ()
 
 
 @dataclass(frozen=True)
 class Points:
-    """The points: (n,) ids, (n, 3) positions, (n, 3) colours, (n,) how many images the tracks have."""
+    """The n points."""
 
     numbers: Indices
     positions: Floats
-    colours: Indices
-    tracks: Indices
-    places: Sequence[Place]
+    colours: Indices  # (n, 3)
+    tracks: Indices  # (n,) images in the track of each point
+    places: Sequence[Place] = ()
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig: its reference sensor, and the others with their poses, sensor from rig."""
+    """A rig: its reference sensor, and the other sensors with their poses, sensor from rig."""
 
     number: int
     reference: tuple[str, int] | None
     sensors: tuple[tuple[str, int, Pose | None], ...]
-    place: Place
+    place: Place = Place()
 
 
 @dataclass(frozen=True)
@@ -114,7 +100,7 @@ class Frame:
     rig: int
     pose: Pose
     data: tuple[tuple[str, int, int], ...]
-    place: Place
+    place: Place = Place()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,23 +10,22 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.colmap.binary import read_binary
-from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Images, Model, Pose
-from photogram.formats.colmap.text import read_text
+from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
+from photogram.formats.colmap.files import read_model
 from photogram.formats.format import Wishes
 from photogram.formats.names import NAMES, Colours, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.places import Place, at_place
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 TITLE = "COLMAP model"
-LONGEST, SHORT = 1e-2, 1e-6
-"""What the length of a quaternion may differ from 1 by, and what is not worth a remark."""
+MAX_DIFFERENCE, NORMALISED = 1e-2, 1e-6
+"""Differences of the length of a quaternion from 1: the largest, and the largest without a remark."""
 
 
 def place_of(path: Path) -> Path | None:
@@ -41,14 +40,12 @@ def place_of(path: Path) -> Path | None:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a model; binary files where there are both, as the package does."""
+    """Read a model."""
     del wishes
     folder = place_of(path)
     if folder is None:
-        raise InputError("holds no COLMAP model: cameras and images, .bin or .txt", file=path)
-    binary = (folder / "cameras.bin").is_file()
-    model = read_binary(folder) if binary else read_text(folder)
-    return renamed(_project(model, path), folder / NAMES)
+        raise InputError(phrase("colmap.files"), file=path)
+    return renamed(_project(read_model(folder), path), folder / NAMES)
 
 
 def _project(model: Model, path: Path) -> Project:
@@ -57,8 +54,11 @@ def _project(model: Model, path: Path) -> Project:
     sizes: list[Size | None] = [(each.width, each.height) for each in model.cameras]
     places = {each.number: row for row, each in enumerate(model.cameras)}
     images = model.images
-    _check_images(model, places)
-    rotations = _rotations(images.quaternions, images, messages)
+    _check_model(model, places)
+    rotations, off = _rotations(images.quaternions, images.places)
+    if len(off):
+        names = [images.names[row] for row in off]
+        messages.append(Message.of("colmap.normalised", n=len(off), names=names))
     translations = images.translations.copy()
     frames = _composed(model, rotations, translations, messages)
     matrices = (Y_DOWN @ rotations).transpose(0, 2, 1)
@@ -102,179 +102,142 @@ def _camera(camera: Camera) -> HouseCamera:
         return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
-def _check_images(model: Model, places: dict[int, int]) -> None:
-    images = model.images
-    seen: dict[int, int] = {}
-    names: dict[str, int] = {}
-    for row, (number, camera, name) in enumerate(
-        zip(images.numbers.tolist(), images.cameras.tolist(), images.names, strict=True)
-    ):
-        place = images.places[row]
+def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
+    """Reject names without text, unknown cameras, repeated names, and numbers that are not finite."""
+    images, points = model.images, model.points
+    for name, camera, place in zip(images.names, images.cameras.tolist(), images.places, strict=True):
         if not name.strip() or not name.isprintable():
-            raise place.error(f"image {number} has no name that prints: {name[:40]!r}")
-        if camera not in places:
-            raise place.error(f"image {number} has the camera {camera}, which is not there")
-        if seen.setdefault(number, row) != row or names.setdefault(name, row) != row:
-            raise place.error(f"the image {number}, {name}, is there twice")
-    if not np.isfinite(images.xy).all():
-        feature = int(np.flatnonzero(~np.isfinite(images.xy).all(axis=1))[0])
-        row = int(np.searchsorted(np.cumsum(images.counts), feature, side="right"))
-        raise images.places[row].error(f"image {images.numbers[row]} has a feature that is no finite number")
-    points = model.points
-    for values, stand, what in (
-        (images.translations, images.places, "translation"),
-        (points.positions, points.places, "position"),
+            raise place.error(phrase("format.name", what="image", name=name))
+        if camera not in cameras:
+            raise place.error(_unknown("image", name, "camera", camera))
+    xy = np.isfinite(images.xy).all(axis=1)
+    if not xy.all():
+        row = int(np.searchsorted(np.cumsum(images.counts), np.argmin(xy), side="right"))
+        raise images.places[row].error(phrase("format.finite", name="a feature"))
+    for values, places, what in (
+        (images.translations, images.places, "the translation"),
+        (points.positions, points.places, "the position"),
     ):
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(bad):
-            raise stand[int(bad[0])].error(f"the {what} is no finite number")
-    order = np.argsort(points.numbers, kind="stable")
-    again = np.flatnonzero(np.diff(points.numbers[order]) == 0)
-    if again.size:
-        row = int(order[again[0] + 1])
-        raise points.places[row].error(f"point {points.numbers[row]} is there twice")
+        finite = np.isfinite(values).all(axis=1)
+        if not finite.all():
+            raise places[int(np.argmin(finite))].error(phrase("format.finite", name=what))
+    for what, names, places in (
+        ("image", np.array(images.names, dtype=object), images.places),
+        ("image", images.numbers, images.places),
+        ("point", points.numbers, points.places),
+    ):
+        _, first = np.unique(names, return_index=True)
+        if len(first) < len(names):
+            row = int(np.setdiff1d(np.arange(len(names)), first)[0])
+            raise places[row].error(phrase("format.repeated", what=what, name=str(names[row])))
 
 
-def _rotations(quaternions: Floats, images: Images, messages: list[Message]) -> Floats:
-    """Return (n, 3, 3) world to camera."""
+def _unknown(owner: str, name: object, what: str, other: object) -> Phrase:
+    return phrase("format.reference", owner=owner, name=str(name), what=what, other=str(other))
+
+
+def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, Indices]:
+    """Return (n, 3, 3) matrices of quaternions w, x, y, z, and rows whose length differs from 1."""
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(quaternions, axis=1)
-        bad = np.flatnonzero(~(np.abs(lengths - 1) <= LONGEST))
-    if len(bad):
-        row = int(bad[0])
-        raise images.places[row].error(
-            f"the quaternion of {images.names[row]} has the length {lengths[row]:.6g}, not 1"
-        )
-    off = np.flatnonzero(np.abs(lengths - 1) > SHORT)
-    if len(off):
-        messages.append(
-            Message(
-                f"{len(off)} quaternions have not the length 1, by up to {np.abs(lengths - 1).max():.2g},"
-                f" and were normalised: {listed([images.names[row] for row in off[:20]], 3)}"
-            )
-        )
-    return _matrices(quaternions / lengths[:, np.newaxis])
-
-
-def _matrices(quaternions: Floats) -> Floats:
-    w, x, y, z = quaternions.T
+        differences = np.abs(lengths - 1)
+    bad = ~(differences <= MAX_DIFFERENCE)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise places[row].error(phrase("format.length", length=float(lengths[row])))
+    w, x, y, z = quaternions.T / lengths
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    found: Floats = np.array(rows).transpose(2, 0, 1)
-    return found
+    return np.array(rows).transpose(2, 0, 1), np.flatnonzero(differences > NORMALISED)
 
 
 def _rigid(pose: Pose, place: Place) -> tuple[Floats, Floats]:
-    quaternion = np.array([pose.quaternion])
-    with np.errstate(over="ignore", invalid="ignore"):
-        length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1) <= LONGEST:
-        raise place.error(f"a quaternion has the length {length:.6g}, not 1")
     translation = np.array(pose.translation)
     if not np.isfinite(translation).all():
-        raise place.error("a translation is no finite number")
-    return _matrices(quaternion / length)[0], translation
+        raise place.error(phrase("format.finite", name="the translation"))
+    return _rotations(np.array([pose.quaternion]), [place])[0][0], translation
 
 
 def _composed(
     model: Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
-    """Put the poses of frames and rigs into those of images; return frames whose images hang together."""
+    """Put the poses of frames and rigs into the poses of images; return frames of several images."""
     if not model.frames:
         return []
-    cameras = {each.number: str(each.number) for each in model.cameras}
-    rigs = {each.number for each in model.rigs}
-    sensors, house = _mounted_sensors(model, cameras)
+    cameras = {camera.number: str(camera.number) for camera in model.cameras}
+    numbers = {rig.number for rig in model.rigs}
+    sensors, rigs = _mounted_sensors(model, cameras)
     rows = {number: row for row, number in enumerate(model.images.numbers.tolist())}
-    found, seen, unknown = [], set(), 0
+    frames, seen, unknown = [], set(), 0
     for frame in model.frames:
-        if frame.rig not in rigs:
-            raise frame.place.error(f"frame {frame.number} has the rig {frame.rig}, which is not there")
-        turn, shift = _rigid(frame.pose, frame.place)
+        place = frame.place
+        if frame.rig not in numbers:
+            raise place.error(_unknown("frame", frame.number, "rig", frame.rig))
+        turn, shift = _rigid(frame.pose, place)
         photos: dict[str, int] = {}
-        for kind, sensor, image in frame.data:
-            if kind != CAMERA:
-                continue
+        for sensor, image in ((sensor, image) for kind, sensor, image in frame.data if kind == CAMERA):
             if image not in rows:
-                raise frame.place.error(f"frame {frame.number} has the image {image}, which is not there")
+                raise place.error(_unknown("frame", frame.number, "image", image))
             row = rows[image]
             if (frame.rig, sensor) not in sensors or model.images.cameras[row] != sensor:
-                raise frame.place.error(
-                    f"frame {frame.number}: the image {image} is not of the camera {sensor} of its rig"
-                )
-            if row in seen:
-                raise frame.place.error(f"the image {image} is in two frames")
+                raise place.error(phrase("colmap.sensor", frame=frame.number, image=image, camera=sensor))
+            if row in seen or cameras[sensor] in photos:
+                raise place.error(phrase("colmap.frame", frame=frame.number, image=image, camera=sensor))
             seen.add(row)
-            own_pose = sensors[frame.rig, sensor]
-            if own_pose is None:
+            pose = sensors[frame.rig, sensor]
+            if pose is None:
                 rotations[row], translations[row] = np.nan, np.nan
                 unknown += 1
                 continue
-            rotations[row], translations[row] = own_pose[0] @ turn, own_pose[0] @ shift + own_pose[1]
-            if cameras[sensor] in photos:
-                raise frame.place.error(f"frame {frame.number} has two images of the camera {sensor}")
+            rotations[row], translations[row] = pose[0] @ turn, pose[0] @ shift + pose[1]
             photos[cameras[sensor]] = row
-        of_frame = house.get(frame.rig)
-        if of_frame is not None and any(camera != of_frame.reference for camera in photos):
-            found.append(FrameOf(str(frame.number), of_frame, photos))
-    if unknown:
-        text = f"{unknown} images are of sensors whose pose on the rig is not known: they are oriented first"
-        messages.append(Message(text))
-    if alone := len(rows) - len(seen):
-        text = f"{alone} images are in no frame: their poses are those of the table of images"
-        messages.append(Message(text))
-    return found
+        rig = rigs.get(frame.rig)
+        if rig is not None and any(camera != rig.reference for camera in photos):
+            frames.append(FrameOf(str(frame.number), rig, photos))
+    for code, n in (("colmap.unposed", unknown), ("colmap.frameless", len(rows) - len(seen))):
+        messages += [Message.of(code, n=n)] if n else []
+    return frames
 
 
 def _mounted_sensors(
     model: Model, cameras: Mapping[int, str]
 ) -> tuple[dict[tuple[int, int], tuple[Floats, Floats] | None], dict[int, Rig]]:
-    """Return the poses of cameras on rigs, None where not known, and the rigs whose frame is a camera."""
-    sensors: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
-    house: dict[int, Rig] = {}
+    """Return the poses of cameras on rigs, None if unknown, and the rigs whose frame is a camera."""
+    poses: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
+    rigs: dict[int, Rig] = {}
     for rig in model.rigs:
-        own: dict[str, Sensor] = {}
-        for kind, number, pose in rig.sensors:
-            if kind != CAMERA:
-                continue
+        sensors: dict[str, Sensor] = {}
+        for number, pose in ((number, pose) for kind, number, pose in rig.sensors if kind == CAMERA):
             if number not in cameras:
-                raise rig.place.error(f"rig {rig.number} has the camera {number}, which is not there")
-            found = sensors[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
-            if found is not None:
-                own[cameras[number]] = Sensor.from_colmap(f"rig {rig.number}, camera {number}", *found)
+                raise rig.place.error(_unknown("rig", rig.number, "camera", number))
+            rigid = poses[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
+            if rigid is not None:
+                name = f"rig {rig.number}, camera {number}"
+                sensors[cameras[number]] = Sensor.from_colmap(name, *rigid)
         if rig.reference is not None and rig.reference[0] == CAMERA:
-            sensors[rig.number, rig.reference[1]] = np.eye(3), np.zeros(3)
-            house[rig.number] = Rig(str(rig.number), cameras.get(rig.reference[1], ""), own)
-    return sensors, house
+            poses[rig.number, rig.reference[1]] = np.eye(3), np.zeros(3)
+            rigs[rig.number] = Rig(str(rig.number), cameras.get(rig.reference[1], ""), sensors)
+    return poses, rigs
 
 
 def _observed(model: Model, messages: list[Message]) -> tuple[Indices, Indices]:
-    """Return rows of features that are images of points, and the rows of these."""
+    """Return rows of features that are images of points, and the rows of the points."""
     images, points = model.images, model.points
-    with_point = np.flatnonzero(images.points != NO_POINT)
+    features = np.flatnonzero(images.points != NO_POINT)
     order = np.argsort(points.numbers, kind="stable")
-    known = points.numbers[order]
-    wanted = images.points[with_point]
-    at = np.searchsorted(known, wanted) if len(known) else np.zeros(len(wanted), dtype=np.int64)
-    there = np.zeros(len(wanted), dtype=bool)
-    inside = at < len(known)
-    there[inside] = known[at[inside]] == wanted[inside]
-    without = len(images.points) - len(with_point)
-    if without:
-        messages.append(Message(f"{without} features have no point and are left out"))
-    if not there.all():
-        lost = np.unique(wanted[~there])
-        messages.append(
-            Message(
-                f"{np.count_nonzero(~there)} features are of {len(lost)} points that points3D does not have,"
-                f" and are left out: {listed([str(each) for each in lost[:20].tolist()], 3)}"
-            )
-        )
-    rows = order[at[there]]
-    apart = int(np.count_nonzero(np.bincount(rows, minlength=len(points.numbers)) != points.tracks))
-    if apart:
-        messages.append(Message(f"the tracks of {apart} points are not those of the images, which count"))
-    return with_point[there], rows
+    numbers, wanted = points.numbers[order], images.points[features]
+    at = np.searchsorted(numbers, wanted)
+    known = np.append(numbers, NO_POINT)[at] == wanted
+    rows = order[at[known]]
+    missing = np.unique(wanted[~known]).tolist()
+    counts = np.bincount(rows, minlength=len(points.numbers))
+    for code, n in (
+        ("colmap.pointless", len(images.points) - len(features)),
+        ("colmap.unknown-points", np.count_nonzero(~known)),
+        ("colmap.tracks", np.count_nonzero(counts != points.tracks)),
+    ):
+        messages += [Message.of(code, n=int(n), names=missing)] if n else []
+    return features[known], rows

@@ -11,8 +11,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
-from photogram.formats.colmap.binary import binary_files
-from photogram.formats.colmap.text import text_files
+from photogram.formats.colmap.files import binary_files, text_files
 from photogram.formats.images import sizes_of, to_corner
 from photogram.formats.lenses import lens_of
 from photogram.formats.models import complete_positions
@@ -21,14 +20,12 @@ from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.json import to_json
-from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.rigs import Mount
 from photogram.results.result import Result
-
-_NAMES = dict(content.MODELS)
+from photogram.words import phrase
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -69,19 +66,19 @@ def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> boo
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return the binary files of a project."""
-    found = _made(project)
-    return {**binary_files(found.model), **names_file(found.points)}
+    written = _written(project)
+    return {**binary_files(written.model), **names_file(written.points)}
 
 
 def write_as_text(project: Project) -> Mapping[str, bytes]:
     """Return the text files of a project."""
-    found = _made(project)
-    return {**text_files(found.model), **names_file(found.points)}
+    written = _written(project)
+    return {**text_files(written.model), **names_file(written.points)}
 
 
 @dataclass(frozen=True)
-class _Made:
-    """A model with the numbers that photos, points and cameras have in it, and its images in their order."""
+class _Written:
+    """A model with the numbers of photos, points and cameras in it, and rows of image observations."""
 
     model: content.Model
     photos: dict[str, int]
@@ -90,96 +87,76 @@ class _Made:
     rows: Indices
 
 
-def _made(project: Project) -> _Made:
-    """Return the model of a project; an error of cameras that COLMAP does not have, or without poses."""
-    block = project.block
+def _written(project: Project) -> _Written:
+    """Return the model of all photos with a pose, and of all points with a position."""
+    block, details = project.block, project.details
     cameras, photo_cameras = known_cameras(block)
-    numbers = numbered([each.name for each in cameras])
-    sizes = sizes_of(project)
-    lines = [_camera(each, size, numbers[each.name]) for each, size in zip(cameras, sizes, strict=True)]
-    shown = np.flatnonzero(posed(block))
-    if not len(shown):
-        raise InputError("no photo has a pose, and a model holds nothing but photos with one")
-    photos = numbered([block.photo_ids[row] for row in shown], project.details.get("image numbers"))
+    numbers = numbered([camera.name for camera in cameras])
+    records = [
+        _camera(camera, size, numbers[camera.name])
+        for camera, size in zip(cameras, sizes_of(project), strict=True)
+    ]
+    rows = np.flatnonzero(posed(block))
+    if not len(rows):
+        raise InputError(phrase("format.poses"))
+    photos = numbered([block.photo_ids[row] for row in rows], details.get("image numbers"))
     positions = complete_positions(project)
-    placed = np.flatnonzero(np.isfinite(positions).all(axis=1))
-    points = numbered([block.point_ids[row] for row in placed], project.details.get("point numbers"))
-    matrices = attitude_matrices(block)[shown]
-    rotations = Y_DOWN @ matrices.transpose(0, 2, 1)
-    translations = -np.einsum("nij,nj->ni", rotations, block.photo_positions[shown])
+    point_rows = np.flatnonzero(np.isfinite(positions).all(axis=1))
+    points = numbered([block.point_ids[row] for row in point_rows], details.get("point numbers"))
+    matrices = attitude_matrices(block)[rows]
+    translations = -np.einsum("nij,nj->ni", Y_DOWN @ matrices.transpose(0, 2, 1), block.photo_positions[rows])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
-    camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in shown], dtype=np.int64)
-    ids = np.array(list(photos.values()), dtype=np.int64)
-    images, rows = _images(project, shown, ids, camera_numbers, quaternions, translations, placed, points)
-    colours = project.details.get("colours", {})
-    poses = {
-        name: content.Pose(tuple(q), tuple(t))
-        for name, q, t in zip(photos, quaternions.tolist(), translations.tolist(), strict=True)
-    }
+    camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in rows], dtype=np.int64)
+    poses = [
+        content.Pose(tuple(quaternion), tuple(translation))
+        for quaternion, translation in zip(quaternions.tolist(), translations.tolist(), strict=True)
+    ]
     of_photo = dict(zip(photos, camera_numbers.tolist(), strict=True))
-    rigs, frames = _rigs(project, poses, photos, of_photo, sorted(numbers.values()))
-    point_numbers = np.array(list(points.values()), dtype=np.int64)
-    order = np.argsort(point_numbers, kind="stable")
-    shown_colours = [colours.get(block.point_ids[row], (0, 0, 0)) for row in placed[order]]
-    of_points = content.Points(
-        point_numbers[order],
-        positions[placed[order]],
-        np.array(shown_colours, dtype=np.int64).reshape(-1, 3),
-        np.zeros(len(placed), dtype=np.int64),
-        [],
+    rigs, frames = _rigs(project, dict(zip(photos, poses, strict=True)), photos, of_photo, numbers)
+
+    ids = np.array(list(photos.values()), dtype=np.int64)
+    order = np.argsort(ids, kind="stable")
+    rank = np.full(len(block.photo_ids), -1, dtype=np.int64)
+    rank[rows[order]] = np.arange(len(rows))
+    image_rows = np.flatnonzero(rank[block.image_photos] >= 0)
+    image_rows = image_rows[np.argsort(rank[block.image_photos[image_rows]], kind="stable")]
+    point_numbers = np.full(len(block.point_ids), content.NO_POINT, dtype=np.int64)
+    point_numbers[point_rows] = list(points.values())
+    images = content.Images(
+        ids[order],
+        camera_numbers[order],
+        quaternions[order],
+        translations[order],
+        [block.photo_ids[row] for row in rows[order]],
+        np.bincount(rank[block.image_photos[image_rows]], minlength=len(rows)),
+        to_corner(project)[image_rows],
+        point_numbers[block.image_points[image_rows]],
     )
-    by_number = sorted(lines, key=lambda each: each.number)
-    model = content.Model(project.path, by_number, images, of_points, rigs, frames)
-    return _Made(model, photos, points, numbers, rows)
+    point_rows = point_rows[np.argsort(point_numbers[point_rows], kind="stable")]
+    colours = details.get("colours", {})
+    point_table = content.Points(
+        point_numbers[point_rows],
+        positions[point_rows],
+        np.array(
+            [colours.get(block.point_ids[row], (0, 0, 0)) for row in point_rows], dtype=np.int64
+        ).reshape(-1, 3),
+        np.zeros(len(point_rows), dtype=np.int64),
+    )
+    records.sort(key=lambda camera: camera.number)
+    model = content.Model(project.path, records, images, point_table, rigs, frames)
+    return _Written(model, photos, points, numbers, image_rows)
 
 
 def _camera(camera: Camera, size: Size, number: int) -> content.Camera:
     model = camera.model.upper()
-    if model in _NAMES and camera.unit == "px":
-        return content.Camera(number, model, *size, tuple(camera.values.tolist()), Place())
+    if model in content.MODELS and camera.unit == "px":
+        return content.Camera(number, model, *size, tuple(camera.values.tolist()))
     lens = lens_of(camera, size)
     if lens is None:
-        raise InputError(
-            f"the camera {camera.title} has the model {camera.model}, which COLMAP does not have; none is"
-            " fitted"
-        )
+        raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="COLMAP"))
     if lens.fx == lens.fy and lens.is_plain("k1", "k2"):
-        return content.Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2), Place())
-    return content.Camera(
-        number, "FULL_OPENCV", *size, (lens.fx, lens.fy, lens.cx, lens.cy, *lens.terms), Place()
-    )
-
-
-def _images(
-    project: Project,
-    shown: Indices,
-    ids: Indices,
-    cameras: Indices,
-    quaternions: Floats,
-    translations: Floats,
-    placed: Indices,
-    points: Mapping[str, int],
-) -> tuple[content.Images, Indices]:
-    block = project.block
-    number = np.full(len(block.point_ids), content.NO_POINT, dtype=np.int64)
-    number[placed] = list(points.values())
-    rank = np.full(len(block.photo_ids), -1, dtype=np.int64)
-    by_id = np.argsort(ids, kind="stable")
-    rank[shown[by_id]] = np.arange(len(shown))
-    rows = np.flatnonzero(rank[block.image_photos] >= 0)
-    rows = rows[np.argsort(rank[block.image_photos[rows]], kind="stable")]
-    images = content.Images(
-        ids[by_id],
-        cameras[by_id],
-        quaternions[by_id],
-        translations[by_id],
-        [block.photo_ids[row] for row in shown[by_id]],
-        np.bincount(rank[block.image_photos[rows]], minlength=len(shown)),
-        to_corner(project)[rows],
-        number[block.image_points[rows]],
-        [],
-    )
-    return images, rows
+        return content.Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2))
+    return content.Camera(number, "FULL_OPENCV", *size, (lens.fx, lens.fy, lens.cx, lens.cy, *lens.terms))
 
 
 def _rigs(
@@ -187,7 +164,7 @@ def _rigs(
     poses: Mapping[str, content.Pose],
     photos: Mapping[str, int],
     cameras: Mapping[str, int],
-    numbers: list[int],
+    numbers: Mapping[str, int],
 ) -> tuple[list[content.Rig], list[content.Frame]]:
     """Return rigs and frames: those of mounts, and of each other camera and photo one of its own."""
     sensors: dict[int, dict[int, content.Pose]] = {}
@@ -203,9 +180,8 @@ def _rigs(
             number,
             (content.CAMERA, number),
             tuple((content.CAMERA, other, pose) for other, pose in sorted(sensors.get(number, {}).items())),
-            Place(),
         )
-        for number in numbers
+        for number in sorted(numbers.values())
         if all(number not in own for own in sensors.values())
     ]
     frames = [
@@ -214,7 +190,6 @@ def _rigs(
             cameras[name],
             poses[name],
             tuple((content.CAMERA, cameras[each], photos[each]) for each in own),
-            Place(),
         )
         for name, own in members.items()
     ]
@@ -230,7 +205,7 @@ def _sensor_pose(position: Floats, axes: Floats) -> content.Pose:
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
     """Return the covariances of a result in the order of the model's files: docs/formats.md."""
-    model = _made(project)
+    model = _written(project)
     block = result.block
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     photos = {number: rows[name] for name, number in model.photos.items()}
@@ -276,7 +251,7 @@ def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> byt
     return struct.pack("<Q", len(table)) + table.tobytes()
 
 
-def _quality(model: _Made, result: Result) -> bytes:
+def _quality(model: _Written, result: Result) -> bytes:
     """Return residuals, redundancy numbers and test values of images, by image and feature."""
     images = model.model.images
     counts = np.asarray(images.counts)
@@ -288,7 +263,7 @@ def _quality(model: _Made, result: Result) -> bytes:
     return struct.pack("<Q", len(table)) + table.tobytes()
 
 
-def _camera_covariances(model: _Made, result: Result) -> bytes:
+def _camera_covariances(model: _Written, result: Result) -> bytes:
     found = []
     own = {each.name: each.covariance for each in result.cameras}
     names = {number: name for name, number in model.cameras.items()}

@@ -54,11 +54,6 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
     """Return support data with the values that other fields determine, and remarks on these.
 
     `code` is the prefix of the instrument's keywords.
-
-    Raises
-    ------
-    InputError
-        A value is null and no other field determines it.
     """
     remarks = []
     for path, keyword, derive, meaning in _RULES:

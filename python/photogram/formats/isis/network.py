@@ -87,43 +87,23 @@ class ControlPoints(_Columns):
 
     Coordinates are rectangular and body-fixed, in metres; a covariance is the upper triangle of a matrix, row
     by row, in square metres. Whatever a point does not have is NaN, -1 where it is an index or a code.
-
-    Parameters
-    ----------
-    ids
-        What they are called.
-    types
-        (n,) index into `POINT_TYPES`.
-    edit_lock, ignore, rejected
-        (n,) not to be edited; not to be used; rejected by the adjustment.
-    reference
-        (n,) the measure to which the others of the point refer, counted from its first one.
-    apriori_source, apriori_radius_source
-        (n,) index into `SOURCES`: where the a-priori coordinates, and the radius, are from.
-    apriori, apriori_covariance
-        (n, 3), (n, 6) coordinates before an adjustment.
-    constrained
-        (n, 3) whether latitude, longitude and radius are weighted.
-    adjusted, adjusted_covariance
-        (n, 3), (n, 6) coordinates of an adjustment.
-    rest
-        What else was read (who chose the point, when; files of sources; what nobody knows): fields of
-        messages, byte for byte, and where those of each point begin (n + 1). It is written back.
     """
 
     ids: Sequence[str]
-    types: _Codes
-    edit_lock: Bools
+    types: _Codes  # (n,) index into `POINT_TYPES`
+    edit_lock: Bools  # (n,) the point must not be edited
     ignore: Bools
     rejected: Bools
-    reference: _Indices
+    reference: _Indices  # (n,) the measure to which the others of the point refer, counted from its first one
+    # (n,) index into `SOURCES`: where the a-priori coordinates, and the radius, are from
     apriori_source: _Codes
     apriori_radius_source: _Codes
-    apriori: Floats
+    apriori: Floats  # (n, 3) coordinates before an adjustment
     apriori_covariance: Floats
-    constrained: Bools
-    adjusted: Floats
+    constrained: Bools  # (n, 3) whether latitude, longitude and radius are weighted
+    adjusted: Floats  # (n, 3) coordinates of an adjustment
     adjusted_covariance: Floats
+    # All other fields of messages, byte for byte, and the first of each point (n + 1); they are written back
     rest: _Rest
 
     def __len__(self) -> int:
@@ -146,34 +126,11 @@ class ControlMeasures(_Columns):
 
     Samples and lines are pixels, counted so that the centre of an image's first pixel is (1, 1). Whatever a
     measure does not have is NaN.
-
-    Parameters
-    ----------
-    serials
-        Serial numbers of images, each once.
-    serial
-        (m,) index of the image in `serials`.
-    types
-        (m,) index into `MEASURE_TYPES`.
-    sample, line
-        (m,) what was measured.
-    apriori_sample, apriori_line
-        (m,) where it was expected.
-    sample_sigma, line_sigma
-        (m,) standard deviations.
-    sample_residual, line_residual
-        (m,) residuals of an adjustment.
-    diameter
-        (m,) of a crater that was measured.
-    edit_lock, ignore, rejected
-        (m,) not to be edited; not to be used; rejected by the adjustment.
-    rest
-        What else was read, as in :class:`ControlPoints`: who measured, when, numbers of the registration.
     """
 
-    serials: Sequence[str]
-    serial: _Indices
-    types: _Codes
+    serials: Sequence[str]  # Of images, each once
+    serial: _Indices  # (m,) index of the image in `serials`
+    types: _Codes  # (m,) index into `MEASURE_TYPES`
     sample: Floats
     line: Floats
     apriori_sample: Floats
@@ -182,8 +139,8 @@ class ControlMeasures(_Columns):
     line_sigma: Floats
     sample_residual: Floats
     line_residual: Floats
-    diameter: Floats
-    edit_lock: Bools
+    diameter: Floats  # (m,) of a crater that was measured
+    edit_lock: Bools  # (m,) the measure must not be edited
     ignore: Bools
     rejected: Bools
     rest: _Rest

@@ -26,58 +26,33 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Settings:
-    """What is adjusted, and how it is weighted; defaults are those of jigsaw.
+    """What is adjusted, and how it is weighted; defaults are those of jigsaw."""
 
-    Attributes
-    ----------
-    ck_degree, ck_solve_degree
-        Degree of the polynomials that are fitted to the angles of an image, and of those that are adjusted.
-    angles, twist
-        Which of their coefficients are unknown, and whether those of the third angle are.
-    over_existing
-        Whether polynomials are added to the angles of the table instead.
-    spk_degree, spk_solve_degree, positions, over_hermite
-        The same of positions.
-    angle_sigmas
-        Degrees: of the coefficients of degree 0, 1 and 2, by scaled time.
-    position_sigmas
-        Metres: likewise.
-    radius
-        Whether radii of free points are unknown.
-    axes
-        What point coordinates are adjusted.
-    latitude_sigmas, rectangular_sigmas
-        Metres: of latitude, longitude, radius of all points, and of X, Y, Z.
-    observations
-        Whether images of one observation share their coefficients.
-    held
-        The list of images whose poses are known; None: no image is.
-    rejects, multiplier
-        Whether measures with long residuals are rejected, and how many of their deviations these are long.
-    told
-        What was said and has another form here, in sentences.
-    """
-
+    # Degrees of the polynomials that are fitted to the angles of an image, and that are adjusted
     ck_degree: int = 2
     ck_solve_degree: int = 2
+    # Which of their coefficients are unknown, and whether those of the third angle are
     angles: Solved = "first"
     twist: bool = True
-    over_existing: bool = False
-    spk_degree: int = 2
+    over_existing: bool = False  # Whether polynomials are added to the angles of the table instead
+    spk_degree: int = 2  # The same of positions
     spk_solve_degree: int = 2
     positions: Solved = "none"
     over_hermite: bool = False
+    # Degrees: of the coefficients of degree 0, 1 and 2, by scaled time
     angle_sigmas: Sigmas = (None, None, None)
-    position_sigmas: Sigmas = (None, None, None)
-    radius: bool = False
-    axes: Axes = "latitudinal"
+    position_sigmas: Sigmas = (None, None, None)  # Metres: likewise
+    radius: bool = False  # Whether radii of free points are unknown
+    axes: Axes = "latitudinal"  # What point coordinates are adjusted
+    # Metres: of latitude, longitude, radius of all points, and of X, Y, Z
     latitude_sigmas: Sigmas = (None, None, None)
     rectangular_sigmas: Sigmas = (None, None, None)
-    observations: bool = False
-    held: Path | None = None
+    observations: bool = False  # Whether images of one observation share their coefficients
+    held: Path | None = None  # The list of images whose poses are known; None: no image is
+    # Whether measures with long residuals are rejected, and how many of their deviations these are long
     rejects: bool = False
     multiplier: float = 3.0
-    told: tuple[str, ...] = field(default=())
+    told: tuple[str, ...] = field(default=())  # What was said and has another form here, in sentences
 
     @property
     def angle_coefficients(self) -> int:

@@ -89,13 +89,7 @@ def map_files(
 
 
 def check_map(path: Path) -> str:
-    """Return the ending of a file that can be a map.
-
-    Raises
-    ------
-    InputError
-        It has another one.
-    """
+    """Return the ending of a file that can be a map."""
     suffix = path.suffix.lower()
     if suffix != GEOPACKAGE and suffix not in GEOJSON:
         raise InputError("maps are written as .gpkg or .geojson", file=path)

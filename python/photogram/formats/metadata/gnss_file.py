@@ -30,21 +30,8 @@ def read_gnss_file(
 ) -> Metadata:
     """Read the positions of a file by the names of photos.
 
-    Parameters
-    ----------
-    path
-        The file; its content decides the format.
-    photos
-        Names of the photos of the project.
-    directory
-        Folder of all photographs; None: those of the project are all. Events belong to photos in their order.
-    mrk_antenna
-        Whether positions of .MRK files are antenna positions.
-
-    Raises
-    ------
-    InputError
-        The file has no positions of photos, or events whose number differs from the number of photos.
+    `directory`: folder of all photographs; None: those of the project are all. Events belong to photos in
+    their order; `mrk_antenna`: whether positions of .MRK files are antenna positions.
     """
     messages: list[Message] = []
     first = next((place.text or "" for place in filled_lines(path)), "").strip()

@@ -110,13 +110,7 @@ def usable_deviations(east: float, north: float, height: float) -> Triple | None
 
 
 def geographic_position(place: Place, values: Sequence[float]) -> Triple | None:
-    """Return longitude, latitude (degrees) and height of a source; None for 0, 0, which is no position.
-
-    Raises
-    ------
-    InputError
-        Angles beyond the earth, a height that nobody flies at.
-    """
+    """Return longitude, latitude (degrees) and height of a source; None for 0, 0, which is no position."""
     longitude, latitude, height = values
     if not (abs(longitude) <= 180 and abs(latitude) <= 90):
         raise place.error(f"{longitude!r}, {latitude!r} is no longitude and latitude in degrees")

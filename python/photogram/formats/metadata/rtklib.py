@@ -53,13 +53,7 @@ def _is_header(line: str) -> bool:
 
 
 def read_events(path: Path) -> list[Event]:
-    """Read the events of a file in order of time.
-
-    Raises
-    ------
-    InputError
-        Baselines instead of positions; a line that cannot be read; no event.
-    """
+    """Read the events of a file in order of time."""
     head, heights, events = Place(path), "", list[Event]()
     for record, line in enumerate(read_lines(path), 1):
         if line.startswith(_COMMENT):

@@ -64,29 +64,7 @@ def streamable(path: Path) -> bool:
 
 
 class Streamed:
-    """A project that is read batch by batch.
-
-    Parameters
-    ----------
-    path
-        Its folder, or its file of settings.
-    wishes
-        As of all formats.
-    folder
-        Where buckets are kept until the parts are written.
-
-    Attributes
-    ----------
-    project
-        All of it but images, and points that are not control or tied.
-    block
-        Its block, common unknowns with values to start from.
-
-    Raises
-    ------
-    InputError
-        As of a project that is read whole; columns that only a project that is read whole may have.
-    """
+    """A project that is read batch by batch."""
 
     def __init__(self, path: Path, wishes: Wishes, folder: Path) -> None:
         settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)

@@ -25,13 +25,7 @@ TIMES = "times of photos on frames"
 
 
 def read_boards(tables: Tables) -> dict[str, Board]:
-    """Read boards of columns and rows; points of others are the control of the project.
-
-    Raises
-    ------
-    InputError
-        A kind or shape that there is not, what is no board, more than one.
-    """
+    """Read boards of columns and rows; points of others are the control of the project."""
     table = tables.rows("boards")
     if table.count > 1:
         raise table.error(1, "several boards: those fixed to each other are one of the kind points")
@@ -58,13 +52,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
 
 
 def read_regularised(tables: Tables) -> str | None:
-    """Return whose weak priors a calibration adds to its cameras; None of a project without a board, or none.
-
-    Raises
-    ------
-    InputError
-        Another word.
-    """
+    """Return whose weak priors a calibration adds to its cameras; None without a board or priors."""
     table = tables.rows("boards")
     if not table.count:
         return None
@@ -75,13 +63,7 @@ def read_regularised(tables: Tables) -> str | None:
 
 
 def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
-    """Return how boards bend, where the table says so.
-
-    Raises
-    ------
-    InputError
-        A standard deviation that is none.
-    """
+    """Return how boards bend, where the table says so."""
     table = tables.rows("boards")
     if all(each.shape != "bend" for each in boards.values()):
         return []

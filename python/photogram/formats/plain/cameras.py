@@ -58,16 +58,7 @@ class Cameras:
 
 
 def read_cameras(tables: Tables) -> Cameras:
-    """Read the table of cameras.
-
-    Raises
-    ------
-    InputError
-        There is none, a model that there is not, a parameter that is missing or that the model does not have,
-        a principal distance below :data:`SMALLEST_DISTANCE`.
-    ContradictionError
-        A principal distance that is far from that of the certificate.
-    """
+    """Read the table of cameras."""
     table = tables.read("cameras")
     if table is None:
         raise InputError("has no table of cameras (cameras.csv)", file=tables.settings.path)
@@ -117,13 +108,7 @@ def read_cameras(tables: Tables) -> Cameras:
 def _from_mm(
     image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
 ) -> tuple[float, bool]:
-    """Return the divisor from lengths of a row to the unit of the camera, and whether it converts mm to px.
-
-    Raises
-    ------
-    InputError
-        A principal distance that is too small in pixels.
-    """
+    """Return the divisor from lengths of a row to the unit of the camera, and whether the row is in mm."""
     pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
     least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
     small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
@@ -183,13 +168,7 @@ class _Row:
     deviations: dict[str, float]
 
     def behind_a_lens(self, table: ColumnTable, row: int) -> _Row:
-        """Return the row without what places a line of sensors: the camera that the line is behind.
-
-        Raises
-        ------
-        InputError
-            A model that has parameters of the same names.
-        """
+        """Return the row without what places a line of sensors: the camera that the line is behind."""
         model = "brown" if self.model == LINE else self.model
         own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
         if both := own.intersection(OF_LINES):
@@ -239,13 +218,7 @@ def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
 
 
 def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
-    """Return a camera as its calibration by stars has it, with the covariance.
-
-    Raises
-    ------
-    InputError
-        What says the same beside it, a file that cannot be read, or is in another unit than images.
-    """
+    """Return a camera as its calibration by stars has it, with the covariance."""
     from photogram.stellar.cameras import camera_from
 
     beside = given.model or given.values or given.deviations
@@ -365,13 +338,7 @@ def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
 
 
 def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
-    """Return cameras with the knots that the table has of them; those that are missing are 0 and held.
-
-    Raises
-    ------
-    InputError
-        Knots of a camera that has none there, or twice.
-    """
+    """Return cameras with the knots that the table has of them; those that are missing are 0 and held."""
     table = tables.rows("knots")
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))

@@ -22,6 +22,7 @@ from photogram.messages import Message, listed, quoted
 from photogram.network.cameras import Camera
 from photogram.network.films import Mark
 from photogram.network.observations import KnownTogether, Observation
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -33,14 +34,7 @@ SD_MARK = 0.002
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
-    """Return the certificates that photos, or the section of films, name, by the names of cameras.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, certificates of one camera of which none can be chosen, one that is of no
-        camera.
-    """
+    """Return the certificates that photos, or the section of films, name, by the names of cameras."""
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
@@ -158,17 +152,13 @@ def _tell(
         said.insert(0, f"its certificate is {day}{chosen}: {own.verdict.headline}")
     for each in sorted({*flown[:1], *flown[-1:]}):
         said += [age_remark(own, each), changed_remark(own, several, each)]
-    tables.messages.extend(Message(f"camera {camera}: {each}", own.file) for each in said if each)
+    tables.messages.extend(
+        Message(phrase("error.at", what=f"camera {camera}", message=each), own.file) for each in said if each
+    )
 
 
 def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera:
-    """Return the camera of a certificate.
-
-    Raises
-    ------
-    InputError
-        Another model than certificates are of, no focal length, a table that determines no lens.
-    """
+    """Return the camera of a certificate."""
     if (chosen := model or _MODELS[0]) not in _MODELS:
         raise InputError(
             f"the camera {name} has the model {chosen}: a certificate is of {', '.join(_MODELS)}",
@@ -180,13 +170,7 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
 
 
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
-    """Return the covariance of all marks of a camera, with the datum that distances have not.
-
-    Raises
-    ------
-    InputError
-        It is singular otherwise.
-    """
+    """Return the covariance of all marks of a camera, with the datum that distances have not."""
     try:
         found, free = with_datum(xy, covariance)
     except InputError as error:
@@ -238,13 +222,7 @@ class Fiducials:
         return found
 
     def take(self, certificates: Mapping[str, Certificate]) -> None:
-        """Take the marks of certificates.
-
-        Raises
-        ------
-        InputError
-            A camera that has marks already, a covariance that is none.
-        """
+        """Take the marks of certificates."""
         for camera, own in certificates.items():
             if camera in self.places:
                 raise InputError(
@@ -264,13 +242,7 @@ class Fiducials:
 def read_fiducials(
     tables: Tables, cameras: Collection[str], certificates: Mapping[str, Certificate]
 ) -> Fiducials:
-    """Read the marks of cameras, of the table and of certificates.
-
-    Raises
-    ------
-    InputError
-        Cells that are no numbers, a mark that is there twice, marks in the table and in a certificate.
-    """
+    """Read the marks of cameras, of the table and of certificates."""
     found, table = Fiducials(tables), tables.rows("fiducials")
     xy = table.given(("x", "y"))
     sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)

@@ -54,22 +54,7 @@ class Shared:
         *given: Any,
         **more: Any,
     ) -> _Kind:
-        """Return what a row names, the same object for all rows that do.
-
-        Parameters
-        ----------
-        table, row, column
-            Where it is named.
-        kind, name
-            Its type and name.
-        given, more
-            Its further arguments.
-
-        Raises
-        ------
-        InputError
-            What is refused, or is not what another row says of the same name.
-        """
+        """Return what a row names, the same object for all rows that do."""
         new = made(table, row, partial(kind, name, *given, **more))
         own = self._known.setdefault((kind, name), new)
         same = own is new or (

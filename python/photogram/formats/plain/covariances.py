@@ -54,13 +54,7 @@ class Covariances:
     matrices: Mapping[tuple[str, str], _Matrix]
 
     def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
-        """Return cameras with their covariances.
-
-        Raises
-        ------
-        InputError
-            Cameras and parameters that are not there, matrices that are none.
-        """
+        """Return cameras with their covariances."""
         own = {name: each for (kind, name), each in self.matrices.items() if kind == CAMERA}
         if not own:
             return list(cameras)
@@ -103,11 +97,6 @@ class Covariances:
         """Return the matrix of components of films, scanners or marks; None where it is not there.
 
         It may be singular where it is said so.
-
-        Raises
-        ------
-        InputError
-            Components that there are not, or that are missing.
         """
         own = self.matrices.get((kind, name))
         if own is None:
@@ -125,13 +114,7 @@ class Covariances:
         return found
 
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
-        """Return what was determined of unknowns together as observations.
-
-        Raises
-        ------
-        InputError
-            Unknowns and components that are not there, matrices that are none.
-        """
+        """Return what was determined of unknowns together as observations."""
         known = {(each.KIND, each.name): each for each in unknowns}
         found: list[Observation] = []
         for (kind, name), matrix in self.matrices.items():
@@ -161,13 +144,7 @@ class Covariances:
 
 
 def read_covariances(tables: Tables) -> Covariances:
-    """Read the table; it has nothing where it is not there.
-
-    Raises
-    ------
-    InputError
-        Empty cells, a pair of components that is there twice.
-    """
+    """Read the table; it has nothing where it is not there."""
     table, matrices = tables.rows("covariances"), dict[tuple[str, str], _Matrix]()
     values = table.given(("covariance",))[:, 0]
     kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]

@@ -30,13 +30,7 @@ Exposure = Shutter | LineSensor | None
 
 
 def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
-    """Return the line of sensors of each row of a table of cameras; None of one that takes frames.
-
-    Raises
-    ------
-    InputError
-        A line without a pitch, or whose middle is not known.
-    """
+    """Return the line of sensors of each row of a table of cameras; None of one that takes frames."""
     unit = 1e-3 if tables.settings.image == "um" else 1.0
     pitches = scaled(table.vectors(("pitch_x", "pitch_y")), unit)
     places = scaled(table.vectors(("x0", "y0"), 0.0), unit)
@@ -62,14 +56,7 @@ def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
 def shutters(
     tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
 ) -> list[Shutter | None]:
-    """Return the rolling shutter of each row of a table of cameras; None without.
-
-    Raises
-    ------
-    InputError
-        Words that say no direction, edges that are not known, a shutter of a line of sensors, columns of
-        shutters where there is no readout time.
-    """
+    """Return the rolling shutter of each row of a table of cameras; None without."""
     directions = cast("list[Direction]", table.words("readout_direction", get_args(Direction)))
     edges = _edges(tables, table, cameras, sizes, directions)
     values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
@@ -130,14 +117,8 @@ def _counted(direction: str) -> int:
 def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
     """Return (2,) where a picture begins and ends in a direction, in image coordinates of a camera.
 
-    Parameters
-    ----------
-    camera
-        In pixels that count down: from the corner; all others from the middle of the picture.
-    direction
-        In which it is read.
-    extent
-        (2,) width and height in the unit of the camera; NaN where not known.
+    `extent` is (2,) width and height in the unit of the camera; NaN if unknown. Pixels that count down begin
+    at the corner, all others at the center.
     """
     axis = _counted(direction)
     length = float(extent[axis])
@@ -151,13 +132,7 @@ def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
 
 
 def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) -> list[Exposure]:
-    """Return what the photos of each camera of a block have: a shutter, a line of sensors, or neither.
-
-    Raises
-    ------
-    InputError
-        A camera whose photos have several.
-    """
+    """Return what the photos of each camera of a block have: a shutter, a line of sensors, or neither."""
     of_photos = {each.photo: each for each in block.timed}
     found: dict[int, Exposure] = {}
     for photo, row in zip(block.photo_ids, which, strict=True):
@@ -178,13 +153,7 @@ def exposure_columns(
     pixel_mm: Sequence[float | None],
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of a table of cameras that say what their photos have; none where they have nothing.
-
-    Raises
-    ------
-    InputError
-        A shutter whose edges are no image coordinates of tables, a line of sensors that is not straight.
-    """
+    """Return the columns of shutters and lines of sensors of a table of cameras."""
     lines = [each if isinstance(each, LineSensor) else None for each in exposures]
     own = [each if isinstance(each, Shutter) else None for each in exposures]
     for camera, line in zip(cameras, lines, strict=True):

@@ -31,17 +31,7 @@ FEWEST = 4
 
 
 def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> str:
-    """Return what is wrong with the pitch of a scanner; nothing where marks are as far apart as they should.
-
-    Parameters
-    ----------
-    photo
-        The photo.
-    places
-        (n, 2) of its marks in the camera's frame.
-    mirrored
-        Whether it is.
-    """
+    """Return an error of the pitch of a scanner; `places` are (n, 2) of the marks in the camera's frame."""
     if len(places) < 2:
         return ""
     *_, m = conformal(places, photo.true, mirrored=mirrored)
@@ -57,18 +47,9 @@ def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> str
 
 
 def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> str:
-    """Return what is said of images beyond a table of distortion, where its curve is worth less than they.
+    """Return a remark on images beyond a table of distortion if the curve is less accurate than they are.
 
-    Parameters
-    ----------
-    camera
-        Of the images; nothing is said where it is not that of the certificate.
-    own
-        The certificate.
-    places
-        (m,) complex, in the camera's frame, mm.
-    sd
-        (m,) standard deviations of the images, mm.
+    `places` are (m,) complex, in the camera's frame, and `sd` (m,) their standard deviations, mm.
     """
     if own.radial is None or own.c is None or len(own.radial.angle) < SHORTEST:
         return ""
@@ -90,17 +71,7 @@ def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats)
 def mark_remarks(
     photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]], found: Sequence[bool | None]
 ) -> list[str]:
-    """Return sentences on what marks show that is hardly what was meant.
-
-    Parameters
-    ----------
-    photos
-        Scanned photos with the readings of their named marks.
-    places
-        Of marks, by the names of cameras and their own.
-    found
-        Of each photo whether its marks alone say that it is mirrored; None where nobody asked them.
-    """
+    """Return sentences on what marks show that is hardly what was meant."""
     said = []
     mirrored = [photo.name for photo, side in zip(photos, found, strict=True) if side]
     if len(mirrored) > max(1.0, len(photos) / 2):

@@ -18,6 +18,7 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
+from photogram.words import phrase
 
 BETTER = 4.0
 """Times by which images must be farther from their places in every other way to lie."""
@@ -95,15 +96,7 @@ class Seen:
         return found
 
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
-        """Yield where images of a photo should be: by its pose, and by that of tie points on another photo.
-
-        Parameters
-        ----------
-        photo
-            Its name.
-        laid
-            Tells of another photo how its film lies, where that is known: asked of few.
-        """
+        """Yield where images of a photo should be: by its pose, and by tie points on another photo."""
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
@@ -158,16 +151,7 @@ def _projected(rays: Floats, c: float) -> Floats:
 def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
     """Return which way to lie brings images where they should be; None where none does, or several do.
 
-    Parameters
-    ----------
-    ways
-        Ways to lie.
-    true
-        (n, 2) true places on the scanner of the marks.
-    images
-        (m, 2) true places of all images of the photo.
-    expected
-        Where some of them should be.
+    `true` are (n, 2) true places of the marks on the scanner, `images` (m, 2) of all images of the photo.
     """
     if len(expected.rows) < 2:
         return None
@@ -319,9 +303,9 @@ class MarkReadings:
         true = photo.true if len(q) else q
         found = is_mirrored(q, true)
         if given is not None and found is not None and found != given:
-            error = self.seen.photos.table.error(
-                photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
-            )
+            message = mirror_message(given, side_residuals(q, true))
+            located = phrase("error.at", what=f"photo {photo.name}", message=message)
+            error = self.seen.photos.table.error(photo.row, located)
             raise ContradictionError.of(error)
         if found is None and given is None and len(q) > 1:
             chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])

@@ -60,14 +60,7 @@ class Scanned:
 
 
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
-    """Read which photos are scanned films or plates, and all that belongs to these.
-
-    Raises
-    ------
-    InputError
-        Films, scanners and marks that are not there, photos that are mirrored against what is given, marks
-        that cannot be told.
-    """
+    """Read which photos are scanned films or plates, and all that belongs to these."""
     photos = seen.photos
     films = [photos.table.texts("film")[row] for row in photos.rows.tolist()]
     scanned = np.array([bool(name) for name in films], dtype=bool)

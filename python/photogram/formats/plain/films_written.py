@@ -33,20 +33,7 @@ class _Marks:
 
 
 class WrittenFilms:
-    """The films of a project as tables have them.
-
-    Parameters
-    ----------
-    project
-        The project.
-    cameras
-        (P,) what the tables call the camera of each photo.
-
-    Raises
-    ------
-    InputError
-        Films of which tables have no place for something: values that differ where a row has one.
-    """
+    """The films of a project as tables have them."""
 
     def __init__(self, project: Project, cameras: Sequence[str]) -> None:
         block = project.block

@@ -47,21 +47,7 @@ class Inertial:
 def grouped(
     tables: Tables, table: ColumnTable, groups: Mapping[str, _Group], what: str
 ) -> list[_Group | None]:
-    """Return the group of each row; None of rows of no group.
-
-    Parameters
-    ----------
-    tables, table
-        The tables, and that of the rows.
-    groups, what
-        Groups by their names, and the table that has them. Without a table `gnss_groups` names of groups
-        stand for nothing; boresights are said nowhere else.
-
-    Raises
-    ------
-    InputError
-        A group that is not there.
-    """
+    """Return the group of each row; None of rows of no group."""
     names = table.texts("group")
     if what in tables.settings.tables or what == "attitude_groups":
         for row, name in enumerate(names):
@@ -71,13 +57,7 @@ def grouped(
 
 
 def antennas(tables: Tables) -> dict[str, Antenna]:
-    """Read the table `gnss_groups`, by the names of groups.
-
-    Raises
-    ------
-    InputError
-        A group that is there twice, other values of what has one name.
-    """
+    """Read the table `gnss_groups`, by the names of groups."""
     table = tables.rows("gnss_groups")
     values = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
     values |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
@@ -110,13 +90,7 @@ def antennas(tables: Tables) -> dict[str, Antenna]:
 
 
 def inertials(tables: Tables) -> dict[str, Inertial]:
-    """Read the table `attitude_groups`, by the names of groups.
-
-    Raises
-    ------
-    InputError
-        A group that is there twice, other values of what has one name.
-    """
+    """Read the table `attitude_groups`, by the names of groups."""
     table = tables.rows("attitude_groups")
     # Both the photo and what carries it have axes as the settings say.
     matrices = tables.turns(table)

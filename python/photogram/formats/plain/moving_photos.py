@@ -39,22 +39,7 @@ def read_timed(
     trajectories: Mapping[str, Trajectory],
     rigs: Mapping[str, Rig],
 ) -> list[Timed]:
-    """Read which photos are on trajectories, or move by themselves.
-
-    Parameters
-    ----------
-    tables, photos
-        The tables, and that of photos.
-    cameras
-        As they stand in their table: whose shutters and lines of sensors photos have.
-    trajectories, rigs
-        By their names.
-
-    Raises
-    ------
-    InputError
-        Names that are not there, line scanners without lines or times, what contradicts itself.
-    """
+    """Read which photos are on trajectories, or move by themselves."""
     table = photos.table
     on, lines = named_of(table, "trajectory", trajectories, "trajectory"), _line_times(tables, photos)
     motions = _motions(tables, table)
@@ -155,15 +140,7 @@ def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
 
 
 def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) -> Photos:
-    """Return photos of which those on trajectories have the poses that these are about, where they have none.
-
-    Parameters
-    ----------
-    photos, timed
-        The photos, and which of them are on trajectories.
-    spheroid
-        Of geographic space; None for rectangular space.
-    """
+    """Return photos of which those on trajectories without a pose have the pose of the trajectory."""
     centres, matrices = photos.centres.copy(), photos.matrices.copy()
     axes = Cartesian(spheroid)
     places = {name: row for row, name in enumerate(photos.names)}

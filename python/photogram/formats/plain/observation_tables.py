@@ -48,24 +48,12 @@ _THROUGH = "through"
 
 @dataclass(frozen=True)
 class _Common:
-    """Unknowns that observations have in common; one that no row of its table has is not known at all.
+    """Unknowns that observations have in common; one that no row of its table has is not known at all."""
 
-    Attributes
-    ----------
-    made
-        Their class; its fields have the values that it has where cells are empty.
-    column
-        What names them in their table, which is called after it, and in those of observations.
-    values
-        Columns of each field: all of a row, or none.
-    sd
-        Columns of standard deviations: free where they are empty.
-    """
-
-    made: type[Unknown]
-    column: str
-    values: Mapping[str, tuple[str, ...]]
-    sd: tuple[str, ...]
+    made: type[Unknown]  # Their class; its fields have the values that it has where cells are empty
+    column: str  # What names them in their table, which is called after it, and in those of observations
+    values: Mapping[str, tuple[str, ...]]  # Columns of each field: all of a row, or none
+    sd: tuple[str, ...]  # Columns of standard deviations: free where they are empty
 
     @property
     def table(self) -> str:
@@ -75,31 +63,18 @@ class _Common:
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of observation.
+    """A kind of observation."""
 
-    Attributes
-    ----------
-    made, table
-        Its class, and the table.
-    points
-        Columns of names of points by the fields that have them.
-    values
-        Columns of each field that was observed: 0 where they are empty and need not be there.
-    sd
-        Components with standard deviations `sd_..` and covariances; none: there is one, `sd`.
-    unknown, common
-        The field of what observations have in common, and what that is.
-    of_photos
-        Whether it is of a photo, or of a trajectory at a time, and has a lever arm there.
-    """
-
-    made: type[Observation]
+    made: type[Observation]  # Its class, and the table
     table: str
-    points: Mapping[str, str]
+    points: Mapping[str, str]  # Columns of names of points by the fields that have them
+    # Columns of each field that was observed: 0 where they are empty and need not be there
     values: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # Components with standard deviations `sd_..` and covariances; none: there is one, `sd`
     sd: tuple[str, ...] = ()
-    unknown: str = ""
+    unknown: str = ""  # The field of what observations have in common, and what that is
     common: _Common | None = None
+    # Whether it is of a photo, or of a trajectory at a time, and has a lever arm there
     of_photos: bool = False
 
     @property
@@ -141,13 +116,7 @@ _KINDS = (
 def read_kinds(
     tables: Tables, transform: Transform, points: Mapping[str, int], subjects: Subjects
 ) -> list[Observation]:
-    """Read the tables of all kinds.
-
-    Raises
-    ------
-    InputError
-        Names that are not there, surfaces that are given by halves, standard deviations that give no weight.
-    """
+    """Read the tables of all kinds."""
     # What several kinds may have is read once, and is the same for all of them.
     commons = {kind.common.table: kind.common for kind in _KINDS if kind.common is not None}
     known = {name: _commons(tables, transform, each) for name, each in commons.items()}

@@ -67,13 +67,7 @@ def read_observations(
     points: Mapping[str, int],
     rigs: Mapping[str, Rig],
 ) -> list[Observation]:
-    """Read all tables of observations beside images.
-
-    Raises
-    ------
-    InputError
-        Names that are not there, values that give no observation.
-    """
+    """Read all tables of observations beside images."""
     return [
         *_gnss(tables, transform, subjects),
         *_velocities(tables, subjects),

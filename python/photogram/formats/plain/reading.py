@@ -63,25 +63,13 @@ _USES = ("control", "check", "off")
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the project of a folder, or of a file of settings.
-
-    Raises
-    ------
-    InputError
-        A table that cannot be read or is missing, cells that are at fault, names that do not belong together.
-    """
+    """Read the project of a folder, or of a file of settings."""
     settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)
     return read_tables(Tables(settings, unread_tables(settings)), wishes)
 
 
 def read_tables(tables: Tables, wishes: Wishes) -> Project:
-    """Read the tables of a project.
-
-    Raises
-    ------
-    InputError
-        As :func:`read`.
-    """
+    """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
         raise InputError("has no table of images (images.csv)", file=settings.path)
@@ -256,13 +244,7 @@ class _Given:
 
 
 def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _Given:
-    """Read a table of control and check points.
-
-    Raises
-    ------
-    InputError
-        A point that is there twice or has no coordinate, a standard deviation that is missing.
-    """
+    """Read a table of control and check points."""
     names = table.names_once("point")
     values = table.vectors(AXES)
     uses = table.words("use", _USES)

@@ -31,13 +31,7 @@ ZERO = 1e-6
 
 
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
-    """Read rigs: the first sensor of each is the frame; sensors are called by their cameras, or otherwise.
-
-    Raises
-    ------
-    InputError
-        Cameras that are not there, sensors that are there twice, a first sensor with a pose.
-    """
+    """Read rigs: the first sensor of each is the frame; sensors are called by their cameras, or otherwise."""
     table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
@@ -81,20 +75,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
 def read_frames(
     tables: Tables, rigs: Mapping[str, Rig], photos: Sequence[str], cameras: Sequence[str]
 ) -> list[FrameOf]:
-    """Read which photos were taken together.
-
-    Parameters
-    ----------
-    tables, rigs
-        The tables, and the rigs by name.
-    photos, cameras
-        Names of photos, and of the camera of each.
-
-    Raises
-    ------
-    InputError
-        Rigs, photos and sensors that are not there, two photos of a sensor on one frame.
-    """
+    """Read which photos were taken together."""
     table = tables.rows("frames")
     rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
@@ -118,13 +99,7 @@ def read_frames(
 
 
 def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> str:
-    """Return what a rig calls the sensor of a photo: as the row says, else as the camera.
-
-    Raises
-    ------
-    InputError
-        The rig does not have it.
-    """
+    """Return what a rig calls the sensor of a photo: as the row says, else as the camera."""
     sensor = own or camera
     if sensor != rig.reference and sensor not in rig.sensors:
         what = "sensor" if own else "camera"
@@ -145,13 +120,7 @@ def times_said(photos: Sequence[str], times: Floats) -> dict[str, float]:
 
 
 def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
-    """Read distances between sensors of rigs.
-
-    Raises
-    ------
-    InputError
-        Rigs and sensors that are not there, values that give no observation.
-    """
+    """Read distances between sensors of rigs."""
     table = tables.rows("bases")
     lengths = table.numbers("distance")
     sd = tables.deviations(table, "bases", ["sd"])[:, 0]
@@ -183,22 +152,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
 
 
 class Rigs:
-    """The rigs of a block, whose sensors are called by the cameras of their photos where these tell them.
-
-    Parameters
-    ----------
-    block
-        The block.
-    cameras
-        The name of each photo's camera.
-    times
-        When photos on frames were taken, where that is known.
-
-    Attributes
-    ----------
-    lost
-        Bases of sensors that took no photo: no frame says what they are on.
-    """
+    """The rigs of a block, whose sensors are called by the cameras of their photos where these tell them."""
 
     def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
         self._times = times

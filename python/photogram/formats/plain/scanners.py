@@ -66,13 +66,7 @@ class FilmKind:
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
-    """Read the table of scanners; nothing where there is none.
-
-    Raises
-    ------
-    InputError
-        Numbers that are none, a covariance of components that a scanner has not.
-    """
+    """Read the table of scanners; nothing where there is none."""
     table = tables.rows("scanners")
     names = table.names_once("scanner")
     counts = table.given(("pitch_mm", "origin_column", "origin_row"))
@@ -181,22 +175,7 @@ def _machine(
 
 
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
-    """Read the table of films; those that are not in it have the defaults.
-
-    Parameters
-    ----------
-    tables
-        The tables.
-    names
-        Of the films that photos name.
-    default
-        The model of films that say none.
-
-    Raises
-    ------
-    InputError
-        Patterns and models that there are not, numbers that are none.
-    """
+    """Read the table of films; those that are not in it have the defaults."""
     table = tables.rows("films")
     found = {
         name: FilmKind(Roll(name, 0.0, 5e-4), default, (1e-4,) * 3, _bends(default), None) for name in names

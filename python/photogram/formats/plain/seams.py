@@ -34,13 +34,7 @@ Seams = Mapping[str, Seam]
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:
-    """Return tables whose joined scans are divided, and the seams.
-
-    Raises
-    ------
-    InputError
-        A seam of a photo that has no film, or along both columns and rows.
-    """
+    """Return tables whose joined scans are divided, and the seams."""
     table = tables.read("photos")
     found: dict[str, Seam] = {}
     if table is None or not any(f"seam_{line}" in table for line in _LINES):

@@ -66,71 +66,41 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What `project.toml` says, or tables that come without one: all that it leaves out has its default.
+    """What `project.toml` says, or tables that come without one: all that it leaves out has its default."""
 
-    Attributes
-    ----------
-    path
-        The file, or what errors name where there is none.
-    name
-        Of the project.
-    frame, options
-        As in a project.
-    length, angle, image
-        Units.
-    image_y, pixel_origin, attitude, rotation, photo
-        Axes.
-    time_origin, time_scale
-        What seconds of all tables count from, a number or a date, and of which scale: said, not calculated
-        with.
-    sd
-        Standard deviations of tables without columns for them: three numbers, of images two.
-    tables
-        The file of each table that is there.
-    crs
-        Of tables whose coordinates are not in the frame.
-    columns
-        What is said of the columns of tables of points, as `--columns` and `--roles` say it.
-    features
-        By their names, as :func:`photogram.features` takes them.
-    photo_files
-        Where photographs lie whose files carry positions; None without.
-    statement
-        What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it.
-    film, interior
-        The model of films that say none; whether their interior orientation is unknown inside the adjustment,
-        or fitted before it and errorless.
-    certificates
-        The files of the certificates of the cameras of films.
-    flown
-        The day of the flight; None where it is not said.
-    """
-
-    path: Path
-    name: str = ""
-    frame: Frame = field(default_factory=Frame)
+    path: Path  # The file, or what errors name where there is none
+    name: str = ""  # Of the project
+    frame: Frame = field(default_factory=Frame)  # As in a project
     options: Options = field(default_factory=Options)
-    length: str = "m"
+    length: str = "m"  # Units
     angle: str = "deg"
     image: str = "px"
-    image_y: str = ""
+    image_y: str = ""  # Axes
     pixel_origin: str = "corner"
     attitude: str = "omega_phi_kappa"
     rotation: str = "object_to_photo"
     photo: str = "y_up"
+    # What seconds of all tables count from, a number or a date, and of which scale: said, not
+    # calculated with
     time_origin: float | str = 0.0
     time_scale: str = "none"
+    # Standard deviations of tables without columns for them: three numbers, of images two
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    tables: Mapping[str, Path] = field(default_factory=dict)
-    crs: Mapping[str, str] = field(default_factory=dict)
+    tables: Mapping[str, Path] = field(default_factory=dict)  # The file of each table that is there
+    crs: Mapping[str, str] = field(default_factory=dict)  # Of tables whose coordinates are not in the frame
+    # What is said of the columns of tables of points, as `--columns` and `--roles` say it
     columns: Mapping[str, Columns] = field(default_factory=dict)
+    # By their names, as :func:`photogram.features` takes them
     features: Mapping[str, Definition] = field(default_factory=dict)
-    photo_files: PhotoFiles | None = None
+    photo_files: PhotoFiles | None = None  # Where photographs lie whose files carry positions; None without
+    # What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it
     statement: Mapping[str, Any] = field(default_factory=dict)
+    # The model of films that say none; whether their interior orientation is unknown inside the
+    # adjustment, or fitted before it and errorless
     film: str = "affine"
     interior: str = "inside"
-    certificates: tuple[Path, ...] = ()
-    flown: date | None = None
+    certificates: tuple[Path, ...] = ()  # The files of the certificates of the cameras of films
+    flown: date | None = None  # The day of the flight; None where it is not said
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -147,21 +117,7 @@ class Settings:
 
 
 def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
-    """Read a file of settings, and find the tables that it names or that lie beside it.
-
-    Parameters
-    ----------
-    path
-        The file.
-    wishes
-        What a user says in its place: keys, standard deviations, columns of control.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or is no TOML; a section or key that there is not, with the nearest one; a
-        value that cannot be; two files of one table.
-    """
+    """Read a file of settings, and find the tables that it names or that lie beside it."""
     wishes = wishes or Wishes()
     file = _File(path, wishes.settings)
     file.check_keys(_KEYS)

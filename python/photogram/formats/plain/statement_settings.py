@@ -33,20 +33,7 @@ SOME_LENGTH = {"line": "1", "from": "A", "to": "B", "length": 1.0, "sd": 0.0}
 
 
 def read_asked(file: Sections, unit: str) -> dict[str, Any]:
-    """Return what the sections ask, as :meth:`photogram.Result.statement` takes it.
-
-    Parameters
-    ----------
-    file
-        The settings, whose sections and keys are known.
-    unit
-        The linear unit of the project.
-
-    Raises
-    ------
-    InputError
-        A value that cannot be, with its line; a file of sentences that is not there, or at fault.
-    """
+    """Return what the sections ask, as :meth:`photogram.Result.statement` takes it."""
     found: dict[str, Any] = {}
     for section, keys in KEYS.items():
         for key in keys:
@@ -133,15 +120,7 @@ def _sentences(file: Sections, section: str, key: str) -> dict[str, str]:
 
 
 def asked_lines(asked: Mapping[str, Any], unit: str) -> list[str]:
-    """Return the lines of the sections, which :func:`read_asked` reads again; none where nothing is asked.
-
-    Parameters
-    ----------
-    asked
-        As :func:`read_asked` returns it; what else it has stands in tables.
-    unit
-        The linear unit of the project.
-    """
+    """Return the lines of the sections, which :func:`read_asked` reads again; none where nothing is asked."""
     found = []
     for section, keys in KEYS.items():
         lines = [f"{key} = {_written(own)}" for key in keys if (own := _said(asked, key, unit)) is not None]
@@ -186,19 +165,7 @@ def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def read_sentences(path: Path) -> dict[str, str]:
-    """Return the sentences of a file by their keys (section 5 of the specification of the statement).
-
-    Parameters
-    ----------
-    path
-        A file of TOML, flat, with keys in quotation marks: `"asprs.tested.h" = "Tested with {n} points."`.
-
-    Raises
-    ------
-    InputError
-        It cannot be read or is no TOML; a key that there is not, with the nearest one; what is no sentence,
-        or has fields that the sentence of the program does not have.
-    """
+    """Return the sentences of a TOML file by their keys: `"asprs.tested.h" = "Tested with {n} points."`."""
     file = TomlFile(path)
     for key, sentence in file.content.items():
         if isinstance(sentence, dict):

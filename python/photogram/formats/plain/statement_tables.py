@@ -19,20 +19,7 @@ COVERS = ("open", "vegetated")
 
 
 def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) -> frozenset[str]:
-    """Return the check points of a table of control that lie in vegetation.
-
-    Parameters
-    ----------
-    table
-        The table.
-    names, uses
-        Its points, and what each is: `control`, `check`, `off`.
-
-    Raises
-    ------
-    InputError
-        Another word; a control point in vegetation.
-    """
+    """Return the check points of a table of control that lie in vegetation."""
     found = []
     for row, word in enumerate(table.words("cover", COVERS)):
         if word == COVERS[0]:
@@ -45,22 +32,7 @@ def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) ->
 
 
 def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str]) -> dict[str, Any]:
-    """Return what a project asks of its statement, as :meth:`photogram.Result.statement` takes it.
-
-    Parameters
-    ----------
-    tables
-        Of the project; its settings have what `[check]` and `[statement]` say.
-    points
-        Rows of all points by their names.
-    vegetated
-        Check points in vegetation.
-
-    Raises
-    ------
-    InputError
-        Points that are not there, lengths at fault, or none where a standard is about them.
-    """
+    """Return what a project asks of its statement, as :meth:`photogram.Result.statement` takes it."""
     found, path = dict(tables.settings.statement), tables.settings.path
     for name in found.get("without", ()):
         if name not in points:
@@ -121,15 +93,7 @@ def with_cover(
 
 
 def asked_by_other_names(asked: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-    """Return what is asked where points have other names.
-
-    Parameters
-    ----------
-    asked
-        As :meth:`photogram.Result.statement` takes it.
-    names
-        The new name of each point.
-    """
+    """Return what is asked where points have other names."""
     found = dict(asked)
     if "vegetated" in found:
         found["vegetated"] = frozenset(names.get(each, each) for each in found["vegetated"])

@@ -31,11 +31,6 @@ class Subjects:
         """Return what each row is of, as arguments of its observation; None of those that are left out.
 
         These are at times that their trajectory does not reach; a remark has their number.
-
-        Raises
-        ------
-        InputError
-            Names that are not there, both or none of a photo and a trajectory, a trajectory without a time.
         """
         if "trajectory" not in table:
             names, rows = list(self.photos), indices_of(table, "photo", self.photos, "photo").tolist()
@@ -66,13 +61,7 @@ class Subjects:
 
 
 def clocked(table: ColumnTable, row: int, of: Mapping[str, Any], clock: Clock | None) -> dict[str, Any]:
-    """Return what an observation is of, with its clock.
-
-    Raises
-    ------
-    InputError
-        A clock of what is of a photo.
-    """
+    """Return what an observation is of, with its clock."""
     if clock is None:
         return dict(of)
     if "trajectory" not in of:
@@ -107,11 +96,6 @@ def scalars(
     """Return the clock of each row, or the factor of its line rate, as a rule 1; None where nothing is said.
 
     One without a name is called by its title.
-
-    Raises
-    ------
-    InputError
-        Values that are no numbers, another value of what a row before has of the same name.
     """
     word, number = _COLUMNS[kind]
     values, sd = table.numbers(number, usual), table.numbers(f"sd_{number}", 0.0, infinite=True)

@@ -48,33 +48,15 @@ def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Tables:
-    """The tables of a project with its settings, read as they are asked for; collects remarks.
+    """The tables of a project with its settings, read as they are asked for; collects remarks."""
 
-    Attributes
-    ----------
-    settings
-        Of the project.
-    messages
-        Remarks.
-    names
-        Points that have images, where they are known before the tables are read.
-    shared
-        Common unknowns that rows of all tables name.
-    """
-
-    settings: Settings
-    messages: list[Message]
-    names: Collection[str] = ()
-    shared: Shared = field(default_factory=Shared)
+    settings: Settings  # Of the project
+    messages: list[Message]  # Remarks
+    names: Collection[str] = ()  # Points that have images, where they are known before the tables are read
+    shared: Shared = field(default_factory=Shared)  # Common unknowns that rows of all tables name
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there.
-
-        Raises
-        ------
-        InputError
-            It cannot be read, or a column is missing.
-        """
+        """Return a table that is there."""
         if name not in self.settings.tables:
             return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
         schema, path = TABLES[name], self.settings.tables[name]
@@ -135,13 +117,7 @@ class Tables:
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
     def attitudes(self, table: ColumnTable) -> Floats:
-        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none.
-
-        Raises
-        ------
-        InputError
-            Columns of another representation than that of the settings, rows with some of the numbers only.
-        """
+        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none."""
         names = ANGLES[self.settings.attitude]
         others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
@@ -211,13 +187,7 @@ class Tables:
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
     ) -> Floats:
-        """Return (rows, k) standard deviations: of the table, else of `[sd]`, else the default.
-
-        Raises
-        ------
-        InputError
-            Negative ones.
-        """
+        """Return (rows, k) standard deviations: of the table, else of `[sd]`, else the default."""
         given = self.settings.sd.get(kind)
         defaults = (
             [default] * len(columns)
@@ -263,18 +233,9 @@ def covariances_of(
     names: Sequence[str] = AXES,
     units: Sequence[float] | None = None,
 ) -> Floats:
-    """Return (n, k, k) covariances from standard deviations and the columns cov_xy ... of a table.
+    """Return (n, k, k) covariances from standard deviations (n, k) and the columns cov_xy ... of a table.
 
-    Parameters
-    ----------
-    sd
-        (n, k) in our units.
-    table
-        The table; None for one without such columns.
-    names
-        Of the components.
-    units
-        What a number of the table is in our unit of each component; None: the same.
+    `units` are what a number of the table is in our unit of each component; None: the same.
     """
     count = len(names)
     found = np.zeros((len(sd), count, count))
@@ -287,13 +248,7 @@ def covariances_of(
 
 
 def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind: str) -> Indices:
-    """Return (rows,) which of the named things each row is of.
-
-    Raises
-    ------
-    InputError
-        A name that is not there.
-    """
+    """Return (rows,) which of the named things each row is of."""
     found = table.names(column)
     rows = np.array([places.get(name, -1) for name in found.names], dtype=np.int64)
     if (rows < 0).any():
@@ -304,13 +259,7 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
 
 
 def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind: str) -> list[_Named | None]:
-    """Return which of the named things each row names; None where the cell is empty.
-
-    Raises
-    ------
-    InputError
-        A name that is not there.
-    """
+    """Return which of the named things each row names; None where the cell is empty."""
     names = table.texts(column)
     for row, name in enumerate(names):
         if name and name not in known:

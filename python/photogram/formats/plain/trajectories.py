@@ -38,14 +38,7 @@ Groups = Mapping[tuple[str, ...], Indices]
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
-    """Read trajectories, by their names.
-
-    Raises
-    ------
-    InputError
-        Names that are not there, times that do not increase, trajectories without records, bases that are
-        none, coefficients that a basis does not have.
-    """
+    """Read trajectories, by their names."""
     table = tables.read("trajectories")
     if table is None:
         if there := [each for each in _OTHERS if each in tables.settings.tables]:
@@ -73,13 +66,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
 
 
 def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
-    """Return the rows of each trajectory or, with `bases`, of each of its bases.
-
-    Raises
-    ------
-    InputError
-        Trajectories and bases that are not there.
-    """
+    """Return the rows of each trajectory or, with `bases`, of each of its bases."""
     indices_of(table, "trajectory", places, "trajectory")
     words: Sequence[Sequence[str]] = [table.texts("trajectory")]
     if bases:
@@ -256,13 +243,7 @@ class _Bases:
 
 
 def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> list[Observation]:
-    """Read sums of neighbouring coefficients.
-
-    Raises
-    ------
-    InputError
-        Trajectories and coefficients that are not there, standard deviations that give no weight.
-    """
+    """Read sums of neighbouring coefficients."""
     table = tables.rows("smoothness")
     groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
     sd = tables.deviations(table, "smoothness", SD_AXES)

@@ -29,13 +29,7 @@ Place = tuple[str, str, int]
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectories of a block that are not those of single photos, each once.
-
-    Raises
-    ------
-    InputError
-        Two of one name.
-    """
+    """Return the trajectories of a block that are not those of single photos, each once."""
     own = [each.trajectory for each in block.timed if each.trajectory is not None]
     found = all_trajectories(own, block.observations)
     names = [each.name for each in found]
@@ -46,13 +40,7 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
 
 
 def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block; none where there are none.
-
-    Raises
-    ------
-    InputError
-        Two trajectories of one name.
-    """
+    """Return the tables of the trajectories of a block; none where there are none."""
     own = shared_trajectories(block)
     if not own:
         return {}

@@ -18,15 +18,7 @@ _HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone befo
 
 
 class Transform:
-    """What carries coordinates of tables into the frame, in units of the house.
-
-    Parameters
-    ----------
-    settings
-        With the frame, and the systems of tables.
-    messages
-        Where remarks go.
-    """
+    """What carries coordinates of tables into the frame, in units of the house."""
 
     def __init__(self, settings: Settings, messages: list[Message]) -> None:
         self.settings, self._messages = settings, messages
@@ -35,24 +27,7 @@ class Transform:
     def positions(
         self, name: str, values: Floats, covariances: Floats | None, table: ColumnTable
     ) -> tuple[Floats, Floats]:
-        """Return positions of a table in the frame, and their covariances.
-
-        Parameters
-        ----------
-        name
-            Of the table.
-        values
-            (n, 3) as the table has them; NaN where not given.
-        covariances
-            (n, 3, 3) along the axes of the table's system: metres.
-        table
-            For errors.
-
-        Raises
-        ------
-        InputError
-            A system that PROJ does not know, positions beyond it or with some coordinates only.
-        """
+        """Return (n, 3) positions of a table in the frame, and their (n, 3, 3) covariances, m2."""
         own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
         crs = self.settings.crs.get(name, "")
         if not crs:

@@ -87,13 +87,7 @@ def attitude_matrices(block: Block) -> Floats:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the files of a project.
-
-    Raises
-    ------
-    InputError
-        Cameras in pixels that count from corner and middle both, without the size of their pictures.
-    """
+    """Return the files of a project."""
     block = project.block
     cameras, photo_cameras = known_cameras(block)
     rigs = Rigs(block, [cameras[row].name for row in photo_cameras], _times_of(project))

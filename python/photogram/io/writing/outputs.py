@@ -119,11 +119,6 @@ class OutputSet:
 
     Symbolic links are followed and stay; what is no regular file is written through: at once by :meth:`open`,
     before the files are put in place by :meth:`write`.
-
-    Parameters
-    ----------
-    inputs
-        Files that are read: none is written over.
     """
 
     def __init__(self, inputs: Iterable[Path] = ()) -> None:

@@ -87,13 +87,6 @@ class Guard:
     """Refuses outputs that are inputs, directories, or one another, by whatever name.
 
     What is no regular file (a FIFO, a device) is written through and may be anything.
-
-    Parameters
-    ----------
-    inputs
-        The files that are read; those that are not there do not matter.
-    directories
-        Directories that are made for results if need be.
     """
 
     def __init__(self, inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:

@@ -40,23 +40,12 @@ EXACT = 5000
 
 @dataclass(frozen=True)
 class Source:
-    """A group of observations and what it contributes.
+    """A group of observations and what it contributes."""
 
-    Attributes
-    ----------
-    level
-        `kind`, `strip`, `camera`, `photo`, `point` or `parameter`.
-    subject
-        Its name; of parameters as a message.
-    number
-        How many rows.
-    contribution, share
-        u_k^2 in the square of the unit of the quantity, and over u^2.
-    """
-
-    level: str
-    subject: Phrase | str
-    number: int
+    level: str  # `kind`, `strip`, `camera`, `photo`, `point` or `parameter`
+    subject: Phrase | str  # Its name; of parameters as a message
+    number: int  # Number of rows
+    # u_k^2 in the squared unit of the quantity, and its ratio to u^2
     contribution: float
     share: float
 
@@ -76,88 +65,47 @@ class Source:
 
 @dataclass(frozen=True)
 class Single:
-    """A single observation.
+    """A single observation."""
 
-    Attributes
-    ----------
-    observation
-        Its kind, of what, and its component.
-    sd
-        A priori, in its unit.
-    sensitivity
-        df/dl: units of the quantity for one of the observation.
-    contribution, share
-        As of a source.
-    """
-
-    observation: tuple[str, ...]
-    sd: float
-    sensitivity: float
+    observation: tuple[str, ...]  # Kind, names, component
+    sd: float  # A priori, in its unit
+    sensitivity: float  # df/dl: units of the quantity for one of the observation
+    # As in `Source`
     contribution: float
     share: float
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """Effective degrees of freedom of a standard deviation.
+    """Effective degrees of freedom of a standard deviation."""
 
-    Attributes
-    ----------
-    basis
-        `given`, `unit variance` or `components`: what standard deviations rest on.
-    used
-        What k comes from; infinite for given weights.
-    common
-        Those of the unit variance.
-    of_kind
-        nu_k = 2 / cov_kk of estimated components, by group.
-    joint, welch_satterthwaite
-        2 u^4 / (c' cov c), and u^4 / sum(u_k^4 / nu_k); NaN where nothing was, or can be, estimated.
-    """
-
-    basis: str
-    used: float
-    common: float
+    basis: str  # Basis of standard deviations: `given`, `unit variance`, `components`
+    used: float  # Degrees of freedom for k; infinite for given weights
+    common: float  # Degrees of freedom of the unit variance
+    # nu_k = 2 / cov_kk of estimated components, by group
     of_kind: dict[str, float] = field(default_factory=dict)
+    # 2 u^4 / (c' cov c), and u^4 / sum(u_k^4 / nu_k); NaN if not estimated
     joint: float = math.nan
     welch_satterthwaite: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The budget of a quantity.
+    """The budget of a quantity."""
 
-    Attributes
-    ----------
-    quantity, subject, unit
-        As asked for, the same as a message, and the unit of its value.
-    value, sd
-        The adjusted value and its standard deviation u.
-    cofactor
-        u^2 / s2.
-    sources
-        Groups of observations at all levels; those of the level `kind` sum to u^2.
-    largest
-        The five largest single observations.
-    freedom
-        Effective degrees of freedom.
-    k, expanded
-        The coverage factor (Student, degrees of freedom cut to a whole number) and U = k u.
-    coverage
-        The probability of U.
-    """
-
+    # Requested text, its phrase, unit of the value
     quantity: str
     subject: Phrase
     unit: str
+    # The adjusted value and its standard deviation u
     value: float
     sd: float
-    cofactor: float
-    sources: tuple[Source, ...]
-    largest: tuple[Single, ...]
-    freedom: Freedom
-    k: float
-    coverage: float
+    cofactor: float  # u^2 / s2
+    sources: tuple[Source, ...]  # Groups of observations at all levels; those of the level `kind` sum to u^2
+    largest: tuple[Single, ...]  # The five largest single observations
+    freedom: Freedom  # Effective degrees of freedom
+    k: float  # The coverage factor (Student, degrees of freedom cut to a whole number) and U = k u
+    coverage: float  # The probability of U
 
     @property
     def expanded(self) -> float:

@@ -40,46 +40,26 @@ SAME_PLACE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """The n check points of a block, in the linear unit, along east, north, up.
+    """The n check points of a block, in the linear unit, along east, north, up."""
 
-    Attributes
-    ----------
-    names
-        What they are called.
-    vegetated
-        (n,) whether they lie in vegetation.
-    given
-        (n, 3) coordinates as given, in the axes of the block.
-    given_places, places
-        (n, 3) of them, and of the adjusted points, as east, north and height.
-    differences
-        (n, 3) adjusted minus given; NaN where nothing is given.
-    product, survey
-        (3 n, 3 n) s2 Q of the adjusted points, and S of their survey; rows of what is not given are zero in
-        S.
-    survey_sd, common_sd
-        (n, 3) standard deviations of the survey without what all points share, and (3,) of that.
-    scale, second
-        s2, and the degrees of freedom with which it was estimated: infinite where the unit weight is known.
-    known, step
-        Of how many check points every `step`th is taken: their joint covariance is dense.
-    not_usable
-        Names of known points that say nothing, with the reason.
-    """
-
-    names: tuple[str, ...]
-    vegetated: Bools
-    given: Floats
+    names: tuple[str, ...]  # Names of the points
+    vegetated: Bools  # (n,) whether in vegetation
+    given: Floats  # (n, 3) given coordinates in the axes of the block
+    # (n, 3) given and adjusted coordinates as east, north, height
     given_places: Floats
     places: Floats
-    differences: Floats
+    differences: Floats  # (n, 3) adjusted minus given; NaN if not given
+    # (3 n, 3 n) s2 Q of the adjusted points, and S of the survey; rows of S are zero if not given
     product: Floats
     survey: Floats
+    # (n, 3) standard deviations of the survey without its common error, (3,) of the common error
     survey_sd: Floats
     common_sd: Floats
+    # s2 and its degrees of freedom: infinite if the unit weight is known
     scale: float
     second: float
-    not_usable: tuple[tuple[str, str], ...] = ()
+    not_usable: tuple[tuple[str, str], ...] = ()  # Unusable points and the reasons
+    # Number of all check points; every `step`th is used, because the joint covariance is dense
     known: int = 0
     step: int = 1
 

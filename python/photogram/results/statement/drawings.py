@@ -11,6 +11,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.results.footprints import footprints
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
+from photogram.results.statement.texts import Texts
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar, around, spread
 from photogram.show.sketch.marks import (
@@ -43,36 +44,36 @@ CELLS = 120
 """Of the longer side of the map of overlap."""
 
 
-def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Plot | None:
+def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
     """Draw (k, 3) control, check points, their differences in plan, and those in height as colours."""
     if not len(found) and not len(control):
         return None
     places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
     extent = np.ptp(places, axis=0)
-    panel = _in_plan(around(places, 0.12), labels)
+    panel = _in_plan(around(places, 0.12), texts)
     marks = list[Mark]()
     if len(control):
-        marks.append(Markers(control[:, :2], "^", 6.0, SOFT, label=labels["control"]))
+        marks.append(Markers(control[:, :2], "^", 6.0, SOFT, label=texts("use.control")))
     if len(found):
-        panel = _points(panel, found, float(extent.max()), labels)
+        panel = _points(panel, found, float(extent.max()), texts)
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
     return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
 
 
-def _in_plan(limits: Floats, labels: dict[str, str]) -> Panel:
-    across, up = (f"{labels[axis]}, {labels['unit']}" for axis in ("east", "north"))
-    return Panel(limits, across=across, up=up, equal=True, decimal=labels["decimal"])
+def _in_plan(limits: Floats, texts: Texts) -> Panel:
+    across, up = (f"{texts(f'column.{axis}')}, {texts.unit}" for axis in ("east", "north"))
+    return Panel(limits, across=across, up=up, equal=True, decimal=texts("number.decimal"))
 
 
-def _points(panel: Panel, found: Compared, extent: float, labels: dict[str, str]) -> Panel:
+def _points(panel: Panel, found: Compared, extent: float, texts: Texts) -> Panel:
     """Return a panel with check points, their differences and ellipses, and the scales of these."""
     plan, d = found.places[:, :2], found.differences
     heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
     most = max(float(np.abs(heights).max()), 1e-12)
-    shades = Shades(-most, most, f"{labels['height']}, {labels['unit']}", "signed")
+    shades = Shades(-most, most, f"{texts('component.h')}, {texts.unit}", "signed")
     marks: list[Mark] = [
         Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
-        Markers(plan, "s", 5.1, face="none", edge=0.5, label=labels["check"], layer=3.5),
+        Markers(plan, "s", 5.1, face="none", edge=0.5, label=texts("use.check"), layer=3.5),
     ]
     bars: list[ScaleBar] = []
     both = np.isfinite(d[:, :2]).all(axis=1)
@@ -85,14 +86,14 @@ def _points(panel: Panel, found: Compared, extent: float, labels: dict[str, str]
             Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
         ]
         length = round_length(largest)
-        sizes = (f"{size:.3g} {labels['unit']}" for size in (length, length * scale))
-        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", labels["decimal"])))
+        sizes = (f"{size:.3g} {texts.unit}" for size in (length, length * scale))
+        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", texts("number.decimal"))))
     if len(found) <= NAMED:
         marks.append(Names(plan, found.names, [SOFT] * len(found)))
     return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
-def lengths(found: Lengths, labels: dict[str, str]) -> Plot:
+def lengths(found: Lengths, texts: Texts) -> Plot:
     """Draw errors of calibrated lengths over these, with one standard deviation, and their limits."""
     test, order = found.test, np.argsort(found.calibrated, kind="stable")
     places = np.column_stack([found.calibrated, test.errors])
@@ -108,11 +109,11 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Plot:
             line = np.column_stack([found.calibrated, limit])[order]
             marks.append(Line(line, VERMILION, 0.9, "--"))
     limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
-    across, up = (f"{labels[name]}, {labels['unit']}" for name in ("length", "error"))
-    return Plot(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=labels["decimal"])])
+    across, up = (f"{texts(f'column.{name}')}, {texts.unit}" for name in ("length", "error"))
+    return Plot(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=texts("number.decimal"))])
 
 
-def overlap(result: Result, labels: dict[str, str]) -> Plot | None:
+def overlap(result: Result, texts: Texts) -> Plot | None:
     """Draw how many adjusted photos see each place of the ground; None without footprints."""
     outlines = footprints(result).outlines[:, :, :2]
     outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
@@ -124,10 +125,10 @@ def overlap(result: Result, labels: dict[str, str]) -> Plot | None:
         return None
     x, y = (np.arange(low[k] + cell / 2, high[k], cell) for k in (0, 1))
     counts = photos_per_place(outlines, x, y)
-    shades = Shades(0.0, float(counts.max()) or 1.0, labels["photos"])
+    shades = Shades(0.0, float(counts.max()) or 1.0, texts("column.photos"))
     corners = np.array([low, low + cell * np.array([len(x), len(y)])])
     cells = Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
-    panel = replace(_in_plan(corners, labels), marks=[cells], shades=shades)
+    panel = replace(_in_plan(corners, texts), marks=[cells], shades=shades)
     return Plot(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])
 
 

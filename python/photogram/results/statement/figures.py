@@ -39,92 +39,53 @@ INSIDE = 0.95
 
 @dataclass(frozen=True)
 class Sized:
-    """The differences of a component (`e`, `n`, `h`), radial in plan (`plan`) or in space (`all`).
+    """The differences of a component (`e`, `n`, `h`), radial in plan (`plan`) or in space (`all`)."""
 
-    Attributes
-    ----------
-    n
-        How many.
-    mean, sd
-        Of components; NaN for radial figures, and the sd of one point.
-    rmse
-        Root mean square.
-    largest, point
-        The largest, and whose it is.
-    """
-
-    n: int
+    n: int  # Number of differences
+    # Of components; NaN for radial figures; the sd is NaN for one point
     mean: float
     sd: float
-    rmse: float
+    rmse: float  # Root mean square
+    # The largest difference and its point
     largest: float
     point: str
 
 
 @dataclass(frozen=True)
 class Radius:
-    """A radius of a probability from a sample.
+    """A radius of a probability from a sample."""
 
-    Attributes
-    ----------
-    order, sample
-        k = ceil(p n), and the k-th smallest: NaN without points.
-    upper_order, upper
-        The order whose value exceeds the quantile with 95 percent, points taken as independent; None where
-        there are too few.
-    """
-
+    # k = ceil(p n), and the k-th smallest: NaN without points
     order: int
     sample: float
+    # Order statistic that exceeds the quantile with 95 percent probability if points are independent; None
+    # if there are too few
     upper_order: int | None
     upper: float | None
 
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """All figures of check points.
+    """All figures of check points."""
 
-    Attributes
-    ----------
-    n
-        How many points.
-    parts
-        By `e`, `n`, `h`, `plan`, `all`.
-    rmse_h1, rmse_v1, rmse_h2, rmse_v2
-        Found in plan (radial) and in height, and of the survey.
-    prediction
-        By part; see :mod:`photogram.results.statement.honest`.
-    bias
-        By component.
-    points
-        Tests of single points.
-    inside
-        How many points lie inside 95 percent in height, and in space.
-    radii
-        `ce90`, `le90`, `ce95`, `le95` of the sample.
-    moments, of_moments
-        (2, 2) `sum d d' / n` in plan, and the same radii from moments, the bias inside.
-    mixture
-        `ce90`, `le90` for which the mean probability over the points is 90 percent, by s2 Q_ii.
-    surface
-        Of the heights.
-    """
-
-    n: int
-    parts: dict[str, Sized | None]
+    n: int  # Number of points
+    parts: dict[str, Sized | None]  # By `e`, `n`, `h`, `plan`, `all`
+    # In plan (radial) and height; 1: of differences, 2: of the survey
     rmse_h1: float
     rmse_v1: float
     rmse_h2: float
     rmse_v2: float
-    prediction: dict[str, Prediction | None]
-    bias: dict[str, Bias | None]
-    points: PointTests
-    inside: dict[str, int]
-    radii: dict[str, Radius | None]
+    prediction: dict[str, Prediction | None]  # By part; see :mod:`photogram.results.statement.honest`
+    bias: dict[str, Bias | None]  # By component
+    points: PointTests  # Tests of single points
+    inside: dict[str, int]  # Number of points inside 95 percent in height, and in space
+    radii: dict[str, Radius | None]  # `ce90`, `le90`, `ce95`, `le95` of the sample
+    # (2, 2) `sum d d' / n` in plan, and the same radii from moments, the bias inside
     moments: Floats
     of_moments: dict[str, float]
+    # `ce90`, `le90` from s2 Q_ii: the mean probability of the points is 90 percent
     mixture: dict[str, float]
-    surface: Surface | None
+    surface: Surface | None  # Of the heights
 
     @property
     def rmse_h(self) -> float:

@@ -19,45 +19,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class System:
-    """A system of coordinates for people.
+    """A system of coordinates for people."""
 
-    Attributes
-    ----------
-    crs
-        What it is called; empty for the block's own.
-    axes
-        Names and units of its three coordinates.
-    carried
-        Takes (n, 3) positions of the block there; angles in degrees.
-    """
-
-    crs: str
-    axes: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]
-    carried: Callable[[Floats], Floats]
+    crs: str  # Name; empty for the system of the block
+    axes: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]  # Names and units of its three coordinates
+    carried: Callable[[Floats], Floats]  # Transforms (n, 3) positions of the block; angles in degrees
 
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Points that were given.
+    """Points that were given."""
 
-    Attributes
-    ----------
-    names, kinds
-        n names, and `control` or `check` of each.
-    positions, sd
-        (n, 3) in the system, and standard deviations along the axes of the block.
-    checks
-        (k, 3) positions of the check points of the statement in the system.
-    system
-        The system; None without points.
-    """
-
+    # n names; `control` or `check`
     names: tuple[str, ...]
     kinds: tuple[str, ...]
+    # (n, 3) in the system; standard deviations along the axes of the block
     positions: Floats
     sd: Floats
-    checks: Floats
-    system: System | None
+    checks: Floats  # (k, 3) positions of the check points of the statement in the system
+    system: System | None  # None without points
 
 
 NOTHING = Survey((), (), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), None)

@@ -10,7 +10,6 @@ import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
-from photogram.results.statement import translation
 from photogram.results.statement.budget import Budget
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures, root_mean
@@ -24,6 +23,7 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
+MAX_FIXED_VALUES = 20  # Of a sentence
 Said = list[tuple[str, str]]
 """Keys of the table of words, and texts."""
 
@@ -126,7 +126,7 @@ def _weights(found: Grounds) -> Said:
     test, components = result.global_test, found.asked.components
     if components is not None:
         parts = [
-            f"{translation.kind(texts, each.name)} x {texts.number(each.factor_of_sd, 2)}"
+            f"{texts.kind(each.name)} x {texts.number(each.factor_of_sd, 2)}"
             f" ({texts.number(each.interval[0] ** 0.5, 2)} – {texts.number(each.interval[1] ** 0.5, 2)})"
             for each in components.components
             if not each.held
@@ -146,7 +146,7 @@ def _adjustment(found: Grounds) -> Said:
     result, texts = found.result, found.texts
     total, out = int(result.used_images.sum()), len(found.removed)
     block = result.block
-    held = translation.held(texts, result)
+    held = fixed_values(texts, result)
     refraction = (block.refraction or Refraction()).phrase(block.linear_unit)
     frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
     return [
@@ -172,3 +172,17 @@ def _survey(found: Grounds) -> Said:
         said.append(texts.said(key, size=size))
     said.append(texts.said(f"assume.independent.{asked.independent or 'undeclared'}"))
     return said
+
+
+def fixed_values(texts: Texts, result: Result) -> str:
+    """Name fixed points, photos and parameters; empty without any."""
+    block = result.block
+    points = (block.point_sd == 0).any(axis=1)
+    photos = (block.photo_position_sd == 0).any(axis=1) | (block.photo_attitude_sd == 0).any(axis=1)
+    names = [texts("held.point", name=block.point_ids[row]) for row in np.flatnonzero(points)]
+    names += [texts("held.photo", name=block.photo_ids[row]) for row in np.flatnonzero(photos)]
+    for camera in result.cameras:
+        fixed = [name for name, sd in zip(camera.names, camera.sd.tolist(), strict=True) if not sd > 0]
+        if fixed:
+            names.append(texts("held.camera", parameters=", ".join(fixed), name=camera.name))
+    return texts.listed(names, MAX_FIXED_VALUES) if names else ""

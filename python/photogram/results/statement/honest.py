@@ -30,41 +30,29 @@ FLAT = 1e-6
 
 @dataclass(frozen=True)
 class Prediction:
-    """The differences of a part of the components against their covariance.
+    """The differences of a part of the components against their covariance."""
 
-    Attributes
-    ----------
-    rows, points, rank
-        How many differences, of how many points, and the rank of their covariance.
-    predicted_rmse, predicted_rmse_of_product, found_rmse
-        `sqrt(tr C / n)` of n points, the same of s2 Q alone, and what was found; linear unit.
-    effective_dof, rmse_interval
-        `tr(C)^2 / tr(C^2)`, and the interval of 95 percent that follows for what was found.
-    T, p_high
-        d' C^-1 d and the probability of more (chi-square, C taken as known).
-    p_low, p_high_f
-        Of less, and of more by F where s2 is posterior (else as `p_high`): these decide.
-    factor, factor_interval
-        `sqrt(T / rows)`: by how much differences are larger than predicted, with its interval of 95 percent.
-    sum_of_squares_without_correlations
-        Sum of d^2 / C_ii.
-    """
-
+    # Numbers of differences and points, rank of the covariance
     rows: int
     points: int
     rank: int
+    # `sqrt(tr C / n)` of n points, the same of s2 Q alone, and the actual rmse; linear unit
     predicted_rmse: float
     predicted_rmse_of_product: float
     found_rmse: float
+    # `tr(C)^2 / tr(C^2)`, and the resulting interval (95 percent) of the rmse
     effective_dof: float
     rmse_interval: tuple[float, float]
+    # d' C^-1 d and its upper probability (chi-square, C known)
     T: float
     p_high: float
+    # Decisive probabilities: lower, and upper by F if s2 is posterior (else `p_high`)
     p_low: float
     p_high_f: float
+    # `sqrt(T / rows)`: ratio of differences to prediction, with its interval (95 percent)
     factor: float
     factor_interval: tuple[float, float]
-    sum_of_squares_without_correlations: float
+    sum_of_squares_without_correlations: float  # Sum of d^2 / C_ii
 
     @property
     def rejected_high(self) -> bool:
@@ -96,23 +84,16 @@ class Bias:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Differences of heights as a surface: 1, x, y, x^2 + y^2.
+    """Differences of heights as a surface: 1, x, y, x^2 + y^2."""
 
-    Attributes
-    ----------
-    origin, scale
-        x, y are those of the adjusted points less (2,) `origin`, over `scale`.
-    estimate, sd, t
-        (4,) coefficients in the linear unit, their standard deviations, and the one over the other.
-    T, dof, p
-        x' N x of all four, 4, and the probability of more.
-    """
-
+    # x, y: adjusted coordinates minus (2,) `origin`, divided by `scale`
     origin: tuple[float, float]
     scale: float
+    # (4,) coefficients in the linear unit, their standard deviations, and the ratios
     estimate: Floats
     sd: Floats
     t: Floats
+    # x' N x of all four, 4, and its upper probability
     T: float
     dof: int
     p: float
@@ -125,32 +106,20 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class PointTests:
-    """Each of the n check points by itself.
+    """Each of the n check points by itself."""
 
-    Attributes
-    ----------
-    sd_predicted, sd_adjusted
-        (n, 3) roots of C_ii and of s2 Q_ii.
-    normalised
-        (n, 3) d over `sd_predicted`.
-    T, p
-        (n,) d_i' C_ii^-1 d_i and the probability of more, with as many degrees of freedom as components.
-    others, p_others
-        (n,) the same of the point predicted from all others.
-    dimension
-        (n,) how many components.
-    ce90, le90
-        (n,) radii of 90 percent that s2 Q_ii predicts for the product; linear unit.
-    """
-
+    # (n, 3) square roots of the diagonals of C and s2 Q
     sd_predicted: Floats
     sd_adjusted: Floats
-    normalised: Floats
+    normalised: Floats  # (n, 3) d over `sd_predicted`
+    # (n,) d_i' C_ii^-1 d_i and its upper probability
     T: Floats
     p: Floats
+    # (n,) the same for the prediction from all other points
     others: Floats
     p_others: Floats
-    dimension: Floats
+    dimension: Floats  # (n,) number of components
+    # (n,) radii of 90 percent that s2 Q_ii predicts for the product; linear unit
     ce90: Floats
     le90: Floats
 

@@ -39,26 +39,16 @@ _CASES = {
 
 @dataclass(frozen=True)
 class Judged:
-    """What a statement says.
+    """What a statement says."""
 
-    Attributes
-    ----------
-    exit, tone
-        Exit code, and how the headline is to be taken.
-    headline
-        A sentence.
-    sentences, assumptions
-        Keys and texts.
-    remarks
-        What is to be looked at, without an exit code of its own.
-    """
-
+    # Exit code, severity of the headline
     exit: int
     tone: Tone
-    headline: str
+    headline: str  # A sentence
+    # Keys and texts
     sentences: Said
     assumptions: Said
-    remarks: list[str]
+    remarks: list[str]  # Remarks that do not change the exit code
 
 
 @dataclass(frozen=True)

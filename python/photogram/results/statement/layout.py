@@ -27,35 +27,19 @@ CELLS = 200
 
 @dataclass(frozen=True)
 class Layout:
-    """How n check points lie in a block.
+    """How n check points lie in a block."""
 
-    Attributes
-    ----------
-    count
-        n.
-    diagonal
-        Of the block's box in plan, in the linear unit.
-    quadrants
-        Shares of the points: x and y low, x high and y low, x low and y high, both high. Points on a middle
-        line count as low.
-    least_spacing
-        Between two points, over the diagonal; NaN with less than two.
-    far
-        Share of the block's area that is farther from all points than a third of the diagonal; NaN
-        where the block is a line.
-    heights
-        Range of the heights of the points over that of the block; NaN where that is level.
-    beyond_control
-        The number of points outside the hull of the control points in plan.
-    """
-
-    count: int
-    diagonal: float
+    count: int  # n
+    diagonal: float  # Of the box of the block in plan, linear unit
+    # Shares of the points: x and y low, x high and y low, x low and y high, both high. Points on a middle
+    # line count as low.
     quadrants: tuple[float, float, float, float]
-    least_spacing: float
+    least_spacing: float  # Between two points, over the diagonal; NaN for one point
+    # Share of the block's area that is farther from all points than a third of the diagonal; NaN if the
+    # block is a line
     far: float
-    heights: float
-    beyond_control: int
+    heights: float  # Range of the heights of the points over that of the block; NaN if the block is level
+    beyond_control: int  # The number of points outside the hull of the control points in plan
 
     @property
     def even(self) -> bool:
@@ -113,7 +97,7 @@ def _plan(name: str, given: ArrayLike, least: int) -> Floats:
 
 
 def _least_spacing(plan: Floats) -> float:
-    """Return the least distance between two of some points; NaN with less than two."""
+    """Return the least distance between two of some points; NaN for one point."""
     if len(plan) < 2:
         return math.nan
     reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))

@@ -29,32 +29,18 @@ PREDICTABLE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A control point, predicted by the rest.
+    """A control point, predicted by the rest."""
 
-    Attributes
-    ----------
-    point
-        Its name.
-    difference
-        (3,) predicted minus survey, east, north, up; NaN for what is not held or hardly predictable. Linear
-        unit.
-    sd
-        (3,) its standard deviations.
-    covariance
-        (3, 3), of the same; zero where there is none.
-    T, rank, p
-        The test, directions that are predictable, and the probability of more.
-    redundancy, eigenvalues
-        Redundancy numbers of the k held components, and the eigenvalues of R_g in rising order.
-    """
-
-    point: str
+    point: str  # Its name
+    # (3,) predicted minus survey, east, north, up; linear unit; NaN if free or hardly predictable
     difference: Floats
-    sd: Floats
-    covariance: Floats
+    sd: Floats  # (3,) its standard deviations
+    covariance: Floats  # (3, 3); zero if there is none
+    # Test, number of predictable directions, upper probability
     T: float
     rank: int
     p: float
+    # Redundancy numbers of the k weighted components; eigenvalues of R_g, ascending
     redundancy: Floats
     eigenvalues: Floats
 

@@ -30,14 +30,9 @@ REFERENCE = 20.0
 
 @dataclass(frozen=True)
 class Limit:
-    """The largest error allowed of a length L: A + K L, no more than B; A, B and L of one unit.
+    """The largest error allowed of a length L: A + K L, no more than B; A, B and L of one unit."""
 
-    Attributes
-    ----------
-    constant, slope, most
-        A, K and B; B may be infinite.
-    """
-
+    # A, K and B; B may be infinite
     constant: float
     slope: float
     most: float = math.inf
@@ -49,36 +44,20 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class LengthTest:
-    """m measured lengths against calibrated ones.
+    """m measured lengths against calibrated ones."""
 
-    Attributes
-    ----------
-    errors
-        (m,) measured minus calibrated.
-    sd
-        (m,) their standard deviations, with those of the calibration.
-    normalised
-        (m,) errors over these; NaN where a standard deviation is zero.
-    limits
-        (m,) of the errors; None where none was given.
-    together
-        The test of all errors with their joint covariance; None where that has none.
-    lines, least
-        Lines, and lengths on the line that has the fewest.
-    longest
-        The longest calibrated length over the diagonal of the volume; NaN where that is not known.
-    off_diagonal
-        Smallest angle between a length and a diagonal of the volume, radians; NaN where that is not known.
-    """
-
-    errors: Floats
-    sd: Floats
-    normalised: Floats
-    limits: Floats | None
+    errors: Floats  # (m,) measured minus calibrated
+    sd: Floats  # (m,) their standard deviations, with those of the calibration
+    normalised: Floats  # (m,) errors / sd; NaN if the standard deviation is zero
+    limits: Floats | None  # (m,) limits of the errors
+    # Test of all errors with their joint covariance; None without rank
     together: GlobalTest | None
+    # Number of lines, and of lengths on the line with the fewest
     lines: int
     least: int
+    # The longest calibrated length over the diagonal of the volume; NaN if unknown
     longest: float
+    # Smallest angle between a length and a diagonal of the volume, radians; NaN if unknown
     off_diagonal: float
 
     @property
@@ -194,7 +173,7 @@ def length_test(
     `covariance` is the (m, m) joint one of the measured ones (:func:`measured_lengths`), `sd` are (m,)
     standard deviations of the calibrated ones, `lines` (m,) names of the lines on which they lie. `diagonal`
     and `off_diagonal` are of the volume that was measured: its diagonal, and the smallest angle between a
-    length and it (:func:`angle_to_diagonal`); NaN where that is not known. `freedom` are degrees of freedom
+    length and it (:func:`angle_to_diagonal`); NaN if unknown. `freedom` are degrees of freedom
     with which the unit weight of the covariance was estimated. Arrays of other shapes, and what is no length,
     are refused.
     """

@@ -26,30 +26,15 @@ LEAST_RATIO = 0.6
 
 @dataclass(frozen=True)
 class Nssda:
-    """Accuracy of n check points at 95 %, in the linear unit; None where there is no figure.
+    """Accuracy of n check points at 95 %, in the linear unit; None where there is no figure."""
 
-    Attributes
-    ----------
-    count
-        n.
-    ratio
-        Of the smaller RMSE of an axis to the larger.
-    accuracy_r
-        Horizontal, by the mean RMSE of the axes; none where the ratio is below 0.6.
-    accuracy_r_equal
-        Horizontal, by the radial RMSE, as if both axes had the same.
-    ce95
-        The radius that holds 95 % of errors of the mean products that were found, whatever the ratio.
-    accuracy_z
-        Vertical.
-    """
-
-    count: int
-    ratio: float | None
-    accuracy_r: float | None
-    accuracy_r_equal: float | None
+    count: int  # n
+    ratio: float | None  # Of the smaller RMSE of an axis to the larger
+    accuracy_r: float | None  # Horizontal, by the mean RMSE of the axes; None if the ratio is below 0.6
+    accuracy_r_equal: float | None  # Horizontal, by the radial RMSE, as if both axes had the same
+    # Radius of 95 % from the mean products of differences, for any ratio
     ce95: float | None
-    accuracy_z: float | None
+    accuracy_z: float | None  # Vertical
 
     @property
     def enough(self) -> bool:

@@ -41,38 +41,22 @@ _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 
 @dataclass(frozen=True, eq=False)
 class Asprs:
-    """ASPRS Positional Accuracy Standards, Edition 2.
+    """ASPRS Positional Accuracy Standards, Edition 2."""
 
-    Attributes
-    ----------
-    figures
-        By `h`, `v`, `3d`, `vva`; None where there are no points.
-    verdicts
-        Of the classes that were asked for: sentences, headline, table and JSON document follow from them.
-    words
-        `tested`, `produced` or `none`, by the component with the fewest check points.
-    area, points_asked
-        Square kilometres, and how many check points the standard asks for there.
-    survey, control
-        Whether check survey and control are good enough for the classes, by `h` and `v`.
-    control_rmse
-        Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit.
-    remarks
-        Means and differences to be investigated first.
-    left_out
-        RMSE of control predicted by the others, `h` and `v`; NaN without.
-    """
-
-    figures: Mapping[str, asprs.Accuracy | None]
+    figures: Mapping[str, asprs.Accuracy | None]  # By `h`, `v`, `3d`, `vva`; None without points
+    # Verdicts on the requested classes, for sentences, headline, table and JSON
     verdicts: Mapping[str, str]
-    words: str
+    words: str  # `tested`, `produced` or `none`, by the component with the fewest check points
+    # Square kilometres; number of check points that the standard requires
     area: float
     points_asked: int
+    # Whether survey and control are accurate enough for the classes, by `h` and `v`
     survey: Mapping[str, bool]
     control: Mapping[str, bool]
+    # Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit
     control_rmse: tuple[float, float]
-    remarks: tuple[asprs.Remark, ...]
-    left_out: Mapping[str, float]
+    remarks: tuple[asprs.Remark, ...]  # Means and differences to investigate first
+    left_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
         """Return what the JSON document has; `metre` is the linear unit in metres."""
@@ -103,29 +87,6 @@ class Lengths:
     limit: Limit | None
     test: LengthTest
     expansion: float | None
-
-    def member(self) -> dict[str, Any]:
-        """Return what the JSON document has."""
-        test, together = self.test, self.test.together
-        columns = {
-            "line": self.lines,
-            "from": [first for first, _ in self.ends],
-            "to": [last for _, last in self.ends],
-            "calibrated": self.calibrated,
-            "error": test.errors,
-            **members(test, "sd", "normalised"),
-            "limit": [None] * len(self.lines) if test.limits is None else test.limits,
-        }
-        return {
-            "lengths": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
-            **members(test, "largest", rmse="rms", met="met", lines="lines"),
-            "arrangement": test.enough and test.long_enough and test.along_diagonal,
-            "angle_to_diagonal": test.off_diagonal,
-            "at_reference_temperature": self.expansion is not None,
-            "T": together and together.weighted_sum_of_squares,
-            "rank": together and together.degrees_of_freedom,
-            "p_high": together and together.probability_above,
-        }
 
 
 @dataclass(frozen=True, eq=False)

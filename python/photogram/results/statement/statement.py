@@ -17,18 +17,20 @@ from photogram.messages import nearest
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import Compared, compared, control_places
+from photogram.results.statement.document import budget_member, figures_member, statement_members
 from photogram.results.statement.figures import figures
 from photogram.results.statement.given_coordinates import NOTHING, Survey, System, surveyed
 from photogram.results.statement.grounds import Grounds, removed_observations
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
 from photogram.results.statement.leave_one_out import leave_one_out
-from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import standards
+from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Document
+from photogram.show.quantity import records
 from photogram.show.run import InputFile
 from photogram.show.summary import Brief, Rows
 from photogram.words import Phrase
@@ -91,12 +93,12 @@ class Statement(Grounds, Brief):
     @property
     def check_points(self) -> list[dict[str, Any]]:
         """The check points, as in the JSON document."""
-        return point_rows(self.compared, None if self.of_all is None else self.of_all.points)
+        return records(check_points(self).columns)
 
     @property
     def leave_one_out(self) -> list[dict[str, Any]]:
         """Control points predicted by the others, likewise."""
-        return left_out_rows(self.left_out)
+        return records(left_out_points(self.texts, self.left_out).columns)
 
     def budget(self, quantity: str | Mapping[Any, Sequence[float]]) -> dict[str, Any]:
         """Return the budget of a quantity: one of the page, or any other.
@@ -147,11 +149,6 @@ class Statement(Grounds, Brief):
 
         return statement_document(self)
 
-    def _members(self) -> dict[str, Any]:
-        from photogram.results.statement.document import statement_members
-
-        return statement_members(self)
-
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as one HTML file that needs nothing else, and write it where a path is given.
 
@@ -174,7 +171,7 @@ class Statement(Grounds, Brief):
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return everything as a JSON document (UTF-8), and write it where a path is given."""
-        return _written(json.to_json(self._members()), path)
+        return _written(json.to_json(statement_members(self)), path)
 
 
 def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:

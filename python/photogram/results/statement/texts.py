@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import date
 from string import Formatter
 from typing import Any
@@ -93,7 +93,7 @@ class Texts(Words):
 
     def probability(self, value: float) -> str:
         """Return a probability."""
-        return probability_written(value).replace(".", self._table["number.decimal"])
+        return self.numeral(probability_written(value))
 
     def numeral(self, written: str) -> str:
         """Return a number that is written with a point as the language writes it."""
@@ -101,7 +101,7 @@ class Texts(Words):
         whole, point, decimals = written.removeprefix(sign).partition(".")
         group = self._table["number.group"]
         head = ""
-        while len(whole) > 4 or (head and len(whole) > 3):
+        while whole.isdigit() and (len(whole) > 4 or (head and len(whole) > 3)):
             whole, head = whole[:-3], group + whole[-3:] + head
         return sign.replace("-", "−") + whole + head + (point and self._table["number.decimal"]) + decimals
 
@@ -140,3 +140,18 @@ class Texts(Words):
     def word(self, family: str, name: str) -> str:
         """Return what a word of another module is called in the language; one without a key as it is."""
         return self.text(Phrase(f"{family}.{name}"))
+
+    def kind(self, name: str) -> str:
+        """Return the name of a kind in the plural: `images`, `prior, lever arm`, `.., 4 coefficients`."""
+        names = []
+        for part in name.split(", "):
+            count, blank, rest = part.partition(" ")
+            counted = f"{count} {self.word('kind', rest)}" if blank and count.isdigit() else ""
+            names.append(counted or self.word("kind", part))
+        return ", ".join(names)
+
+    def observation(self, parts: Sequence[str]) -> str:
+        """Return the name of an observation from its kind, the names of its things, and its component."""
+        kind, *things, component = parts
+        one = ", ".join(self.word("one", part) for part in kind.split(", "))
+        return " ".join([one, *things, self.word("axis", component)])

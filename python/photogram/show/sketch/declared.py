@@ -17,52 +17,30 @@ ScaleBar: TypeAlias = tuple[float, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One pair of axes with what is on it.
+    """One pair of axes with what is on it."""
 
-    Attributes
-    ----------
-    limits
-        (2, 2) values at the lower left and at the upper right corner.
-    equal
-        Whether a unit is equally long along both axes.
-    notes
-        What a reader must know, below.
-    bars
-        Scales of what is enlarged, above, under the title.
-    legend
-        Where: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or nowhere.
-    across_names, up_names
-        Of 0, 1, 2 ... along the axes, in place of numbers.
-    turned
-        Whether names across are written upwards.
-    bare, unnumbered
-        Whether there are no lines of axes; whether these have no numbers.
-    log_across, log_up
-        Whether equal ratios are equally long along an axis.
-    shades
-        What a bar of colours beside the panel shows.
-    decimal
-        Sign of the numbers along the axes, in the language of the picture.
-    """
-
-    limits: Floats
+    limits: Floats  # (2, 2) values at the lower left and at the upper right corner
     marks: Sequence[Mark] = ()
     title: str = ""
     across: str = ""
     up: str = ""
-    equal: bool = False
-    notes: Sequence[str] = ()
-    bars: Sequence[ScaleBar] = ()
+    equal: bool = False  # Whether a unit is equally long along both axes
+    notes: Sequence[str] = ()  # Below the panel
+    bars: Sequence[ScaleBar] = ()  # Scale bars of enlarged marks, below the title
+    # Position: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or empty
     legend: str = ""
+    # Names at 0, 1, 2 ... instead of numbers
     across_names: Sequence[str] = ()
     up_names: Sequence[str] = ()
-    turned: bool = False
+    turned: bool = False  # Whether names across are vertical
+    # Without lines of axes; without numbers
     bare: bool = False
     unnumbered: bool = False
+    # Logarithmic axes
     log_across: bool = False
     log_up: bool = False
-    shades: Shades | None = None
-    decimal: str = "."
+    shades: Shades | None = None  # Colour bar of the panel
+    decimal: str = "."  # Decimal sign
 
     def even(self, places: Floats) -> Floats:
         """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""
@@ -72,28 +50,15 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A picture: its panels row by row, None where one is empty.
+    """A picture: its panels row by row, None where one is empty."""
 
-    Attributes
-    ----------
-    width, height
-        Inches, of which it takes no more than its panels need.
-    columns
-        Of panels.
-    shades
-        What a bar of colours beside all panels shows.
-    shared
-        Whether the panels of a column have their numbers across below the lowest only.
-    title
-        Of all panels.
-    """
-
+    # Maximum size, inches
     width: float
     height: float
     panels: Sequence[Panel | None]
     columns: int = 1
-    shades: Shades | None = None
-    shared: bool = False
+    shades: Shades | None = None  # Colour bar of all panels
+    shared: bool = False  # Numbers across only below the lowest panel of a column
     title: str = ""
 
     @property

@@ -14,6 +14,7 @@ from photogram.show.sketch.layout import NAME, NOTE
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.names import Box, free_side
 from photogram.show.style import FAINT, INK, ORDERED, signed, styled
+from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
 LEGENDS: dict[str, dict[str, Any]] = {
@@ -37,7 +38,7 @@ def on_axes(sketch: Sketch, ax: Any) -> None:
             panels += [None] * (ax.size - len(panels))
         every: list[Any] = np.atleast_1d(np.asarray(ax, dtype=object)).ravel().tolist()
         if len(every) != len(panels):
-            raise InputError(f"the plot has {len(panels)} panels and needs as many axes, got {len(every)}")
+            raise InputError(phrase("plot.axes", panels=len(panels), axes=len(every)))
         drawn = [(axes, panel) for axes, panel in zip(every, panels, strict=True) if panel is not None]
         for axes, panel in zip(every, panels, strict=True):
             axes.set_visible(panel is not None)

@@ -14,6 +14,7 @@ from photogram.show.pictures import new_figure
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.svg import svg_of
 from photogram.show.style import styled
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +80,7 @@ class Plot(Sketch):
             return self._svg("plot").encode()
         drawn, content = self.figure(), io.BytesIO()
         if ending not in drawn.canvas.get_supported_filetypes():
-            raise InputError(f"matplotlib does not write the format {ending!r}: use svg, png or pdf")
+            raise InputError(phrase("plot.format", ending=ending))
         with styled():
             drawn.savefig(content, format=ending, metadata=TIMELESS.get(ending))
         return content.getvalue()

@@ -80,21 +80,7 @@ class Chosen:
 
 
 class Conditional:
-    """n blocks of rows, each with the same groups, whose R is known block by block.
-
-    Parameters
-    ----------
-    residuals
-        (n, m) of unit weight.
-    cofactors
-        (n, m, m) R.
-    groups
-        The rows of each of the K groups.
-    scales
-        (n, K) what the variances of each group are multiplied by before it is tested (k^2).
-    units
-        Of all that takes part, for each block.
-    """
+    """n blocks of rows, each with the same groups, whose R is known block by block."""
 
     def __init__(
         self,

@@ -21,37 +21,18 @@ from photogram.statistics.snooping.whole_photos import take_bad_photos_out, take
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What snooping has ended with.
+    """What snooping has ended with."""
 
-    Attributes
-    ----------
-    log
-        Everything that was taken out, in order.
-    rounds
-        Every round; the last takes nothing out.
-    out
-        What takes no part.
-    tests
-        How many groups are tested: it is kept from the start.
-    before, standing
-        How the network stood at first, and without what is out.
-    factors
-        By kind, the robust factors by which standard deviations were multiplied for the tests; empty where
-        the given ones stand.
-    final
-        Tests of what takes part, at the end.
-    remarks
-        What else there is to say.
-    """
-
-    log: list[Removal]
-    rounds: list[Round]
-    out: Out
-    tests: int
-    before: Standing
+    log: list[Removal]  # all removals in order
+    rounds: list[Round]  # the last removes nothing
+    out: Out  # what is excluded
+    tests: int  # number of tested groups, as at the start
+    before: Standing  # with all observations, and without the excluded ones
     standing: Standing
+    # By kind, the robust factors by which standard deviations were multiplied for the tests; empty where the
+    # given ones stand
     factors: dict[str, float]
-    final: Tests
+    final: Tests  # at the end
     remarks: list[str]
 
 

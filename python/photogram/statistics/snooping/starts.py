@@ -126,17 +126,7 @@ def start_robustly(work: TakingOut) -> None:
 
 
 def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: Standing, what: str) -> None:
-    """Put the points of some groups aside, and let tests against all others decide about them.
-
-    Parameters
-    ----------
-    candidates
-        The groups.
-    first, standing
-        Tests, and how the network stood, with everything in it.
-    what
-        Names them.
-    """
+    """Put the points of some groups aside, and let tests against all others decide about them."""
     suspects, start = work.suspects, work.out
     points = np.unique(suspects.points[candidates])
     points = points[points >= 0]
@@ -221,16 +211,6 @@ def begun(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] |
 
     An image whose point has other rays is tested against its prediction. Where no two are left, the point is
     aside with all of them, and each is tested as if it were in, so that both of two rays are named.
-
-    Parameters
-    ----------
-    afresh
-        Finds the consensus, and starts the trial at it; None where there is none, or nothing against it.
-
-    Raises
-    ------
-    LostSupportError
-        The network is not determined, or runs off and there is no consensus.
     """
     start = None if settings.robust is False else afresh
     try:

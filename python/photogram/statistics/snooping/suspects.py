@@ -16,43 +16,24 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
-    """G groups of observations with M rows in all, one group after the other.
+    """G groups of observations with M rows in all, one group after the other."""
 
-    Attributes
-    ----------
-    row_starts
-        (G + 1,) where the rows of each group start.
-    kinds
-        (G,) which of `kind_names` each is of.
-    kind_names
-        What the kinds are called: `image`, `control`, ...
-    subjects
-        (G,) the number, within its kind, of what a group is of: an image, a point, an observation ...
-    points, photos
-        (G,) the point and the photo that a group is of; -1 where there is none. Groups of one point cannot be
-        judged one without the other.
-    loads
-        Which photos, further than its own, a group has to do with: those that its point is seen from.
-    removable
-        (G,) whether snooping may take it out.
-    parts
-        Rows that may go alone, of a group by its number: plan, height, or all of a control point. None where
-        the group goes as a whole.
-    name, row_name, unit
-        What a group is called, what one of its rows is, and the unit of that row (M).
-    photo_name
-        What a photo is called.
-    """
-
-    row_starts: Indices
-    kinds: Indices
-    kind_names: Sequence[str]
+    row_starts: Indices  # (G + 1,) where the rows of each group start
+    kinds: Indices  # (G,) which of `kind_names` each is of
+    kind_names: Sequence[str]  # `image`, `control`, ...
+    # (G,) number of the image, point, observation, ... of a group
     subjects: Indices
+    # points, photos: (G,) the point and the photo that a group is of; -1 where there is none. Groups of one
+    # point cannot be judged one without the other
     points: Indices
     photos: Indices
+    # Further photos that a group concerns: those that observe its point
     loads: Callable[[int], Indices]
-    removable: Bools
+    removable: Bools  # (G,) whether snooping may take it out
+    # Rows that may go alone, of a group by its number: plan, height, or all of a control point. None where
+    # the group goes as a whole
     parts: Callable[[int], Sequence[Sequence[int]] | None]
+    # Name of a group, component and unit of a row
     name: Callable[[int], Phrase]
     row_name: Callable[[int], str]
     unit: Callable[[int], str]
@@ -96,17 +77,10 @@ def _at(by: tuple[Indices, Indices], value: int) -> Indices:
 
 @dataclass(eq=False)
 class Out:
-    """What takes no part.
+    """What takes no part."""
 
-    Attributes
-    ----------
-    rows
-        (M,) which rows are out.
-    points, photos
-        Those that are out with all that was observed of them.
-    """
-
-    rows: Bools
+    rows: Bools  # (M,) which rows are out
+    # Excluded points and photos, with all their observations
     points: set[int] = field(default_factory=set)
     photos: set[int] = field(default_factory=set)
 
@@ -117,52 +91,27 @@ class Out:
 
 @dataclass(frozen=True)
 class Standing:
-    """How a network stands without what is out.
+    """How a network stands without what is out."""
 
-    Attributes
-    ----------
-    status
-        `converged`, or what else came of the iteration.
-    weighted_sum_of_squares, degrees_of_freedom
-        Omega and f of what takes part.
-    """
-
-    status: str
+    status: str  # `converged`, or what else came of the iteration
+    # weighted_sum_of_squares, degrees_of_freedom: Omega and f of what takes part
     weighted_sum_of_squares: float
     degrees_of_freedom: int
 
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests of all groups; NaN for what is out.
+    """Tests of all groups; NaN for what is out."""
 
-    Attributes
-    ----------
-    active
-        (G,) whether any row takes part.
-    rank
-        (G,) directions in which an error shows.
-    statistic
-        (G,) T, by which Omega falls without the group.
-    least
-        (G,) the smallest redundancy of a direction that shows.
-    shared
-        (G,) h: |correlation| of two groups of different points is no more than the root of the product.
-    residual
-        (M,) of unit weight.
-    redundancy
-        (M,) redundancy numbers.
-    error, error_sd
-        (M,) estimated error and its standard deviation, in the units of the rows.
-    """
-
-    active: Bools
-    rank: Indices
-    statistic: Floats
-    least: Floats
+    active: Bools  # (G,) whether any row takes part
+    rank: Indices  # (G,) directions in which an error shows
+    statistic: Floats  # (G,) T, by which Omega falls without the group
+    least: Floats  # (G,) the smallest redundancy of a direction that shows
+    # (G,) h: |correlation| of two groups of different points is no more than the root of the product
     shared: Floats
-    residual: Floats
-    redundancy: Floats
+    residual: Floats  # (M,) of unit weight
+    redundancy: Floats  # (M,) redundancy numbers
+    # error, error_sd: (M,) estimated error and its standard deviation, in the units of the rows
     error: Floats
     error_sd: Floats
 
@@ -174,20 +123,11 @@ class Tests:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What is out of a group against what the rest predicts.
+    """What is out of a group against what the rest predicts."""
 
-    Attributes
-    ----------
-    statistic
-        d' C^-1 d: chi-square with as many degrees of freedom as rows are out.
-    rows
-        These, of all.
-    error, error_sd
-        Observed minus predicted of each, and its standard deviation, in its unit.
-    """
-
-    statistic: float
-    rows: tuple[int, ...]
+    statistic: float  # d' C^-1 d: chi-square; its degrees of freedom are the number of excluded rows
+    rows: tuple[int, ...]  # These, of all
+    # error, error_sd: Observed minus predicted of each, and its standard deviation, in its unit
     error: tuple[float, ...]
     error_sd: tuple[float, ...]
 

@@ -28,26 +28,12 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Settings:
-    """How to snoop.
+    """How to snoop."""
 
-    Attributes
-    ----------
-    level
-        Family level of all tests together, or the false discovery rate.
-    fdr
-        Whether it is the latter.
-    known
-        Whether the unit weight is known: chi-square decides, else F.
-    robust
-        Whether to start robustly; None where many observations are wrong.
-    max_rounds
-        Rounds at the most.
-    """
-
-    level: float = LEVEL
-    fdr: bool = False
-    known: bool = True
-    robust: bool | None = None
+    level: float = LEVEL  # Family level of all tests together, or the false discovery rate
+    fdr: bool = False  # Whether it is the latter
+    known: bool = True  # Whether the unit weight is known: chi-square decides, else F
+    robust: bool | None = None  # Whether to start robustly; None where many observations are wrong
     max_rounds: int = 20
 
 
@@ -57,17 +43,7 @@ _NOT_DETERMINED = "its point is no longer determined and has left the network"
 
 
 class TakingOut:
-    """A network that is being snooped.
-
-    Parameters
-    ----------
-    trial
-        The network.
-    settings
-        How.
-    out
-        What takes no part from the start; nothing by default.
-    """
+    """A network that is being snooped."""
 
     def __init__(self, trial: Trial, settings: Settings, out: Out | None = None) -> None:
         self.trial, self.settings = trial, settings

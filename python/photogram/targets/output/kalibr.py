@@ -14,8 +14,7 @@ def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
     """Return the file.
 
     `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` takes points from the axes of the camera
-    before to those of this one. InputError: a lens with other terms, pictures of unknown size, cameras that
-    are not tied to each other.
+    before to those of this one.
     """
     lines = []
     for row in range(len(rig.cameras)):

@@ -30,8 +30,7 @@ def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, 
 
     `optimization_inputs` go with the cameras where the calibration is at hand and mrcal could have made it: a
     board on a grid, its shape held or two parabolas, cameras of one model, no single term of a lens held.
-    `valid` is (n, 2) by the numbers of cameras: the closed outline of what is known well enough. InputError:
-    a lens that mrcal has not, pictures of unknown size.
+    `valid` is (n, 2) by the numbers of cameras: the closed outline of what is known well enough.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     inputs = None if rig.calibrated is None else _inputs(rig, rig.calibrated, lenses)
@@ -155,7 +154,7 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
     """Return (n, 2) the closed outline of the pixels to which the worst sd stays below a bound.
 
     From the best known pixel of the map outwards in 90 directions, each as far as the standard deviation,
-    linear between pixels of the map, is not above the bound. InputError: no pixel of the map is as good.
+    linear between pixels of the map, is not above the bound.
     """
     sd = np.where(np.isfinite(found.sd), found.sd, np.inf)
     row, column = np.unravel_index(np.argmin(sd), sd.shape)

@@ -23,7 +23,7 @@ def opencv_yaml(rig: Rig) -> dict[str, bytes]:
     """Return a file a camera.
 
     Pixels count from 0 at the centre of the first. `avg_reprojection_error` is as OpenCV has it: the root of
-    the mean of dx^2 + dy^2 over points. InputError: a lens that OpenCV has not, pictures of unknown size.
+    the mean of dx^2 + dy^2 over points.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     return {

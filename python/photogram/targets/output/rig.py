@@ -68,24 +68,13 @@ def terms_of(camera: Camera) -> Terms | None:
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """K cameras in pixels from 0 at the centre of the first.
+    """K cameras in pixels from 0 at the centre of the first."""
 
-    Attributes
-    ----------
-    cameras
-        The cameras.
-    sizes
-        Width and height of their pictures, pixels; None where not known.
-    sensors
-        (K, 4, 4) camera 0 -> camera k; NaN of cameras that are not tied to it.
-    calibrated
-        What they came from; None where that is not at hand.
-    """
-
-    cameras: tuple[Camera, ...]
+    cameras: tuple[Camera, ...]  # The cameras
+    # Width and height of their pictures, pixels; None where not known
     sizes: tuple[tuple[int, int] | None, ...]
-    sensors: Floats
-    calibrated: Calibrated | None = None
+    sensors: Floats  # (K, 4, 4) camera 0 -> camera k; NaN of cameras that are not tied to it
+    calibrated: Calibrated | None = None  # What they came from; None where that is not at hand
 
     @property
     def names(self) -> list[str]:

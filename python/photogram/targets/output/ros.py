@@ -17,8 +17,7 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     """Return a file a camera.
 
     Of two cameras that are tied the rectification turns both so that a point has one row in both; the
-    projection of the second has -fx b, b the base. All others are not rectified. InputError: a lens that ROS
-    has not, pictures of unknown size.
+    projection of the second has -fx b, b the base. All others are not rectified.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     rectified: list[tuple[Floats, Floats] | tuple[()]] = [()] * len(lenses)

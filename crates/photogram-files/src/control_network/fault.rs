@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::Stopped;
+use photocore::Stopped;
 
 /// Where something stands in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

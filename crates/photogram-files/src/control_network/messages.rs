@@ -12,7 +12,7 @@ use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, MEASURE};
 use super::values::number_or_absent;
-use crate::{Stopped, sorting};
+use photocore::Stopped;
 
 /// How long each message is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,7 +175,9 @@ pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
 
 /// The columns in the order of their fields' numbers.
 fn order(table: &Table<'_>) -> Vec<usize> {
-    sorting::order(table.fields.len(), &|a, b| table.fields[a].number.cmp(&table.fields[b].number))
+    let mut order: Vec<usize> = (0..table.fields.len()).collect();
+    order.sort_by_key(|&column| table.fields[column].number);
+    order
 }
 
 type Inside<'a> = &'a mut dyn FnMut(&mut Vec<u8>) -> Result<(), Reason>;

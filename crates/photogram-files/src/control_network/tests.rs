@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::messages::{Message, put_bytes, put_number, put_varint, put_whole};
 use super::{Fault, Framing, Header, Place, Points, Reason, decoded, encoded, read_text, text};
-use crate::Stopped;
+use photocore::Stopped;
 
 fn go_on() -> ControlFlow<()> {
     ControlFlow::Continue(())

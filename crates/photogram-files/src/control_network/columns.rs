@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use crate::Stopped;
+use photocore::Stopped;
 
 use super::fault::Reason;
 use super::fields::{Field, Kind, MEASURES, POINT};

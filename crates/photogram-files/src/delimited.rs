@@ -1,0 +1,466 @@
+//! Columns of a large table whose lines are all regular. The reader of single lines reads all other tables and names their faults.
+
+use std::hash::{BuildHasher, RandomState};
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+/// Bytes of a line at most.
+const LONGEST_LINE: usize = 100_000;
+/// Bytes of a number at most.
+const LONGEST_NUMBER: usize = 1_000;
+
+/// Bytes of the parts of a piece, which threads read at the same time.
+const PART: usize = 1 << 18;
+
+/// A table of text, which grows piece by piece.
+#[derive(Debug)]
+pub struct Table {
+    delimiter: u8,
+    columns: Vec<Column>,
+    state: State,
+}
+
+/// A column of a table.
+#[derive(Debug)]
+pub enum Column {
+    /// Numbers; NaN for an empty cell.
+    Numbers(Vec<f64>),
+    /// Names.
+    Names(Names),
+}
+
+/// What the lines so far require of the next ones.
+#[derive(Debug, Default)]
+struct State {
+    /// The decimal mark of all numbers, from the first number that has one.
+    mark: Option<u8>,
+    /// A blank line was read: no other line may follow.
+    ended: bool,
+}
+
+/// The cells of some lines.
+struct Part {
+    columns: Vec<Cells>,
+    state: State,
+    /// Lines that are not blank.
+    lines: usize,
+}
+
+enum Cells {
+    Numbers(Vec<f64>),
+    /// Places of the names in the piece, and their hashes.
+    Names(Vec<(Range<usize>, u64)>),
+}
+
+impl Table {
+    /// An empty table; `numeric` of a column is whether its cells are numbers.
+    pub fn new(delimiter: u8, numeric: &[bool]) -> Self {
+        let column = |&numeric: &bool| {
+            if numeric { Column::Numbers(vec![]) } else { Column::Names(Names::default()) }
+        };
+        Self { delimiter, columns: numeric.iter().map(column).collect(), state: State::default() }
+    }
+
+    /// The columns.
+    pub fn columns(self) -> Vec<Column> {
+        self.columns
+    }
+
+    /// Appends whole lines, in the threads of the current pool. The result is `None`, and the table is useless, if a line is irregular.
+    pub fn add(&mut self, piece: &[u8]) -> Option<()> {
+        let parts: Vec<Part> =
+            parts_of(piece).into_par_iter().map(|lines| self.part(piece, lines)).collect::<Option<_>>()?;
+        for part in &parts {
+            self.state.follow(part)?;
+        }
+        self.columns.par_iter_mut().enumerate().try_for_each(|(k, column)| {
+            let mut cells = parts.iter().map(|part| &part.columns[k]);
+            cells.try_for_each(|cells| column.extend(piece, cells))
+        })
+    }
+
+    /// Reads whole lines of a piece.
+    fn part(&self, piece: &[u8], lines: Range<usize>) -> Option<Part> {
+        let columns = self.columns.iter().map(Column::cells).collect();
+        let mut part = Part { columns, state: State::default(), lines: 0 };
+        let (mut at, text) = (lines.start, &piece[..lines.end]);
+        while at < text.len() {
+            let first = after_blanks(text, at, b'\n');
+            if let Some(next) = after_line_end(text, first) {
+                (part.state.ended, at) = (true, next);
+                continue;
+            }
+            if part.state.ended || text[first] == b'#' {
+                return None;
+            }
+            let next = self.line(text, at, &mut part)?;
+            if next - at > LONGEST_LINE {
+                return None;
+            }
+            (part.lines, at) = (part.lines + 1, next);
+        }
+        Some(part)
+    }
+
+    /// Appends a line to a part, and returns where the next one begins.
+    fn line(&self, piece: &[u8], mut at: usize, part: &mut Part) -> Option<usize> {
+        for (k, (column, cells)) in self.columns.iter().zip(&mut part.columns).enumerate() {
+            if k > 0 {
+                if piece.get(at) != Some(&self.delimiter) {
+                    return None;
+                }
+                at += 1;
+            }
+            let (cell, end) = self.cell(piece, at)?;
+            at = end;
+            match (column, cells) {
+                (Column::Names(names), Cells::Names(cells)) => {
+                    let hash = names.hashes.hash_one(&piece[cell.clone()]);
+                    cells.push((cell, hash));
+                }
+                (_, Cells::Numbers(numbers)) => {
+                    numbers.push(number(&piece[cell], self.delimiter, &mut part.state.mark)?)
+                }
+                (Column::Numbers(_), Cells::Names(_)) => return None,
+            }
+        }
+        if piece.get(at) == Some(&self.delimiter) {
+            // A delimiter at the end of the line.
+            at = after_blanks(piece, at + 1, self.delimiter);
+        }
+        after_line_end(piece, at)
+    }
+
+    /// The content of a cell without quotation marks and outer blanks, and the place of the delimiter or line end behind the cell.
+    fn cell(&self, piece: &[u8], at: usize) -> Option<(Range<usize>, usize)> {
+        let start = after_blanks(piece, at, self.delimiter);
+        if piece.get(start) != Some(&b'"') {
+            let ends = |byte: &u8| *byte == self.delimiter || *byte == b'\n' || *byte == b'"';
+            let end = piece[start..].iter().position(ends).map_or(piece.len(), |length| start + length);
+            let end = match piece.get(end) {
+                Some(b'"') => return None,
+                Some(b'\n') | None if end > start && piece[end - 1] == b'\r' => end - 1,
+                _ => end,
+            };
+            return Some((without_blanks(piece, start..end), end));
+        }
+        let inside = &piece[start + 1..];
+        let length = inside.iter().position(|byte| matches!(byte, b'"' | b'\n'))?;
+        let closing = start + 1 + length;
+        let content = after_blanks(piece, start + 1, b'\n').min(closing)..closing;
+        (piece[closing] == b'"')
+            .then(|| (without_blanks(piece, content), after_blanks(piece, closing + 1, self.delimiter)))
+    }
+}
+
+impl Column {
+    fn cells(&self) -> Cells {
+        match self {
+            Self::Numbers(_) => Cells::Numbers(vec![]),
+            Self::Names(_) => Cells::Names(vec![]),
+        }
+    }
+
+    fn extend(&mut self, piece: &[u8], cells: &Cells) -> Option<()> {
+        match (self, cells) {
+            (Self::Numbers(column), Cells::Numbers(numbers)) => column.extend_from_slice(numbers),
+            (Self::Names(column), Cells::Names(names)) => column.extend(piece, names)?,
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+impl State {
+    /// Continues with the lines of a part; `None` if they may not follow.
+    fn follow(&mut self, part: &Part) -> Option<()> {
+        let marks = self.mark.is_none() || part.state.mark.is_none() || self.mark == part.state.mark;
+        if !marks || (self.ended && part.lines > 0) {
+            return None;
+        }
+        self.mark = self.mark.or(part.state.mark);
+        self.ended |= part.state.ended;
+        Some(())
+    }
+}
+
+/// Parts of a piece that end with a line each.
+fn parts_of(piece: &[u8]) -> Vec<Range<usize>> {
+    let (mut parts, mut start) = (vec![], 0);
+    while start < piece.len() {
+        let near = (start + PART).min(piece.len());
+        let end =
+            piece[near..].iter().position(|&byte| byte == b'\n').map_or(piece.len(), |at| near + at + 1);
+        parts.push(start..end);
+        start = end;
+    }
+    parts
+}
+
+fn is_blank(byte: u8) -> bool {
+    byte == b' ' || byte == b'\t'
+}
+
+/// The place of the first byte from `at` on that is the delimiter or no blank.
+fn after_blanks(piece: &[u8], at: usize, delimiter: u8) -> usize {
+    let blanks = piece[at..].iter().take_while(|&&byte| is_blank(byte) && byte != delimiter);
+    at + blanks.count()
+}
+
+/// The range without blanks at its end.
+fn without_blanks(piece: &[u8], range: Range<usize>) -> Range<usize> {
+    let blanks = piece[range.clone()].iter().rev().take_while(|&&byte| is_blank(byte));
+    range.start..range.end - blanks.count()
+}
+
+/// The place after the line end at a place; `None` if there is no line end.
+fn after_line_end(piece: &[u8], at: usize) -> Option<usize> {
+    match &piece[at..] {
+        [] | [b'\r'] => Some(piece.len()),
+        [b'\n', ..] => Some(at + 1),
+        [b'\r', b'\n', ..] => Some(at + 2),
+        _ => None,
+    }
+}
+
+/// The number in a cell, NaN if the cell is empty.
+fn number(cell: &[u8], delimiter: u8, mark: &mut Option<u8>) -> Option<f64> {
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    for &byte in cell {
+        match byte {
+            b'0'..=b'9' | b'+' | b'-' | b'e' | b'E' => {}
+            b'.' | b',' if byte != delimiter && *mark.get_or_insert(byte) == byte => {}
+            _ => return None,
+        }
+    }
+    let text = str::from_utf8(cell).ok().filter(|text| text.len() <= LONGEST_NUMBER)?;
+    let value: f64 =
+        if *mark == Some(b',') { text.replace(',', ".").parse().ok()? } else { text.parse().ok()? };
+    value.is_finite().then_some(value)
+}
+
+/// A column of names: each name once, in the order of the rows, and the number of the name of each row.
+#[derive(Debug, Default)]
+pub struct Names {
+    /// The number of the name of each row.
+    pub rows: Vec<i64>,
+    /// The names, each with a line feed behind it.
+    pub text: Vec<u8>,
+    starts: Vec<usize>,
+    /// Places by hash: a power of two of them, of which at most half are filled.
+    slots: Vec<Slot>,
+    hashes: RandomState,
+    /// The names have letters of either case.
+    lower: bool,
+    upper: bool,
+    /// A name is empty, "nan", not ASCII or with a blank inside.
+    doubtful: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    hash: u32,
+    /// The number of a name, from 1; 0 if the slot is free.
+    number: u32,
+}
+
+impl Names {
+    /// Whether all names are proper names, no two of which are equal but for blanks and case.
+    pub fn are_distinct(&self) -> bool {
+        let mixed = self.lower && self.upper;
+        !self.doubtful && !mixed
+    }
+
+    fn extend(&mut self, piece: &[u8], cells: &[(Range<usize>, u64)]) -> Option<()> {
+        self.rows.reserve(cells.len());
+        for (cell, hash) in cells {
+            let row = self.number(&piece[cell.clone()], *hash)?;
+            self.rows.push(row);
+        }
+        Some(())
+    }
+
+    fn number(&mut self, name: &[u8], hash: u64) -> Option<i64> {
+        if 2 * self.starts.len() >= self.slots.len() {
+            self.grow();
+        }
+        let slot = self.slot(name, hash);
+        if self.slots[slot].number == 0 {
+            self.check(name)?;
+            self.starts.push(self.text.len());
+            self.text.extend_from_slice(name);
+            self.text.push(b'\n');
+            self.slots[slot] =
+                Slot { hash: (hash >> 32) as u32, number: u32::try_from(self.starts.len()).ok()? };
+        }
+        Some(i64::from(self.slots[slot].number) - 1)
+    }
+
+    /// The slot of a name, or a free one for it.
+    fn slot(&self, name: &[u8], hash: u64) -> usize {
+        let last = self.slots.len() - 1;
+        let mut at = hash as usize & last;
+        loop {
+            let slot = self.slots[at];
+            if slot.number == 0 || (slot.hash == (hash >> 32) as u32 && self.is_name(slot.number, name)) {
+                return at;
+            }
+            at = (at + 1) & last;
+        }
+    }
+
+    fn is_name(&self, number: u32, name: &[u8]) -> bool {
+        let text = &self.text[self.starts[number as usize - 1]..];
+        text.get(name.len()) == Some(&b'\n') && text.starts_with(name)
+    }
+
+    fn grow(&mut self) {
+        let count = (2 * self.slots.len()).max(64);
+        self.slots = vec![Slot { hash: 0, number: 0 }; count];
+        for (number, name) in (1..).zip(self.text.split(|&byte| byte == b'\n').take(self.starts.len())) {
+            let hash = self.hashes.hash_one(name);
+            let mut at = hash as usize & (count - 1);
+            while self.slots[at].number > 0 {
+                at = (at + 1) & (count - 1);
+            }
+            self.slots[at] = Slot { hash: (hash >> 32) as u32, number };
+        }
+    }
+
+    /// Notes what a new name has; `None` if it has a control character.
+    fn check(&mut self, name: &[u8]) -> Option<()> {
+        self.doubtful |= name.is_empty() || name.eq_ignore_ascii_case(b"nan");
+        for &byte in name {
+            match byte {
+                0..b' ' => return None,
+                b'a'..=b'z' => self.lower = true,
+                b'A'..=b'Z' => self.upper = true,
+                b' ' | 128.. => self.doubtful = true,
+                _ => {}
+            }
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers, or names by row, of each column.
+    #[derive(Debug, PartialEq)]
+    enum Read {
+        Numbers(Vec<f64>),
+        Names(Vec<String>, bool),
+    }
+
+    fn read(pieces: &[&str], numeric: &[bool]) -> Option<Vec<Read>> {
+        let mut table = Table::new(b',', numeric);
+        for piece in pieces {
+            table.add(piece.as_bytes())?;
+        }
+        let columns = table.columns().into_iter().map(|column| match column {
+            Column::Numbers(numbers) => Read::Numbers(numbers),
+            Column::Names(names) => {
+                let text = String::from_utf8_lossy(&names.text).into_owned();
+                let all: Vec<&str> = text.lines().collect();
+                let rows = names.rows.iter().map(|&row| all[row as usize].to_owned()).collect();
+                Read::Names(rows, names.are_distinct())
+            }
+        });
+        Some(columns.collect())
+    }
+
+    fn names(names: &[&str], distinct: bool) -> Read {
+        Read::Names(names.iter().map(|&name| name.to_owned()).collect(), distinct)
+    }
+
+    #[test]
+    fn cells_have_quotes_blanks_and_line_ends() {
+        let expected = || Some(vec![names(&["a b", "2", "a b"], false), Read::Numbers(vec![1.5, -2e3, 7.0])]);
+        let numeric = [false, true];
+        assert_eq!(read(&["a b,1.5\n2,-2e3\na b,7\n"], &numeric), expected());
+        assert_eq!(read(&["a b,1.5\r\n2,-2e3\r\na b,7"], &numeric), expected());
+        assert_eq!(
+            read(&["\"a b\" , 1.5,\n", " 2 ,\t\"-2e3\"\n a b, 7\r\n", "\n  \n"], &numeric),
+            expected()
+        );
+    }
+
+    #[test]
+    fn an_empty_number_is_nan() {
+        let columns = read(&["p,,2\n"], &[false, true, true]);
+        assert!(matches!(&columns.unwrap()[1], Read::Numbers(x) if x.len() == 1 && x[0].is_nan()));
+    }
+
+    #[test]
+    fn irregular_lines_are_rejected() {
+        let lines = [
+            "p\n",
+            "p,1,2\n",
+            "p,x\n",
+            "p,inf\n",
+            "p,1_0\n",
+            "# p,1\n",
+            "\n p,1\n",
+            "\"p,1\n",
+            "p\"q,1\n",
+            "\"a\"b,1\n",
+            "\x01,1\n",
+        ];
+        for line in lines {
+            assert_eq!(read(&["a,1\n", line], &[false, true]), None, "{line:?}");
+            assert_eq!(read(&[&format!("a,1\n{line}")], &[false, true]), None, "{line:?}");
+        }
+        let long = format!("{},1\n", "x".repeat(LONGEST_LINE));
+        assert_eq!(read(&[&long], &[false, true]), None);
+    }
+
+    #[test]
+    fn a_table_has_one_decimal_mark() {
+        let read = |pieces: &[&str]| {
+            let mut table = Table::new(b';', &[true, true]);
+            pieces.iter().try_for_each(|piece| table.add(piece.as_bytes()))?;
+            match &table.columns()[1] {
+                Column::Numbers(numbers) => Some(numbers.clone()),
+                Column::Names(_) => None,
+            }
+        };
+        assert_eq!(read(&["1;2,5\n", "3;4,5\n"]), Some(vec![2.5, 4.5]));
+        assert_eq!(read(&["1;2,5\n", "3;4.5\n"]), None);
+        assert_eq!(read(&["1;2,5\n3;4.5\n"]), None);
+    }
+
+    #[test]
+    fn names_of_one_spelling_are_distinct() {
+        for (text, distinct) in [("a\nb\n", true), ("a\nB\n", false), ("7\nnan\n", false), ("ä\n", false)] {
+            let columns = read(&[text], &[false]).unwrap();
+            assert!(matches!(columns[0], Read::Names(_, same) if same == distinct), "{text:?}");
+        }
+    }
+
+    /// Parts that threads read at the same time give the columns of one part, and their faults.
+    #[test]
+    fn parts_are_joined_in_order() {
+        let line = |k: usize| format!("DJI_{:05},{},{}.25,{}\n", k / 100, k % 7919, k, k as f64 / 3.0);
+        let rows = 40_000;
+        let text: String = (0..rows).map(line).collect();
+        assert!(parts_of(text.as_bytes()).len() > 3);
+        let numeric = [false, false, true, true];
+        let columns = |threads: usize, pieces: &[&str]| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| read(pieces, &numeric))
+        };
+        let one = columns(1, &[&text]).unwrap();
+        let half = text.len() / 2 + text[text.len() / 2..].find('\n').unwrap() + 1;
+        assert_eq!(columns(3, &[&text]).unwrap(), one);
+        assert_eq!(columns(2, &[&text[..half], &text[half..]]).unwrap(), one);
+        assert!(matches!(&one[0], Read::Names(names, _) if names[rows - 1] == "DJI_00399"));
+        assert!(matches!(&one[2], Read::Numbers(x) if x.len() == rows && x[123] == 123.25));
+        assert_eq!(columns(2, &[&format!("{text}\n{text}")]), None);
+        assert_eq!(columns(2, &[&format!("{text}1,2,\"3,5\",4\n")]), None);
+    }
+}

@@ -1,0 +1,196 @@
+"""Tables of a statement: each is declared once, for the page, JSON and files with commas."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.results.statement.leave_one_out import LeftOut, limit_of
+from photogram.results.statement.standards import Lengths
+from photogram.results.statement.texts import Texts
+from photogram.show.cells import written
+from photogram.show.page import Cell, Column, Part, Section, decimals_of
+from photogram.show.quantity import Axis, Quantity, Table
+
+if TYPE_CHECKING:
+    from photogram import Statement
+
+DIRECTIONS = ("e", "n", "h")
+MAX_REMOVED_OBSERVATIONS = 1000  # Of the page; the file lists all
+decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
+"""Decimals of a table: no value loses digits of its standard deviation."""
+
+
+class Columns:
+    """Columns with heads in the language of a statement."""
+
+    def __init__(self, texts: Texts) -> None:
+        self.texts = texts
+
+    def head(self, key: str) -> str:
+        """Return the head of a column; text without a sentence stays."""
+        return self.texts(f"column.{key}") if self.texts.has(f"column.{key}") else key
+
+    def text(self, key: str, values: Sequence[str], **more: Any) -> Quantity:
+        """Return a column of texts."""
+        return Quantity([*values], kind="name", head=self.head(key), **more)
+
+    def number(
+        self, key: str, values: Any, decimals: int | None = None, unit: str = "", **more: Any
+    ) -> Quantity:
+        """Return a column of numbers: in fixed point, or with significant figures."""
+        return Quantity(
+            values,
+            (Axis.of("", unit),) if unit else (),
+            **{"kind": "deviation" if unit else "number", "head": self.head(key), **more},
+            decimals=decimals,
+        )
+
+    def directions(self, key: str, values: Floats, decimals: int, unit: str = "", **more: Any) -> Quantity:
+        """Return columns for east, north and height of (n, 3) values."""
+        axes = tuple(
+            Axis(name, unit, small=unit, label=self.texts(f"component.{name}")) for name in DIRECTIONS
+        )
+        head = f"{self.head(key)} {{}}"
+        return Quantity(np.reshape(values, (-1, 3)), axes, "deviation", head=head, decimals=decimals, **more)
+
+
+def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> Section:
+    """Return an annex with numbers as the language writes them, without empty tables."""
+    return Section(f"annex-{letter}", texts(f"annex.{letter}"), localized(texts, parts), intro, annex=True)
+
+
+def localized(texts: Texts, parts: Sequence[Part]) -> list[Part]:
+    """Return parts of a page with numbers as the language writes them, without empty tables."""
+    found: list[Part] = []
+    for part in parts:
+        if not isinstance(part, Table):
+            found.append(part)
+        elif part.visible:
+            table = written(part)
+            rows = [[_localized(texts, *pair) for pair in row] for row in table.cells()]
+            found.append(replace(table, rows=rows))
+    return found
+
+
+def _localized(texts: Texts, column: Column, cell: Cell) -> Cell:
+    value = cell.sorts if isinstance(cell.value, str) else cell.value
+    if value is None:
+        return cell
+    sorts = value if math.isfinite(value) else None
+    return replace(cell, value=texts.numeral(column.written(cell.value)), sorts=sorts)
+
+
+def check_points(found: Statement) -> Table:
+    """Return the check points with their differences and tests."""
+    texts, own, columns = found.texts, found.compared, Columns(found.texts)
+    names, unit, n = own.names, found.result.block.linear_unit, len(own)
+    tests = None if found.of_all is None else found.of_all.points
+    sd, adjusted, normalised = (
+        np.full((n, 3), np.nan) if tests is None else getattr(tests, name)
+        for name in ("sd_predicted", "sd_adjusted", "normalised")
+    )
+    T, p, others, p_others, ce90, le90 = (
+        np.full(n, np.nan) if tests is None else getattr(tests, name)
+        for name in ("T", "p", "others", "p_others", "ce90", "le90")
+    )
+    limit, decimals = 0.0 if tests is None else tests.limit, decimals_for(adjusted)
+    left_out = np.array([name in found.asked.without for name in names], dtype=bool)
+    covers = ["vegetated" if each else "open" for each in own.vegetated]
+    plain, axes = partial(Quantity, kind="name"), tuple(map(Axis, DIRECTIONS))
+    quantities = [
+        columns.text("point", names, name="point", member="point", marked=left_out),
+        plain(covers, name="cover", member="cover"),
+        columns.text("cover", [texts(f"cover.{cover}") for cover in covers]),
+        Quantity(own.given, member="given"),
+        Quantity(found.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
+        columns.directions("difference", own.differences, decimals, unit, name="d", member="difference"),
+        columns.directions("sd", sd, decimals, unit, name="sd", member="sd_predicted"),
+        Quantity(adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
+        Quantity(own.survey_sd, axes, "deviation", "sd_survey", "sd_survey"),
+        columns.directions("normalised", normalised, 1, name="normalised", member="normalised"),
+        columns.number("T", T, 1, name="T", member="T"),
+        columns.number("p", p, kind="probability", name="p", member="p", marked=p < limit),
+        columns.number(
+            "others",
+            others,
+            1,
+            name="T_from_the_others",
+            member="T_from_the_others",
+            marked=p_others < limit,
+        ),
+        Quantity(p_others, member="p_from_the_others"),
+        columns.number("CE90", ce90, decimals, unit, name="ce90_predicted", member="ce90_predicted"),
+        columns.number("LE90", le90, decimals, unit, name="le90_predicted", member="le90_predicted"),
+        plain(["no" if each else "yes" for each in left_out], name="used"),
+        plain([found.asked.without.get(name, "") for name in names], name="reason"),
+    ]
+    return Table("check_points", texts("annex.a"), quantities)
+
+
+def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
+    """Return control points predicted by the others."""
+    columns, unit = Columns(texts), texts.unit
+    sd, difference = (np.array([getattr(each, name) for each in own]) for name in ("sd", "difference"))
+    p, decimals = np.array([each.p for each in own]), decimals_for(sd)
+    least = [float(each.eigenvalues.min(initial=math.nan)) for each in own]
+    only = {
+        name: [getattr(each, name) for each in own] for name in ("covariance", "redundancy", "eigenvalues")
+    }
+    quantities = [
+        columns.text("point", [each.point for each in own], name="point", member="point"),
+        columns.directions(
+            "difference", difference, decimals, unit, name="d", member="predicted_minus_survey"
+        ),
+        columns.directions("sd", sd, decimals, unit, name="sd", member="sd"),
+        columns.number("T", [each.T for each in own], 1, name="T", member="T"),
+        Quantity([each.rank for each in own], name="rank", member="rank"),
+        columns.number("p", p, kind="probability", name="p", member="p", marked=p < limit_of(own)),
+        Quantity(least, name="least_eigenvalue"),
+        *(Quantity(values, member=name) for name, values in only.items()),
+    ]
+    return Table("leave_one_out", texts("annex.b"), quantities)
+
+
+def removed_observations(found: Statement) -> Table:
+    """Return the removed observations; the page lists the first ones."""
+    texts, columns, count = found.texts, Columns(found.texts), len(found.removed)
+    reasons, shown = [each.reason for each in found.removed], MAX_REMOVED_OBSERVATIONS
+    quantities = [
+        Quantity([each.name for each in found.removed], kind="name", name="observation", member="name"),
+        Quantity(reasons, kind="name", name="reason", member="reason"),
+        columns.text("observation", [texts.text(each.subject) for each in found.removed]),
+        columns.text("reason", [texts(f"removed.{reason}") for reason in reasons]),
+    ]
+    note = texts("table.removed.note", shown=shown, all=count) if count > shown else ""
+    rows = np.arange(min(count, shown))
+    return Table("removed", texts("table.removed"), quantities, note, shown=rows)
+
+
+def test_lengths(texts: Texts, own: Lengths) -> Table:
+    """Return calibrated lengths with their errors."""
+    columns, test, decimals = Columns(texts), own.test, decimals_for(own.test.sd)
+    number = partial(columns.number, decimals=decimals, unit=texts.unit)
+    limits = np.full(len(own.lines), math.nan) if test.limits is None else test.limits
+    labels = [f"{line}: {' – '.join(ends)}" for line, ends in zip(own.lines, own.ends, strict=True)]
+    quantities = [
+        columns.text("line", labels),
+        *(
+            Quantity([*values], kind="name", member=name)
+            for name, values in zip(
+                ("line", "from", "to"), (own.lines, *np.transpose(own.ends).tolist()), strict=True
+            )
+        ),
+        number("length", own.calibrated, member="calibrated"),
+        number("error", test.errors, member="error"),
+        number("sd", test.sd, member="sd"),
+        columns.number("normalised", test.normalised, 2, member="normalised"),
+        number("limit", limits, member="limit"),
+    ]
+    return Table("lengths", texts("table.lengths"), quantities)
