@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from photogram.words import Phrase
+from rejections import located
 
 
 def phrases(message: Any) -> Iterator[Phrase]:
@@ -50,5 +51,7 @@ def fields_of(messages: Any, code: str) -> Mapping[str, Any]:
 
 
 def as_check(expected: str | Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Return a check of errors: a check as it is, or that of a sentence of the other readers of files."""
-    return expected if callable(expected) else lambda error: re.search(expected, str(error)) is not None
+    """Return a check of errors: a check as it is, or whether place, codes and values contain some words."""
+    if callable(expected):
+        return expected
+    return lambda error: expected in located(error) or re.search(expected, str(error)) is not None

@@ -87,8 +87,8 @@ def test_numbers_and_letters_of_reports_are_sides(written, names):
 
 
 WRONG = {
-    "no table": ("[camera]\nc = 1\n", "no table camera"),
-    "unknown key": (HEAD + "focal = 152\n", "has no focal"),
+    "no table": ("[camera]\nc = 1\n", coded("error.unknown", kind="table", name="camera")),
+    "unknown key": (HEAD + "focal = 152\n", coded("error.unknown.close", kind="key", name="focal")),
     "unit": (HEAD + 'unit = "in"\n', coded("error.choice", value="in", names=["mm"])),
     "strip": (HEAD + 'data_strip = "right"\n', coded("error.choice", names=["left", "top"])),
     "date": (HEAD + 'date = "11.5.1983"\n', coded("error.day")),
@@ -261,7 +261,7 @@ def test_tables_of_several_cameras_with_covariances(tmp_path):
     ("text", "message"),
     [
         ("camera,fiducial,x\na,1,2\n", "column y is missing"),
-        ("camera,fiducial,x,y\na,1,2,\n", "is empty"),
+        ("camera,fiducial,x,y\na,1,2,\n", coded("error.column", column="y", message="error.empty")),
         ("camera,fiducial,x,y\na,1,2,3\na,ll,2,3\n", coded("error.repeated")),
         ("camera,fiducial,x,y,sd_x,sd_y\na,1,2,3,0,1\n", coded("error.positive")),
         ("camera,fiducial,x,y,use\na,1,2,3,maybe\n", coded("error.choice", names=["on", "off"])),

@@ -86,8 +86,8 @@ def test_commands_have_the_example(run, tmp_path, command):
     [
         ((), "give IN, or --example"),
         (("a", "b", "--example"), "give IN, or --example"),
-        (("a",), "OUT: is missing"),
-        (("--example",), "OUT: is missing"),
+        (("a",), "OUT: must be specified"),
+        (("--example",), "OUT: must be specified"),
     ],
 )
 def test_arguments_that_are_missing_or_too_many_are_named(run, words, message):

@@ -56,7 +56,7 @@ def test_a_folder_that_is_the_input_is_refused(run):
     shutil.copytree(EXAMPLE, "quarry")
     done = run("adjust", "quarry", "--parquet", "quarry/images.csv")
     assert done.exit_code == 1
-    assert "is not a directory" in done.output
+    assert "must be a folder" in done.output
     for place in ("quarry", "./quarry/"):
         done = run("adjust", "quarry", "--parquet", place)
         assert done.exit_code == 1

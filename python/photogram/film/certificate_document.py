@@ -30,7 +30,6 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.statistics.verdict import marks_of
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -86,7 +85,8 @@ def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]
     adjustment = None
     if found.adjusted is not None:
         test = found.adjusted.test
-        parts.append(observed(found.adjusted, marks_of(certificate.verdict, _distances(found.adjusted))))
+        tests = _distances(found.adjusted)
+        parts.append(observed(found.adjusted, certificate.verdict.marks(tests.kind, tests.values.shape)))
         adjustment = {
             **members(found.adjusted, "degrees_of_freedom", free_movements="free"),
             "omega": test.weighted_sum_of_squares if test else None,

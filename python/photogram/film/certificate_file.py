@@ -30,8 +30,7 @@ from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
-from photogram.io.toml import TomlFile, day_of
-from photogram.io.toml_tables import KeyPlace, Table, read_document
+from photogram.io.toml import KeyPlace, Table, TomlFile, day_of, read_document
 from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
@@ -54,8 +53,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     InputError: the file cannot be read, is no TOML, or has what is not known or cannot be used.
     """
     table = read_document(path, {"certificate": _KEYS}).table("certificate")
-    _choice(table, "unit", "mm", ("mm",))
-    strip = _choice(table, "data_strip", "left", get_args(DataStrip))
+    table.choice("unit", ("mm",), "mm")
+    strip = table.choice("data_strip", get_args(DataStrip), "left")
     frame = _Frame(cast(DataStrip, strip), path)
     found: dict[str, Any] = {
         "name": table.word("camera", path.stem),
@@ -63,7 +62,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         "day": _day(table),
         "c": abs(table.number("c", low=-LARGEST, high=LARGEST)) if "c" in table else None,
         "sd_c": _positive(table, "sd_c"),
-        "reference": _choice(table, "principal_point", "fiducial-centre", REFERENCES),
+        "reference": table.choice("principal_point", REFERENCES, "fiducial-centre"),
         "autocollimation": frame.place(table, "autocollimation"),
         "symmetry": frame.place(table, "symmetry"),
         "sd_principal_point": _positive(table, "sd_principal_point"),
@@ -144,7 +143,7 @@ class _Frame:
         for number, row in enumerate(table.items("lines", []), 1):
             if not isinstance(row, dict):
                 raise table.error("lines", phrase("error.table", value=str(row)))
-            line = Table(row, f"certificate.lines {number}", table.file)
+            line = Table(row, f"certificate.lines {number}", table.source)
             line.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
             names = [self.mark(each) for each in line.words("marks")]
             if len(names) != 4 or len(set(names)) < 4:
@@ -165,13 +164,6 @@ class _Frame:
 def _text(value: Any) -> str:
     """Return a number as it was typed."""
     return str(value).replace("_", "")
-
-
-def _choice(table: Table, key: str, default: str, known: tuple[str, ...]) -> str:
-    value = table.text(key, default)
-    if value not in known:
-        raise table.error(key, phrase("error.choice", value=value, names=known))
-    return value
 
 
 def _positive(table: Table, key: str) -> float | None:

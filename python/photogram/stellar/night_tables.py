@@ -12,7 +12,6 @@ from photogram.arguments.types import Indices
 from photogram.show.angles import ARCSEC
 from photogram.show.page import Fact
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, of_each
-from photogram.statistics.verdict import marks_of
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
     ARCSEC_OF_RAD,
@@ -185,7 +184,8 @@ def worst(result: CalibratedNight, most: int) -> Table:
     """Return the images with the largest standardized residuals; the outliers of the verdict are marked."""
     size = np.nan_to_num(np.abs(result.calibration.standardized)).max(axis=1, initial=0.0)
     rows: Indices = np.argsort(-size, kind="stable")[:most]
-    marked = marks_of(result.verdict, night_tests(result)[0])
+    tests = night_tests(result)[0]
+    marked = result.verdict.marks(tests.kind, tests.values.shape)
     columns = [
         replace(column, marked=marked) if column.member == "standardized" else column
         for column in images(result).columns[:-1]

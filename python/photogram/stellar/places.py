@@ -125,13 +125,13 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
     ra, dec = catalogue.places.T
     pm_ra = catalogue.proper_motions[:, 0] / np.cos(dec)
     # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
-    motions = ra, dec, pm_ra, catalogue.proper_motions[:, 1], catalogue.parallaxes / ARCSEC
     epoch = erfa.epj2jd(catalogue.epoch)
     with warnings.catch_warnings():
         # Parallaxes of zero mean distant stars; erfa warns about each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
         # Overflows become an error of erfa.
         warnings.simplefilter("ignore", RuntimeWarning)
+        motions = ra, dec, pm_ra, catalogue.proper_motions[:, 1], catalogue.parallaxes / ARCSEC
         try:
             moved = erfa.pmsafe(*motions, 0.0, *epoch, 2451545.0, 0.0)
         except erfa.ErfaError:

@@ -14,7 +14,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.io.places import Place, at_place
 from photogram.io.rows import Row, read_rows
-from photogram.io.toml_tables import Document, Table, read_document
+from photogram.io.toml import Document, Table, read_document
 from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
@@ -251,9 +251,7 @@ def _groups_and_times(
 
 def _axis(table: Table) -> Axis:
     xx, yy, xy = table.numbers("weight", 3)
-    group = table.text("orientation", "event")
-    if group not in GROUPS:
-        raise table.error("orientation", phrase("error.choice", value=group, names=GROUPS))
+    group = table.choice("orientation", GROUPS, "event")
     return Axis(
         azimuth=math.radians(table.number("azimuth_deg", low=-360, high=360)),
         zenith_distance=math.radians(table.number("zenith_distance_deg", low=-90, high=90)),

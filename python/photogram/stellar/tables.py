@@ -13,7 +13,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each
-from photogram.statistics.verdict import marks_of
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
     ARCSEC_OF_RAD,
@@ -290,7 +289,7 @@ def worst(result: Result, most: int) -> Table:
         column(result.solved.residuals, UM_OF_M, "Residual", 2, parts="x, y"),
         replace(
             column(values, None, f"Test value {tests.statistic}", 2, parts="x, y"),
-            marked=marks_of(result.verdict, tests),
+            marked=result.verdict.marks(tests.kind, tests.values.shape),
         ),
     ]
     note = f"The {len(order)} plate coordinates of the largest test values."

@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from photogram.io.places import at_place
-from photogram.io.toml_tables import KeyPlace, Table, read_document
+from photogram.io.toml import KeyPlace, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 

@@ -116,4 +116,4 @@ def test_the_command_rejects_and_says_so(three):
     assert done.exit_code in (0, 3, 4), done.output
     report = (three / "other" / "report.txt").read_text()
     assert "OUTLIER_REJECTION: 2 measures of" not in report
-    assert "OUTLIER_REJECTION=yes is not used" in report
+    assert "OUTLIER_REJECTION=yes is ignored" in report
