@@ -210,7 +210,7 @@ def test_a_project_declares_them(run, tmp_path):
     assert f"{diameter['value']:.7f}" in again.stdout
 
     for line, message in (
-        ('bore = { circle = ["nobody-*"] }', "the feature bore: there is no point 'nobody-*'"),
+        ('bore = { circle = ["nobody-*"] }', "[features] bore: there is no point 'nobody-*'"),
         (
             'bore = { circel = ["hole-1"] }',
             "[features] bore: there is no kind of features 'circel'; the nearest name is 'circle'",

@@ -100,4 +100,4 @@ def test_results_of_collections_are_no_projects(run):
     assert run("collection", "--example", "--parquet", "data", "--quiet").exit_code == 0
     done = run("info", "data")
     assert done.exit_code == 1
-    assert "holds the result of a collection" in " ".join(done.output.split())
+    assert "the folder contains the result of a collection" in " ".join(done.output.split())
