@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from photogram.words import Phrase
+from rejections import located
 
 
 def phrases(message: Any) -> Iterator[Phrase]:
@@ -19,7 +20,7 @@ def phrases(message: Any) -> Iterator[Phrase]:
 
 
 def _plain(value: Any) -> Any:
-    return getattr(value, "code", value)
+    return list(value) if isinstance(value, tuple) else getattr(value, "code", value)
 
 
 def has_code(message: Any, code: str, /, **fields: Any) -> bool:
@@ -28,7 +29,8 @@ def has_code(message: Any, code: str, /, **fields: Any) -> bool:
     A phrase among the fields is compared by its code.
     """
     return any(
-        each.code == code and all(_plain(each.fields[name]) == value for name, value in fields.items())
+        each.code == code
+        and all(_plain(each.fields[name]) == _plain(value) for name, value in fields.items())
         for each in phrases(getattr(message, "phrase", message))
     )
 
@@ -49,10 +51,7 @@ def fields_of(messages: Any, code: str) -> Mapping[str, Any]:
 
 
 def as_check(expected: str | Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Return a check of errors: a check as it is, or that of a sentence of the other readers of files."""
-    return expected if callable(expected) else lambda error: re.search(expected, str(error)) is not None
-
-
-def nested_codes(message: Any) -> list[str]:
-    """Return the codes of an error or phrase, the outermost first."""
-    return [each.code for each in phrases(getattr(message, "phrase", message))]
+    """Return a check of errors: a check as it is, or whether place, codes and values contain some words."""
+    if callable(expected):
+        return expected
+    return lambda error: expected in located(error) or re.search(expected, str(error)) is not None

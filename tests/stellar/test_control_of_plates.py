@@ -14,8 +14,8 @@ from photogram import InputError
 from photogram.cli import app
 from photogram.io.rows import read_rows
 from photogram.stellar import ARCSEC, Site, apparent_places, calibrate, landmark, read_plain, sidereal_time
-from photogram.stellar.landmarks import HOUR
 from photogram.stellar.places import epoch
+from photogram.stellar.sky import HOUR
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 

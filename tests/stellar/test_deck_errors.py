@@ -24,13 +24,13 @@ def deck(plate):
 def refused(tmp_path):
     """Read a deck that cannot be read; return the error."""
 
-    def refused(lines, message, record, **fields):
+    def refused(lines, code, record, **fields):
         file = tmp_path / "deck"
         file.write_text("\n".join(lines) + "\n")
         with pytest.raises(InputError) as raised:
             read_deck(file)
         error = raised.value
-        assert has_code(error, message, **fields), error
+        assert has_code(error, code, **fields), error
         assert (error.file, error.record) == (file, record)
         assert lines[record - 1].rstrip() in str(error)
 

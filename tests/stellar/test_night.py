@@ -368,11 +368,11 @@ def test_results_do_not_replace_the_input(folder, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[station]", "[sation]", "there is no table sation"),
-        ("latitude_deg", "lattitude_deg", r"\[station\] has no lattitude_deg"),
+        ("[station]", "[sation]", coded("error.unknown.close", kind="table", name="sation")),
+        ("latitude_deg", "lattitude_deg", coded("error.unknown.close", kind="key", name="lattitude_deg")),
         ("latitude_deg = 47.05", "latitude_deg = 147.05", coded("error.key", key="latitude_deg")),
         ("field_of_view_deg = 36.9", "field_of_view_deg = 236.9", coded("stars.field-of-view")),
-        ("field_of_view_deg", "fov", r"\[camera\] has no fov"),
+        ("field_of_view_deg", "fov", coded("error.unknown", kind="key", name="fov")),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "yesterday"', coded("stars.utc")),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "2024-13-05T20:10:00.00"', coded("stars.utc-range")),
         (
@@ -382,7 +382,11 @@ def test_results_do_not_replace_the_input(folder, monkeypatch):
         ),
         ('name = "2"', 'name = "6"', coded("error.unknown", kind="exposure", name="2")),
         ('file = "images.csv"', 'file = "nothing.csv"', "cannot be read"),
-        ('file = "images.csv"', 'files = "images.csv"', "has no files"),
+        (
+            'file = "images.csv"',
+            'files = "images.csv"',
+            coded("error.unknown.close", kind="key", name="files"),
+        ),
         ("sd_px = 0.1", "sd_px = 0.0", coded("error.key", key="sd_px")),
         ("sd_px = 0.1", 'sd_px = "small"', coded("error.key", table="images", key="sd_px")),
         ("[labels]", "[labels", "Expected"),
@@ -401,7 +405,7 @@ def test_bad_rows_are_named(folder):
     lines = file.read_text().splitlines()
     for row, message in (
         ("1,12,x", "column y_px: must be a number, got 'x'"),
-        ("1,12,", "y_px is blank"),
+        ("1,12,", coded("error.column", column="y_px", message="error.empty")),
         ("9,1,1", coded("error.unknown", kind="exposure", name="9")),
     ):
         file.write_text("\n".join([*lines[:5], row, *lines[5:]]))

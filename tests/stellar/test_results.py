@@ -23,7 +23,7 @@ from photogram.stellar import (
     camera_document,
     read_plain,
 )
-from photogram.stellar.comparator_frame import comparator_frame
+from photogram.stellar.curves import comparator_frame
 from photogram.stellar.movement import fictitious_points
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))

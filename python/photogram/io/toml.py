@@ -312,6 +312,20 @@ class Table:
         return str(value)
 
 
+class KeyPlace:
+    """A table of a file, or a key of it, as the place of errors."""
+
+    def __init__(self, table: Table, key: str = "") -> None:
+        self.table, self.key = table, key
+
+    def error(self, message: str | Phrase, /) -> InputError:
+        """Return an error that names file, table and key."""
+        if self.key:
+            return self.table.error(self.key, message)
+        located = phrase("error.at", what=f"[{self.table.name}]", message=message)
+        return InputError(located, file=self.table.file)
+
+
 class Document:
     """A TOML file of tables by name, one or several of each; a missing or surplus one is an InputError."""
 

@@ -36,15 +36,12 @@ def plate_tests(result: Result) -> list[Tested]:
         return phrase("stars.place", axis=_AXES[index[1]], star=problem.star_ids[index[0]])
 
     unit = 1 / given if given else 1.0
-    images = _testable(solved.standardized, solved.redundancy, unit)
-    stars = _testable(solved.star_standardized, solved.star_redundancy, unit)
-    observations = [
-        Tested(phrase("stars.plate-coordinates"), images, image),
-        Tested(_PLACES, stars, star),
-    ]
+    images = np.abs(_testable(solved.standardized, solved.redundancy, unit))
+    stars = np.abs(_testable(solved.star_standardized, solved.star_redundancy, unit))
+    tests = [Tested(phrase("stars.plate-coordinates"), images, image), Tested(_PLACES, stars, star)]
     if given:
-        return observations
-    return [each.studentized(sum(solved.sums), result.degrees_of_freedom) for each in observations]
+        return tests
+    return [each.studentized(sum(solved.sums), result.degrees_of_freedom) for each in tests]
 
 
 def plate_findings(result: Result) -> Findings:
@@ -81,11 +78,8 @@ def night_tests(result: CalibratedNight) -> list[Tested]:
 
     images = _testable(found.standardized, found.redundancy, found.mean_error)
     stars = _testable(found.star_standardized, found.star_redundancy, found.mean_error)
-    observations = [
-        Tested(phrase("stars.image-coordinates"), images, image),
-        Tested(_PLACES, stars, star),
-    ]
-    return [each.studentized(found.mean_error**2 * freedom, freedom) for each in observations]
+    tests = [Tested(phrase("stars.image-coordinates"), images, image), Tested(_PLACES, stars, star)]
+    return [each.studentized(found.mean_error**2 * freedom, freedom) for each in tests]
 
 
 def night_findings(result: CalibratedNight) -> Findings:

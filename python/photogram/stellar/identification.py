@@ -40,9 +40,9 @@ def turned_to(rays: Floats, directions: Floats) -> Floats:
     """Return alpha, omega, kappa of the camera that sees directions (n, 3) along rays (n, 3).
 
     Rays have x right, y down and z along the axis, directions are north, east, zenith; finite rows count.
-    The matrix that maximizes the sum of ray' M direction is U diag(1, 1, d) V' of the singular
-    value decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991), with d = -1 or 1 so
-    that det M = -1: the local triad is left-handed.
+    The matrix that maximizes the sum of ray' M direction is U diag(1, 1, d) V' of the singular value
+    decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991), with d = -1 or 1 so that
+    det M = -1: the local triad is left-handed.
     """
     finite = np.isfinite(rays).all(axis=1) & np.isfinite(directions).all(axis=1)
     left, _, right = np.linalg.svd(rays[finite].T @ directions[finite])

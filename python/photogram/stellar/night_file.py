@@ -15,7 +15,7 @@ from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.io.rows import Row
 from photogram.io.rows import Table as ImageTable
-from photogram.io.toml import Document, Table, read_document
+from photogram.io.toml import Document, KeyPlace, Table, read_document
 from photogram.messages import unknown_name
 from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
@@ -30,7 +30,7 @@ from photogram.stellar.pointing import attitude_of, axis_of
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.stellar.tomlfile import KeyPlace, effects, named_files, pole_arcsec, site
+from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 
 AUTO = "auto"
@@ -186,9 +186,7 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
     if prior is not None:
         return _in_pixels(prior, frame, table.path("prior"))
     field = table.number("field_of_view_deg")
-    lens = table.word("lens", "brown")
-    if lens not in (*LENSES, AUTO):
-        raise table.error("lens", phrase("error.choice", value=lens, names=[*LENSES, AUTO]))
+    lens = table.choice("lens", (*LENSES, AUTO), "brown")
     with at_place(KeyPlace(table, "field_of_view_deg")):
         # The choice of a lens begins with the widest one.
         return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)

@@ -127,22 +127,13 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
     # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
     epoch = erfa.epj2jd(catalogue.epoch)
     with warnings.catch_warnings():
-        # Parallaxes of zero stand for stars that are far; erfa remarks on each.
+        # Parallaxes of zero mean distant stars; erfa warns about each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
-        # What overflows ends as an error of erfa.
+        # Overflows become an error of erfa.
         warnings.simplefilter("ignore", RuntimeWarning)
+        motions = ra, dec, pm_ra, catalogue.proper_motions[:, 1], catalogue.parallaxes / ARCSEC
         try:
-            moved = erfa.pmsafe(
-                ra,
-                dec,
-                pm_ra,
-                catalogue.proper_motions[:, 1],
-                catalogue.parallaxes / ARCSEC,
-                0.0,
-                *epoch,
-                2451545.0,
-                0.0,
-            )
+            moved = erfa.pmsafe(*motions, 0.0, *epoch, 2451545.0, 0.0)
         except erfa.ErfaError:
             raise _no_motion(catalogue) from None
     if not all(np.isfinite(part).all() for part in moved):
@@ -160,17 +151,7 @@ def _reduced(places: Sequence[Floats], astrometry: Any, effects: Effects) -> tup
     """Take the steps of erfa.atciq one by one: places of 2000.0 with their motions to those of date."""
     import erfa
 
-    right, declination, pm_right, pm_declination, parallax, velocity = places
-    seen = erfa.pmpx(
-        right,
-        declination,
-        pm_right,
-        pm_declination,
-        parallax,
-        velocity,
-        astrometry["pmt"],
-        astrometry["eb"],
-    )
+    seen = erfa.pmpx(*places, astrometry["pmt"], astrometry["eb"])
     if effects.light_deflection:
         seen = erfa.ldsun(seen, astrometry["eh"], astrometry["em"])
     if effects.annual_aberration:

@@ -19,12 +19,11 @@ from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
-from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
 from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
-from photogram.stellar.sky import Site
+from photogram.stellar.sky import HOUR, Site, landmark
 from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 
@@ -252,9 +251,7 @@ def _groups_and_times(
 
 def _axis(table: Table) -> Axis:
     xx, yy, xy = table.numbers("weight", 3)
-    group = table.text("orientation", "event")
-    if group not in GROUPS:
-        raise table.error("orientation", phrase("error.choice", value=group, names=GROUPS))
+    group = table.choice("orientation", GROUPS, "event")
     return Axis(
         azimuth=math.radians(table.number("azimuth_deg", low=-360, high=360)),
         zenith_distance=math.radians(table.number("zenith_distance_deg", low=-90, high=90)),

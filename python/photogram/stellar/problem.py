@@ -163,19 +163,16 @@ class Problem(Brief):
         keep_images = ~(images | stars[self.image_stars])
         keep = ~stars & np.isin(np.arange(len(self.star_ids)), self.image_stars[keep_images])
         place = np.cumsum(keep) - 1
-        names = self.star_names or self.star_ids
+        of_images = ("image_groups", "image_xy", "image_weights", "image_times")
         return replace(
             self,
             star_ids=_chosen(self.star_ids, keep),
-            star_names=_chosen(names, keep),
+            star_names=_chosen(self.star_names or self.star_ids, keep),
             star_places=self.star_places[keep],
             star_weights=self.star_weights[keep],
             image_points=_chosen(self.image_points, keep_images),
             image_stars=place[self.image_stars[keep_images]],
-            image_groups=self.image_groups[keep_images],
-            image_xy=self.image_xy[keep_images],
-            image_weights=self.image_weights[keep_images],
-            image_times=self.image_times[keep_images],
+            **{name: getattr(self, name)[keep_images] for name in of_images},
         )
 
     def places_at(self, parameters: Floats, free: Bools) -> Floats:

@@ -26,19 +26,8 @@ from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_tim
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import NO_PRIOR, Prior, core_problem
 from photogram.stellar.sky import Site
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera, weight_of
+from photogram.stellar.sky_cameras import SkyCamera, weight_of
 from photogram.words import Phrase, phrase
-
-__all__ = [
-    "BrownCamera",
-    "Exposure",
-    "SkyCalibration",
-    "SkyCamera",
-    "calibrate_exposures",
-    "partials",
-    "project_sky",
-    "stars_near",
-]
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)

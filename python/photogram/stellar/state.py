@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,16 @@ class Stage:
         """Return the stage of a solution."""
         levels, counts = solved.levels, degrees_of_freedom(problem, solved.free)
         return cls(levels[0].solution, counts, levels, solved.stop, solved.converged, solved.log_determinant)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations after the initial values."""
+        return len(self.levels) - 1
+
+    @property
+    def log10_determinant(self) -> float:
+        """Decimal logarithm of the determinant of the reduced normal equations."""
+        return self.log_determinant / math.log(10)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each
 from photogram.stellar.camera_tables import (
@@ -37,6 +38,7 @@ from photogram.stellar.findings import plate_tests
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.problem import Counts
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
@@ -82,29 +84,23 @@ def parameters(result: Result) -> list[Table]:
 
 def stages(result: Result) -> list[Table]:
     """Return the solutions of the run, and the levels of discrepancies of all iterations."""
-    rows = [
-        {
-            "solution": stage.solution,
-            **asdict(stage.counts),
-            "degrees_of_freedom": stage.counts.degrees_of_freedom,
-            "iterations": len(stage.levels) - 1,
-            "stop": stage.stop,
-            "converged": stage.converged,
-            "log10_determinant": stage.log_determinant / math.log(10),
-        }
-        for stage in result.stages
-    ]
-    heads = {"log10_determinant": "Log10 of the determinant"}
+    counts = {field.name: f"counts.{field.name}" for field in fields(Counts)}
+    attributes = {
+        "solution": "solution",
+        **counts,
+        "degrees_of_freedom": "counts.degrees_of_freedom",
+        **{name: name for name in ("iterations", "stop", "converged", "log10_determinant")},
+    }
     columns = [
-        Quantity(
-            [row[name] for row in rows],
-            (),
-            "name" if name in ("solution", "stop", "converged") else "number",
+        of_each(
+            result.stages,
+            attribute,
+            kind="name" if name in ("solution", "stop", "converged") else "number",
             member=name,
-            head=heads.get(name, name.capitalize().replace("_", " ")),
+            head=name.capitalize().replace("_", " "),
             figures=10,
         )
-        for name in rows[0]
+        for name, attribute in attributes.items()
     ]
     levels = [
         of_each(result.levels, "solution", kind="name", head="Solution"),

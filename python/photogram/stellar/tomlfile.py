@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from photogram.errors import InputError
 from photogram.io.places import at_place
-from photogram.io.toml import Table, read_document
+from photogram.io.toml import KeyPlace, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
-from photogram.words import Phrase, phrase
 
 _STATION = {
     "latitude_deg",
@@ -26,20 +24,6 @@ _STATION = {
     "number",
     "name",
 }
-
-
-class KeyPlace:
-    """A table of a file, or a key of it, as the place of errors."""
-
-    def __init__(self, table: Table, key: str = "") -> None:
-        self.table, self.key = table, key
-
-    def error(self, message: str | Phrase, /) -> InputError:
-        """Return an error that names file, table and key."""
-        if self.key:
-            return self.table.error(self.key, message)
-        located = phrase("error.at", what=f"[{self.table.name}]", message=message)
-        return InputError(located, file=self.table.file)
 
 
 def named_files(
