@@ -201,7 +201,7 @@ def test_bad_input_writes_nothing(run, project, tmp_path):
     assert result.exit_code == 1
     assert result.stdout == ""
     assert (
-        f"{project / 'IMAGES'}, record 4: columns 11-20 (F10.3): '       NaN' is not a number"
+        f"{project / 'IMAGES'}, record 4: columns 11-20 (F10.3): must be a number, got '       NaN'"
         in result.stderr
     )
     assert f"|{record[:10]}       NaN{record[20:]}|" in result.stderr

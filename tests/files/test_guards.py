@@ -201,7 +201,7 @@ def test_no_output_goes_over_an_input(run, place, name, option, source, alias):
     before = content(place)
     result = run(*words(name, **{option: target}))
     assert result.exit_code == 1, result.output
-    assert f"{target}: would be " in result.stderr
+    assert f"{target}: the result would be " in result.stderr
     assert "over the input" in result.stderr or "of the project" in result.stderr
     assert content(place) == before
 
@@ -229,7 +229,7 @@ def test_a_directory_is_no_place_for_a_file(run, place, name, option):
     for directory in (".", "galveston", "galveston/.."):
         result = run(*words(name, **{option: directory}))
         assert result.exit_code == 1
-        assert f"{directory}: is a directory" in result.stderr
+        assert f"{directory}: the output is a directory" in result.stderr
     assert content(place) == before
 
 
@@ -286,7 +286,7 @@ def test_files_of_an_output_directory_spare_the_inputs(run, place, name):
     before = content(place)
     result = run("comparator", "listing.txt", "--no-plots", "--out", place)
     assert result.exit_code == 1, (name, result.output)
-    assert "listing.txt: would be written over the input" in result.stderr
+    assert "listing.txt: the result would be written over the input" in result.stderr
     assert content(place) == before
 
 

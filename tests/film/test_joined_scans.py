@@ -77,8 +77,8 @@ def test_a_shift_that_is_none_costs_three_degrees_of_freedom(tmp_path: Path) -> 
 
 
 def test_the_hint_says_what_to_give(tmp_path: Path) -> None:
-    [hint] = map(str, seam_hints(diagnosed(adjusted(joined(tmp_path, 0, seam=False)))))
-    assert "seam_column of the table photos" in hint
+    [hint] = seam_hints(diagnosed(adjusted(joined(tmp_path, 0, seam=False))))
+    assert hint.code == "film-check.seam.column"
 
 
 def test_marks_of_the_other_half_are_not_lost(tmp_path: Path) -> None:

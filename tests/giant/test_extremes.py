@@ -118,7 +118,7 @@ def test_other_encodings_are_named(name, encoding, sound, tmp_path):
 
 def test_zero_bytes_are_named(sound, tmp_path):
     content = sound[0]["FRAMES"]
-    with pytest.raises(InputError, match=r"the character '\\x00' has no place") as caught:
+    with pytest.raises(InputError, match=r"printable characters only, got '\\x00'") as caught:
         read_project(written(tmp_path, sound[0] | {"FRAMES": content[:100] + b"\0" + content[101:]}))
     assert caught.value.record is not None
 
@@ -141,7 +141,7 @@ def test_links_to_nothing_are_named(sound, tmp_path):
     place = written(tmp_path, sound[0])
     (place / "GROUND").unlink()
     os.symlink(place / "nowhere", place / "GROUND.DAT")
-    with pytest.raises(InputError, match=r"GROUND\.DAT: cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"GROUND\.DAT: the file cannot be read: No such file"):
         read_project(place)
 
 

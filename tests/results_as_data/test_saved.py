@@ -284,7 +284,7 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     images.write_bytes(whole)
     parquet.write_table(table.slice(1), folder / "points.parquet")
     resealed(folder)
-    with pytest.raises(InputError, match=r"images\.parquet: names '.*', which is not in its own table"):
+    with pytest.raises(InputError, match=r"images\.parquet: the name '.*' is missing in the table"):
         read_result(folder)
     parquet.write_table(table.drop_columns(["covariance"]), folder / "points.parquet")
     resealed(folder)
@@ -369,14 +369,17 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda document: document.update(format=1), "is of the format 1"),
+        (lambda document: document.update(format=1), "the file has the version '1'"),
         (lambda document: document.update(kind="other"), "of a kind that is not known: 'other'"),
-        (lambda document: document.pop("kept"), "is not the summary of a result"),
+        (lambda document: document.pop("kept"), "must be the summary of a result"),
         (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "no class that this"),
         (lambda document: document["kept"]["block"].update(frame={"was": 1}), "does not say what"),
         (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
         (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
-        (lambda document: document["kept"].update(state={"tuple": []}), "keeps no state"),
+        (
+            lambda document: document["kept"].update(state={"tuple": []}),
+            "must contain the state of an adjustment",
+        ),
         (lambda document: document["kept"]["result"].update(cameras=["x"]), "cameras.0. is 'x', not a Adj"),
         (
             lambda document: document["kept"]["block"].update(point_ids="x"),

@@ -74,7 +74,7 @@ def collection_trial(
     """Return a collection as tests ask it."""
     return NetworkTrial(
         core=core,
-        suspects=_Named(collection, core.suspects, parts).suspects(),
+        suspects=_Named(collection, core.suspects, parts),
         supported=np.asarray(np.isfinite(collection.photo_sd).all(axis=1)),
         rough=ROUGH,
         exact=EXACT,
@@ -89,7 +89,7 @@ class _Named(NamedSuspects):
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
         """Return the rows that may go alone: of control single ones or all, of a station single ones."""
-        size = int(self.starts[group + 1] - self.starts[group])
+        size = int(self.row_starts[group + 1] - self.row_starts[group])
         if not self.apart or int(self.kinds[group]) == IMAGE or size < 2:
             return None
         single = [(row,) for row in range(size)]

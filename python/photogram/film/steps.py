@@ -71,7 +71,6 @@ class StepsCompared(Documented, Brief):
             what=WHAT,
             title=self.inside.block.title,
             judgements=[judged(self.inside.verdict, "films inside the adjustment")],
-            advice=[],
             highlights=_facts(self),
             sections=[
                 Section("points", of_axes.title, [of_axes], _WHY),

@@ -8,7 +8,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from types import MappingProxyType
 
-from photogram.errors import InputError, PhotogramError
+from photogram.errors import InputError, PhotogramError, message_of
 from photogram.formats.block_contents import check_images, lost_motions
 from photogram.formats.format import Format, Wishes, later
 from photogram.formats.format_coordinates import (
@@ -190,7 +190,7 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             )
         except InputError as error:
             # What refuses arrays or systems of coordinates does not know where they came from.
-            raise (error if error.file else InputError(error.message, file=path)) from None
+            raise (error if error.file else InputError(message_of(error), file=path)) from None
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:

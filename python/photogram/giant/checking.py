@@ -11,6 +11,7 @@ from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project
+from photogram.words import Phrase, phrase
 
 """As the 1987 program printed them."""
 CODES = np.array([1, 2, 4])
@@ -23,8 +24,8 @@ class _GuideWords(Words):
     bandwidth = True
     iterations = True
 
-    def unhold(self, kept: Bools) -> str:
-        return f"lower the type (column 80: {_type_code(kept)})"
+    def remedy(self, kept: Bools) -> Phrase:
+        return phrase("check.remedy.type", type=_type_code(kept))
 
     def values(self, kept: Bools) -> dict[str, float]:
         return {"type_code": float(_type_code(kept))}

@@ -18,12 +18,9 @@ from photogram.show.quantity import Axis, Quantity, Table, component, members, o
 if TYPE_CHECKING:
     from photogram import Result
 
-LISTED = 12
-"""Cameras with a table of their own."""
-NAMED = 3
-"""Photos that are named of each correlation."""
-RADII = 9
-"""Radii of a distortion curve that people see."""
+LISTED = 12  # Cameras with a table of their own
+NAMED = 3  # Photos of a correlation
+RADII = 9  # Rows of a distortion curve
 
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
@@ -169,7 +166,6 @@ def _pairs(found: Calibration) -> list[str]:
 
 
 def _first_photos(photos: Sequence[str]) -> str:
-    """Name three photos at the most."""
     named = f"photo {', '.join(photos[:NAMED])}"
     return named if len(photos) <= NAMED else f"{named} and {len(photos) - NAMED} others"
 
@@ -207,7 +203,6 @@ def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
 
 
 def _field_remarks(result: Result, found: Calibration) -> list[str]:
-    """Return the largest effect of the terms of the lens that are not radial."""
     field = lens_field(result, found.camera)
     return [] if field is None else [_field_sentence(field, str(found.camera.camera.unit))]
 

@@ -45,10 +45,8 @@ if TYPE_CHECKING:
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
-JUDGED = 100_000
-"""Images of a network whose `repr` tells the verdict, at most."""
-REMARKS = 5
-"""That its `repr` tells at most."""
+JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
+REMARKS = 5  # Of a `repr`
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +195,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         if len(self.messages) > REMARKS:
             rows.append(("", f"and {len(self.messages) - REMARKS} more remarks"))
         rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
-        return f"Adjusted {self._what}", rows
+        title = getattr(self.given, "title", "")
+        return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
 
     @abstractmethod
     def _members(self) -> dict[str, Any]:
@@ -206,11 +205,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return json.to_json(self._members())
-
-    @property
-    @abstractmethod
-    def _what(self) -> str:
-        """What was adjusted, with its title."""
 
     @property
     @abstractmethod

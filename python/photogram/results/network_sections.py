@@ -31,14 +31,10 @@ from photogram.show.quantity import Link, Quantity, Table, named, of_each
 if TYPE_CHECKING:
     from photogram import Result
 
-ALL = 200
-"""Photos or points up to which all have a row."""
-SOME = 100
-"""Otherwise the rows of the most notable, beside those that other tables name."""
-COMPONENTS = 120
-"""Rows of a table with a row for each component at most."""
-IMAGES = 1_000
-"""Image observations that a text report lists at most."""
+ALL = 200  # Number up to which all photos or points are listed
+SOME = 100  # Rows of longer tables, besides those that other tables mention
+COMPONENTS = 120  # Rows of a table of components
+IMAGES = 1_000  # Image observations of a text report
 
 
 def component_table(

@@ -147,13 +147,11 @@ class Tests:
     @cached_property
     def outliers(self) -> list[Bools]:
         """The components of each type that are outliers of the verdict, or belong to groups that are."""
-        outlying, found = self._result.verdict.outlying, []
+        verdict, found = self._result.verdict, []
         for tests in self.normal:
-            marks = np.zeros(tests.values.shape, dtype=bool)
-            for place in outlying.get(tests.kind, ()):
-                marks[place] = True
+            marks = verdict.marks(tests.kind, tests.values.shape)
             for kind, components in tests.groups.items():
-                marks[[place[0] for place in outlying.get(kind, ())], components] = True
+                marks[[place[0] for place in verdict.outlying.get(kind, ())], components] = True
             found.append(marks)
         return found
 

@@ -17,8 +17,7 @@ from photogram.statistics.distributions import critical_chi_square
 
 CHANCE = 1e-4
 """Chance that one of the pairs that are tried agrees better when exchanged, though it is not exchanged."""
-LEVEL = 0.001
-"""Chance that what is right disagrees as much."""
+LEVEL = 0.001  # Significance level of exchanged names
 
 
 def are_exchanged(

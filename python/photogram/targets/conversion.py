@@ -126,8 +126,6 @@ class Conversion(Brief, Documented):
         return Document(
             what="Lens conversion",
             title=title,
-            judgements=[],
-            advice=[],
             highlights=[Fact(name, text) for name, text in rows],
             sections=[Section.of(Table("differences", "Differences", differences))],
             members={

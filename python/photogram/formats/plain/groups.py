@@ -21,6 +21,7 @@ from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Rate, Velocity
 from photogram.network.trajectories import Clock, GyroBias
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
+from photogram.words import phrase
 
 _Group = TypeVar("_Group", "Antenna", "Inertial")
 
@@ -52,7 +53,7 @@ def grouped(
     if what in tables.settings.tables or what == "attitude_groups":
         for row, name in enumerate(names):
             if name and name not in groups:
-                raise table.error(row, f"column group: there is no group {name} in the table {what}")
+                raise table.unknown_error(row, "group", "group", name, groups)
     return [groups.get(name) for name in names]
 
 
@@ -73,7 +74,7 @@ def antennas(tables: Tables) -> dict[str, Antenna]:
     found: dict[str, Antenna] = {}
     for row, (name, title, lever, shift, drift) in enumerate(zip(names, titles, *words, strict=True)):
         if name in found:
-            raise table.error(row, f"the group {name} is there twice")
+            raise table.error(row, phrase("error.repeated", kind="group", name=name))
 
         def one(kind: type[Any], what: str, name: str, row: int = row, **more: Any) -> Any:
             return tables.shared.one(table, row, what, kind, name, values[what][row], sd[what][row], **more)
@@ -104,7 +105,7 @@ def inertials(tables: Tables) -> dict[str, Inertial]:
     found: dict[str, Inertial] = {}
     for row, (name, title, turned, bias) in enumerate(zip(names, titles, *words, strict=True)):
         if name in found:
-            raise table.error(row, f"the group {name} is there twice")
+            raise table.error(row, phrase("error.repeated", kind="group", name=name))
         matrix = None if np.isnan(matrices[row]).any() else matrices[row].T
         one = tables.shared.one
         boresight, gyro = called(turned, title), called(bias, title)

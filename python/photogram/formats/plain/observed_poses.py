@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -54,6 +53,7 @@ from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
+from photogram.words import phrase
 
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
@@ -94,10 +94,10 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
             if math.isnan(time):
                 time = subjects.times[subjects.photos[given["photo"]]]
             if group.drift is not None and math.isnan(time):
-                raise table.error(row, "the group has a drift, and the photo no time")
+                raise table.error(row, phrase("plain.drift-without-time"))
             given["time"] = 0.0 if math.isnan(time) else float(time)
         given |= {"lever_arm": group.lever, "shift": group.shift, "drift": group.drift}
-        found.append(made(table, row, partial(Position, **given)))
+        found.append(made(table, row, Position, **given))
     return found
 
 
@@ -107,7 +107,7 @@ def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
     measured = _measured(tables, table, "velocities", VELOCITY)
     groups = grouped(tables, table, antennas(tables), "gnss_groups")
     return [
-        made(table, row, partial(Velocity, **given, lever_arm=group.lever))
+        made(table, row, Velocity, **given, lever_arm=group.lever)
         for row, group, given in _used(table, of, groups, Antenna(), "velocity", *measured)
     ]
 
@@ -145,7 +145,7 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
     measured = values @ tables.flip, tables.flip @ covariances @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     return [
-        made(table, row, partial(Rate, **given, boresight=group.boresight, bias=group.bias))
+        made(table, row, Rate, **given, boresight=group.boresight, bias=group.bias)
         for row, group, given in _used(table, of, groups, Inertial(), "rate", *measured)
     ]
 
@@ -162,7 +162,7 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     return [
-        made(table, row, partial(Attitude, **given, boresight=group.boresight))
+        made(table, row, Attitude, **given, boresight=group.boresight)
         for row, group, given in _used(table, of, groups, Inertial(), "attitude", matrices, covariances)
     ]
 
@@ -178,7 +178,7 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     covariances, turns = tables.pose_covariances(table, sd), tables.flip @ tables.known_matrices(table)
     given = zip(first, second, vectors, turns, covariances, strict=True)
     return [
-        made(table, row, partial(Relative, names[one], names[other], vector, turn, covariance=covariance))
+        made(table, row, Relative, names[one], names[other], vector, turn, covariance=covariance)
         for row, (one, other, vector, turn, covariance) in enumerate(given)
     ]
 

@@ -35,6 +35,7 @@ from photogram.network.film_reduction import camera_unit
 from photogram.network.moving_photos import LineSensor
 from photogram.network.observations import Control, Position
 from photogram.results.features import Definition
+from photogram.words import phrase
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -132,9 +133,7 @@ def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Ex
     if ups == {"down"} or None not in [sizes[row] for row in frames]:
         return "down"
     if "down" in ups:
-        raise InputError(
-            "cameras that count from the corner and from the middle: their pictures have no size"
-        )
+        raise InputError(phrase("plain.both-origins"))
     return "up"
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
-from photogram.results.features import Features
+from photogram.results.features import Features, unit_deviations
 from photogram.results.features_report import through
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.comparison import in_order
@@ -30,7 +30,7 @@ from photogram.results.statement.tables import (
     test_lengths,
 )
 from photogram.results.statement.texts import Texts
-from photogram.show.judgement import signs_of
+from photogram.show.judgement import verdict_table
 from photogram.show.page import Drawing, Fact, Facts, Part, Section
 from photogram.show.quantity import Axis, Quantity, Table
 
@@ -63,7 +63,6 @@ def annexes(found: Statement) -> list[Section]:
 
 
 def _radii(texts: Texts, own: Figures) -> Table:
-    """Return radii of probability: of the sample, from moments, and predicted."""
     columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
     radii = {name: radius for name, radius in own.radii.items() if radius is not None}
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
@@ -174,31 +173,11 @@ def _adjustment(found: Statement) -> list[Part]:
     drawing = Drawing("map-overlap", texts("page.overlap"), caption, partial(overlap, found.result, texts))
     return [
         Table("kinds", texts("table.kinds"), sums),
-        _tests(found),
+        verdict_table(found.result.verdict, texts),
         removed_observations(found),
         _markers(found),
         drawing,
     ]
-
-
-def _tests(found: Statement) -> Table:
-    """Return all tests of the verdict on the adjustment."""
-    texts, columns, tests = found.texts, Columns(found.texts), found.result.verdict.tests
-    named = [f"{texts.text(test.kind, '^')}: {texts.text(test.subject)}".removesuffix(": ") for test in tests]
-    outcomes = [texts("test.passes" if test.accepted else "test.rejects") for test in tests]
-    p, level = (np.array([getattr(test, name) for test in tests]) for name in ("p", "level"))
-    quantities = [
-        columns.text("test", named),
-        columns.text("statistic", [signs_of(test.statistic) for test in tests]),
-        columns.number("value", [test.value for test in tests], figures=4),
-        columns.number("low", [test.limits[0] for test in tests], figures=4),
-        columns.number("high", [test.limits[1] for test in tests], figures=4),
-        columns.number("p", p, kind="probability", marked=p < level),
-        columns.number("level", level, kind="probability"),
-        columns.number("tests", [test.tests for test in tests]),
-        columns.text("outcome", outcomes, marked=np.array([not test.accepted for test in tests])),
-    ]
-    return Table("tests", texts("table.tests"), quantities, texts("table.tests.note"))
 
 
 def _markers(found: Statement) -> Table:
@@ -223,7 +202,6 @@ def _markers(found: Statement) -> Table:
 
 
 def _survey(found: Statement) -> list[Table]:
-    """Return control and check points as they were given."""
     texts, columns, own = found.texts, Columns(found.texts), found.survey
     if own.system is None:
         return []
@@ -245,7 +223,6 @@ def _survey(found: Statement) -> list[Table]:
 
 
 def _files(found: Statement) -> list[Part]:
-    """Return program, command and input files."""
     texts, columns, files = found.texts, Columns(found.texts), found.inputs
     facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
     if found.command:
@@ -259,7 +236,6 @@ def _files(found: Statement) -> list[Part]:
 
 
 def _metrology(found: Statement) -> list[Part]:
-    """Return features, calibrated lengths, and measures of ISO 19157."""
     texts, columns, parts = found.texts, Columns(found.texts), list[Part]()
     features, lengths, measures = found.result.features, found.standards.lengths, found.standards.iso_19157
     if features is not None and len(features):
@@ -289,13 +265,6 @@ def _features(texts: Texts, features: Features) -> Table:
     columns = Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
-    deviations = [
-        min(
-            (each.sd for each in feature.quantities if each.unit == own.unit and each.sd > 0),
-            default=math.nan,
-        )
-        for feature, own in every
-    ]
     axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
     numbers = [
         Quantity(
@@ -310,4 +279,4 @@ def _features(texts: Texts, features: Features) -> Table:
         columns.text(BLANK, [own.unit for _, own in every]),
     ]
     note = f"k = {texts.number(features.k, 2)}"
-    return Table("features", texts("table.features"), quantities, note, deviations=np.array([deviations]))
+    return Table("features", texts("table.features"), quantities, note, deviations=unit_deviations(features))

@@ -19,8 +19,7 @@ from photogram.show.quantity import Table
 if TYPE_CHECKING:
     from photogram import Statement
 
-_CLASSES = {"h": "v", "plan": "h", "all": "3d"}
-"""Parts of the components with classes."""
+_CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with classes
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -39,8 +38,6 @@ def statement_document(found: Statement) -> Document:
         what=texts("page.what"),
         title=asked.title or found.result.block.title,
         judgements=[Judgement(mark, found.headline, [text for _, text in judged.sentences], tone)],
-        advice=[],
-        highlights=[],
         sections=[
             Section("figures", texts("page.figures"), [*localized(texts, _figures(found)), *_notes(found)]),
             Section("assumptions", texts("page.assumptions"), [assumed, _map(found)]),

@@ -30,7 +30,6 @@ def files_of_statement(found: Statement) -> dict[str, bytes]:
 
 
 def _check_file(found: Statement) -> bytes:
-    """Return `check_points.csv`: a row for each check point, and for each point that is not usable."""
     columns = frame(check_points(found).columns)
     for name, reason in found.compared.not_usable:
         values = {"point": name, "used": "no", "reason": reason, "cover": ""}
@@ -40,7 +39,6 @@ def _check_file(found: Statement) -> bytes:
 
 
 def _budget_file(found: Sequence[Budget]) -> bytes:
-    """Return `budget.csv`: a row for each source of each quantity at each level."""
     rows: list[tuple[Any, ...]] = []
     for each in found:
         head = (each.quantity, each.unit, each.value, each.sd)

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 DIRECTIONS = ("e", "n", "h")
 MAX_REMOVED_OBSERVATIONS = 1000  # Of the page; the file lists all
 decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
-"""Decimals of a table: no value loses digits of its standard deviation."""
 
 
 class Columns:
