@@ -303,7 +303,7 @@ KINDS: dict[str, Plant] = {
     ),
     "degrees read as radians": of_all(
         "convention",
-        "degrees and read as radians",
+        "degrees and were read as radians",
         lambda block: {"photo_attitudes": np.degrees(block.photo_attitudes)},
     ),
     "stations in feet": of_all(
@@ -334,7 +334,7 @@ KINDS: dict[str, Plant] = {
     ),
     "X and Y of control exchanged": of_all(
         "convention",
-        "X and Y of the points are exchanged",
+        "X and Y of points are exchanged",
         lambda block: {"point_positions": block.point_positions[:, [1, 0, 2]]},
     ),
     "control, test value 10": of_block(control_error),
@@ -346,7 +346,7 @@ KINDS: dict[str, Plant] = {
     "observed positions in feet": with_positions(
         lambda _, each: {"position": np.asarray(each.position) / 0.3048}, "are in feet"
     ),
-    "observed positions of 0.02 s later": with_positions(later, "those of another time"),
+    "observed positions of 0.02 s later": with_positions(later, "time offset"),
     "lever arm with the wrong sign": with_positions(
         lambda _, each: {"lever_arm": -np.asarray(each.lever_arm.value)},
         "lever arm",

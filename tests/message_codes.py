@@ -1,12 +1,58 @@
-"""Codes of messages, and of the messages in their fields."""
+"""What tests ask of messages: codes with fields, never sentences."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 from photogram.words import Phrase
 
 
-def codes(message):
+def phrases(message: Any) -> Iterator[Phrase]:
+    """Return the phrases of a message: of itself, and of its fields."""
+    if isinstance(message, Phrase):
+        yield message
+        for value in message.fields.values():
+            yield from phrases(value)
+    elif isinstance(message, list | tuple):
+        for value in message:
+            yield from phrases(value)
+
+
+def _plain(value: Any) -> Any:
+    return getattr(value, "code", value)
+
+
+def has_code(message: Any, code: str, /, **fields: Any) -> bool:
+    """Return whether an error, a remark or a message has a code, or one of its fields, with some fields.
+
+    A phrase among the fields is compared by its code.
+    """
+    return any(
+        each.code == code and all(_plain(each.fields[name]) == value for name, value in fields.items())
+        for each in phrases(getattr(message, "phrase", message))
+    )
+
+
+def coded(code: str, /, **fields: Any) -> Callable[[Any], bool]:
+    """Return a check of errors for `pytest.raises`: whether they have a code with some fields."""
+    return lambda error: has_code(error, code, **fields)
+
+
+def codes(messages: Any) -> list[str]:
+    """Return the codes of remarks."""
+    return [message.code for message in messages]
+
+
+def fields_of(messages: Any, code: str) -> Mapping[str, Any]:
+    """Return the fields of the first of some remarks that has a code."""
+    return next(each.fields for message in messages for each in phrases(message.phrase) if each.code == code)
+
+
+def as_check(expected: str | Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Return a check of errors: a check as it is, or that of a sentence of the other readers of files."""
+    return expected if callable(expected) else lambda error: re.search(expected, str(error)) is not None
+
+
+def nested_codes(message: Any) -> list[str]:
     """Return the codes of an error or phrase, the outermost first."""
-    phrase = message if isinstance(message, Phrase) else message.phrase
-    if phrase is None:
-        return []
-    inner = [code for value in phrase.fields.values() if isinstance(value, Phrase) for code in codes(value)]
-    return [phrase.code, *inner]
+    return [each.code for each in phrases(getattr(message, "phrase", message))]

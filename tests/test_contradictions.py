@@ -415,7 +415,7 @@ PLANTED = {
         "Accepted: the residuals agree with the given standard deviations"
     ),
     "There are no check points. Leave some control out": "rms of check points   X 0.1 m",
-    "There is no control, and nothing else gives a datum": "held components of control X 3, Y 3, Z 3",
+    "There is no control, and no other observation": "held components of control X 3, Y 3, Z 3",
     "Nothing needs to be done.": "Look at the observations that are named.",
     "Weights too optimistic": "Weights too pessimistic",
     "camera.json is withheld: no block may take this camera.": "camera.json holds the calibrated camera",

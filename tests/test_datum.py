@@ -149,9 +149,9 @@ def test_standard_deviations_say_what_they_refer_to():
 
 def test_a_block_that_is_not_free_says_why(small_block):
     assert adjust(small_block).datum.kind == "observations"
-    with pytest.raises(AdjustmentError, match=r"not free: its datum is given by .*control \(1\)"):
+    with pytest.raises(AdjustmentError, check=lambda error: error.code == "free.not-free"):
         adjust(small_block, datum=InnerConstraints())
-    with pytest.raises(AdjustmentError, match="not free"):
+    with pytest.raises(AdjustmentError, check=lambda error: error.code == "free.not-free"):
         adjust(small_block).in_datum(InnerConstraints())
     # Relative covariances it has all the same.
     relative = adjust(small_block).relative_to(photo=small_block.photo_ids[0])
@@ -162,9 +162,9 @@ def test_datums_that_cannot_be_are_refused():
     block = free_network(bars=False)
     result = adjust(block)
     for points in (["point1", "point2"], []):
-        with pytest.raises(InputError, match="do not carry it"):
+        with pytest.raises(InputError, check=lambda error: error.code == "free.few"):
             result.in_datum(InnerConstraints(points=points))
-    with pytest.raises(InputError, match="do not carry it"):
+    with pytest.raises(InputError, check=lambda error: error.code == "free.few"):
         adjust(block, datum=InnerConstraints(points=["point1"]))
     with pytest.raises(InputError, match="'pointless', which is not in the block"):
         result.in_datum(InnerConstraints(points=["pointless"]))
@@ -174,9 +174,9 @@ def test_datums_that_cannot_be_are_refused():
         MinimumConstraints(coordinate=("photo2", "X"))
     with pytest.raises(InputError, match="datum is InnerConstraints, MinimumConstraints or None"):
         adjust(block, datum="inner")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="a photo, or points"):
+    with pytest.raises(InputError, check=lambda error: error.code == "error.exclusive"):
         result.relative_to()
-    with pytest.raises(InputError, match="no InnerConstraints"):
+    with pytest.raises(InputError, check=lambda error: error.phrase.fields["message"].code == "error.kind"):
         result.in_datum(MinimumConstraints())  # type: ignore[arg-type]
 
 

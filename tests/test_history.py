@@ -88,15 +88,15 @@ def test_figures_are_those_of_a_dense_computation():
 
 
 def test_what_is_no_history_is_refused():
-    with pytest.raises(InputError, match="two occasions"):
+    with pytest.raises(InputError, check=lambda error: error.code == "history.values"):
         history([[1.0]], np.ones((1, 1, 1)))
-    with pytest.raises(InputError, match=r"\(2, 1, 1\)"):
+    with pytest.raises(InputError, check=lambda error: error.code == "history.covariance"):
         history([[1.0], [2.0]], np.ones(3))
-    with pytest.raises(InputError, match="not positive definite"):
+    with pytest.raises(InputError, check=lambda error: error.code == "error.covariance"):
         history([[1.0], [2.0]], np.zeros((2, 1, 1)))
-    with pytest.raises(InputError, match="do not fall"):
+    with pytest.raises(InputError, check=lambda error: error.code == "history.times"):
         history([[1.0], [2.0]], np.ones((2, 1, 1)), times=[1.0, 0.0])
-    with pytest.raises(InputError, match="one time"):
+    with pytest.raises(InputError, check=lambda error: error.code == "history.equal-times"):
         history([[1.0], [2.0]], np.ones((2, 1, 1)), times=[1.0, 1.0])
     (change,) = history([[0.0], [9.0]], np.ones((2, 1, 1)), freedom=100.0).series[0].changes
     assert (change.kind, change.at) == ("step", 1)

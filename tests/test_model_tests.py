@@ -78,9 +78,9 @@ def test_effects_of_ones_own_are_tested_by_their_partials(results):
     camera = symmetric.cameras[0]
     u = camera.camera.rays(xy)
     x, y = (camera.value("c") * u[:, :2] / u[:, 2:] - symmetric.residuals).T
-    with pytest.raises(InputError, match="take up effect 1"):
+    with pytest.raises(InputError, check=lambda error: error.code == "models.inseparable"):
         score_test(symmetric, partials=np.stack([np.stack([-y, x], axis=1)]))
-    with pytest.raises(InputError, match="are estimated already"):
+    with pytest.raises(InputError, check=lambda error: error.code == "models.estimated"):
         score_test(result, ["K1"])
 
 
@@ -96,9 +96,9 @@ def test_bic_finds_the_terms_that_are_there(results):
 
 def test_models_of_other_observations_are_not_compared(block, results):
     others = block.replace(image_sd=block.image_sd * 2)
-    with pytest.raises(InputError, match="other standard deviations of images"):
+    with pytest.raises(InputError, check=lambda error: error.code == "models.observations"):
         compare({"one": results["all"], "two": adjust(others)})
-    with pytest.raises(InputError, match="two results at least"):
+    with pytest.raises(InputError, check=lambda error: error.code == "models.few"):
         compare({"one": results["all"]})
 
 

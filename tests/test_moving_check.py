@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
+from nested_codes import codes
 from photogram import (
     AdjustmentError,
     Block,
@@ -35,21 +36,22 @@ def test_the_check_proposes_nothing_for_what_moves():
 def test_the_check_finds_gross_errors():
     found = diagnose(rolling(gross=True))
     assert len(found.grave) == 1
-    assert found.grave[0].text.startswith("image of point P0 on photo IMG_1 does not fit the others (T ")
-    assert "error about x 1" in found.grave[0].text
+    assert codes(found.grave[0]) == ["check.blunder.group", "check.error"]
+    assert found.grave[0].phrase.fields["subject"] == "image of point P0 on photo IMG_1"
+    assert found.grave[0].phrase.fields["error"].fields["sizes"][0].startswith("x 1")
     block = scanned()
     row = next(k for k, each in enumerate(block.observations) if each.KIND == "velocity")
     wrong = replace(block.observations[row], velocity=[0.0, 0.0, 5.0])
     observations = [*block.observations[:row], wrong, *block.observations[row + 1 :]]
     found = diagnose(block.replace(observations=observations))
-    assert [each.text.split(" does not")[0] for each in found.grave] == [wrong.name]
+    assert [each.phrase.fields["subject"] for each in found.grave] == [wrong.name]
 
 
 def test_the_check_of_what_cannot_be_adjusted():
     block = rolling()
     free = [replace(each, sd_velocity=np.inf, sd_rate=np.inf) for each in block.timed]
     found = diagnose(block.replace(timed=free))
-    assert found.grave[0].text.startswith("it cannot be adjusted: ")
+    assert found.grave[0].kind == "no-adjustment"
     assert found.result is None
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import photogram
 from photogram import collection, formats
-from photogram.results import tested_observations as rows_of
+from photogram.results import tests as table
 from photogram.words import Phrase
 
 PLOT = import_module("photogram.plots.tests")  # the package has a function with this name
@@ -63,9 +63,10 @@ def assert_counts(verdict):
 
 def assert_marks(result):
     """Compare the marked rows of the table of the worst observations with the outliers of the verdict."""
-    every = {each.kind: each for each in rows_of.tested_singly(result)}
-    marked = {kind: rows_of.outlying(result.verdict, each) for kind, each in every.items()}
-    *_, tests = result.document().table("worst").columns
+    tests_of = table.Tests(result)
+    every = {each.kind: each for each in tests_of.components}
+    marked = dict(zip(every, tests_of.outliers, strict=True))
+    tests = next(each for each in result.document().table("worst").columns if each.marked is not None)
     sizes = np.concatenate([np.nan_to_num(np.abs(each.values)).ravel() for each in every.values()])
     flags = np.concatenate([each.ravel() for each in marked.values()])
     order = np.argsort(-sizes, kind="stable")
@@ -107,9 +108,21 @@ def test_simulated_errors_are_judged_once():
 
 def test_the_plot_of_tests_marks_outliers_only(result):
     drawn = result._plot_data()
-    masks = [rows_of.outlying(result.verdict, each) for each in rows_of.tested_observations(result)]
-    count = sum(
-        int((own & np.isfinite(each.values)).sum()) for own, each in zip(masks, drawn.tested, strict=True)
-    )
+    masks = zip(table.Tests(result).outliers, drawn.tested, strict=True)
+    count = sum(int((own & np.isfinite(each.values)).sum()) for own, each in masks)
     labels = [getattr(mark, "label", "") for mark in PLOT.tests(result).panels[1].marks]
     assert (f"outliers of the verdict ({count:,})" in labels) == (count > 0)
+
+
+def test_the_table_of_tests_has_all_columns_for_every_type(result):
+    rows = result.test_table()
+    statistic = "w" if "w" in rows else "t"
+    assert np.isfinite(rows[["residual", "sd", "redundancy"]]).all(axis=None)
+    tested = rows[np.isfinite(rows[statistic])]
+    assert ((tested.p >= 0) & (tested.p <= 1) & np.isfinite(tested.detectable)).all()
+    if statistic == "w":
+        assert np.allclose(tested.w, tested.residual / tested.sd / np.sqrt(tested.redundancy), rtol=1e-6)
+        assert np.allclose(tested.detectable, tested.sd * np.sqrt(17.0746 / tested.redundancy), rtol=1e-4)
+    tests = table.Tests(result)
+    marked = zip(tests.outliers, tests.components, strict=True)
+    assert rows.outlier.sum() == sum(own[each.observed].sum() for own, each in marked)

@@ -531,10 +531,10 @@ def test_a_second_pattern_by_spacing_and_by_positions(run):
 def test_what_plan_refuses(run, tmp_path):
     assert run("simulate", "block", *SMALL).exit_code == 0
     for arguments, said in {
-        ("--control", "corners"): "both patterns are: corners",
-        ("block", "--strips", "3"): "takes no options of simulated",
-        ("block", "--against-spacing", "3"): "takes no options of simulated",
-        ("block", "block"): "the same project twice",
+        ("--control", "corners"): "both patterns are corners",
+        ("block", "--strips", "3"): "must not be combined with options of simulated",
+        ("block", "--against-spacing", "3"): "must not be combined with options of simulated",
+        ("block", "block"): "every project must be specified once",
     }.items():
         result = run("plan", *arguments)
         assert result.exit_code == 2, arguments

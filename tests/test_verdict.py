@@ -21,11 +21,8 @@ from photogram.statistics.findings import (
     Agreement,
     Findings,
     GroupFactor,
-    Observations,
     Removed,
     Systematic,
-    by_t,
-    by_w,
 )
 from photogram.statistics.findings import Tested as Group
 from photogram.statistics.verdict import verdict, worst
@@ -43,7 +40,7 @@ def good(seed=1, factor=1.0):
 
 
 def findings(w, variance=1.0, **more):
-    kinds = [by_w(Observations("image coordinates", w, named))]
+    kinds = [Group("image coordinates", w, named)]
     test = global_test(variance * F, F)
     return Findings(
         **{"status": "converged", "observations": kinds, "degrees_of_freedom": F, "global_test": test} | more
@@ -157,7 +154,7 @@ def test_groups_and_singles_are_tested_together():
     v[11] = [4.0, -4.0]
     tests = group_tests(blocks, v)
     groups = Group("images", tests.statistic, lambda index: f"image {index[0]}", "T", tests.dimension)
-    single = by_w(Observations("control", good()[:4], named))
+    single = Group("control", good()[:4], named)
     made = verdict(findings(good(), 2.0, observations=[groups, single]))
     largest = {test.name.partition(":")[0]: test for test in made.tests}
     assert largest["images"].statistic == "T"
@@ -173,7 +170,7 @@ def test_the_level_is_shared_and_stated():
     assert single.level == pytest.approx(0.05 / 240)
     assert single.limits == (pytest.approx(-3.7089, abs=1e-3), pytest.approx(3.7089, abs=1e-3))
     assert statistics_of(made) == ["judged.w"]
-    by_others = findings(good(), observations=[by_t(Observations("images", good(), named), F, F)])
+    by_others = findings(good(), observations=[Group("images", good(), named).studentized(F, F)])
     assert statistics_of(verdict(by_others)) == ["judged.t"]
 
 
@@ -187,7 +184,7 @@ def test_one_observation_that_makes_up_everything_is_found():
     """Internally studentized it would be the root of 8, 2.83: below 3 whatever its size."""
     w = np.zeros((15, 1))
     w[4] = 1000.0
-    tested = by_t(Observations("stations", w, lambda index: f"station {index[0]}"), 1e6, 8)
+    tested = Group("stations", w, lambda index: f"station {index[0]}").studentized(1e6, 8)
     made = verdict(findings(w, observations=[tested], global_test=None, degrees_of_freedom=8))
     assert made.headline.startswith(
         "Not tested as a whole (no a-priori unit weight), but look at: 1) station 4"
@@ -313,22 +310,21 @@ def test_reliability_stands_in_report_and_document(simulated):
     result = pickle.loads(pickle.dumps(adjust(simulated)))
     summary = result.reliability_summary
     every = result.reliability()
-    kinds = {each.kind: each for each in summary.kinds}
-    assert sum(each.redundancy for each in summary.kinds) == pytest.approx(
+    document = json.loads(result.to_json())["reliability"]
+    kinds = {each["kind"]: each for each in document["kinds"]}
+    assert sum(each["redundancy"] for each in kinds.values()) == pytest.approx(
         result.degrees_of_freedom, abs=1e-6
     )
-    assert kinds["image"].groups == len(simulated.image_xy)
-    images = [each for each in summary.weakest if each.kind == "image"]
+    assert kinds["image"]["groups"] == len(simulated.image_xy)
+    images = [each for each in document["weakest"] if each["kind"] == "image"]
     checked = (every.suspects.kinds == 0) & (every.tests.least > 0.01)
-    assert images[0].external_sd == pytest.approx(np.nanmax(every.group_external[checked]))
-    group = [str(every.suspects.name(each)) for each in range(len(checked))].index(images[0].name)
+    assert images[0]["external_sd"] == pytest.approx(np.nanmax(every.group_external[checked]))
+    group = [str(every.suspects.name(each)) for each in range(len(checked))].index(images[0]["name"])
     moved = np.linalg.norm(every.own_point_effect[every.suspects.rows(group)], axis=1)
-    assert images[0].own_point == pytest.approx(moved.max())
+    assert images[0]["own_point"] == pytest.approx(moved.max())
     assert all(0.9 < pair.correlation <= 1 for pair in summary.pairs)
     weakest = result.document().table("reliability-weakest")
-    assert images[0].name in weakest.frame()["name"].tolist()
-    document = json.loads(result.to_json())["reliability"]
-    assert [each["kind"] for each in document["kinds"]] == [each.kind for each in summary.kinds]
+    assert images[0]["name"] in weakest.frame()["name"].tolist()
     assert list(summary.table()["name"]) == [each["name"] for each in document["weakest"]]
     assert pickle.loads(pickle.dumps(result)).reliability_summary.table().equals(summary.table())
 
@@ -385,7 +381,7 @@ def lens(fall=1e9):
 def checks(*, error=0.0, together=1.0):
     """Return check points of which the second is wrong by so many standard deviations."""
     values = np.array([1.0, 3.0 + error**2, 2.0])
-    own = by_w(Observations("check points", values, lambda place: f"K{place[0]}"))
+    own = Group("check points", values, lambda place: f"K{place[0]}")
     points = replace(own, statistic="T", dimension=np.full(3, 3.0))
     return Agreement(
         points,

@@ -7,7 +7,7 @@ from typer.main import get_command
 
 from files.test_guards import COMMANDS
 from photogram.cli import app
-from photogram.cli.command_classes import PANEL_OF
+from photogram.cli.command_classes import declarations
 
 
 def parameters():
@@ -23,9 +23,12 @@ def parameters():
     return [(name, each) for name, each in walk(get_command(app), "") if not each.hidden]
 
 
-def test_every_option_has_a_panel():
-    assert {each.name for _, each in parameters()} - set(PANEL_OF) == set()
-    assert all(each.rich_help_panel == PANEL_OF[each.name] for _, each in parameters())
+def test_every_declaration_is_an_option_with_a_panel_and_a_short_help():
+    panels = {panel for panel, _, _ in declarations().values()}
+    assert {each.rich_help_panel for _, each in parameters()} <= panels
+    names = {name.rpartition(".")[2] for name in declarations()}
+    assert {each.name for _, each in parameters()} - {"help"} <= names
+    assert {name: text for name, (_, _, text) in declarations().items() if len(text) > 90} == {}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -85,7 +88,7 @@ def test_pictures_of_an_example_need_no_directory(run, name, tmp_path, monkeypat
 def test_plan_takes_an_example_or_projects(run):
     refused = run("plan", "somewhere", "--example")
     assert refused.exit_code == 2
-    assert "goes without DIR" in refused.stderr
+    assert "cannot be combined with DIR" in refused.stderr
 
 
 def test_adjust_snoops_at_a_level(run, tmp_path):

@@ -44,16 +44,15 @@ def test_lines_that_do_not_jitter_are_not_told(crowded: Block) -> None:
     assert line_hints(adjust(crowded)) == []
 
 
-@pytest.mark.parametrize(("axis", "lines", "said"), [(0, 1, "rows"), (1, 1, "rows"), (1, 0, "columns")])
-def test_lines_that_jitter_are_told(crowded: Block, axis: int, lines: int, said: str) -> None:
+@pytest.mark.parametrize(("axis", "lines", "counted"), [(0, 1, "rows"), (1, 1, "rows"), (1, 0, "columns")])
+def test_lines_that_jitter_are_told(crowded: Block, axis: int, lines: int, counted: str) -> None:
     result = diagnosed(adjust(jittered(crowded, axis, lines, 0.5)))
-    [hint] = map(str, line_hints(result))
-    assert hint.startswith(f"residuals in {'xy'[axis]} of images in nearly the same {said} of scanner")
-    size = float(hint.split("alike by ")[1].split(" px")[0])
-    assert size == pytest.approx(0.5, abs=0.15)
-    sd = float(hint.split("--set sd.images=")[1].split(" ")[0])
-    assert sd == pytest.approx(np.hypot(0.25, size), abs=0.02)
-    assert hint in [str(each) for each in result.messages]
+    [hint] = line_hints(result)
+    fields = hint.phrase.fields
+    assert (hint.code, fields["axis"]) == (f"film-check.jitter.{counted}", "xy"[axis])
+    assert fields["jitter"] == pytest.approx(0.5, abs=0.15)
+    assert fields["sd"] == pytest.approx(np.hypot(0.25, fields["jitter"]), abs=0.02)
+    assert hint in result.messages
 
 
 def test_what_is_smooth_over_the_scan_is_no_jitter(crowded: Block) -> None:

@@ -64,27 +64,29 @@ def test_good_marks_have_no_hint(tmp_path: Path) -> None:
 
 def test_a_mark_that_fails_on_all_photos_is_wrong_in_its_certificate(tmp_path: Path) -> None:
     result = adjusted(tmp_path, "fiducials.csv", {("rc10", "ur"): {2: 0.1}})
-    (hint,) = map(str, mark_hints(result))
-    assert hint.startswith("rc10 ur (w = ")
-    assert "on 6 photos): where it fails on all photos its place in the certificate is wrong" in hint
-    assert hint in [str(each) for each in diagnosed(result).messages]
+    (hint,) = mark_hints(result)
+    assert hint.code == "film-check.marks.certificate"
+    mark = hint.phrase.fields["marks"][0].fields
+    assert (mark["mark"], mark["n"]) == ("rc10 ur", 6)
+    assert hint in diagnosed(result).messages
 
 
 def test_a_single_reading_is_of_the_wrong_place(tmp_path: Path) -> None:
-    (hint,) = map(str, mark_hints(adjusted(tmp_path, "fiducial_images.csv", {("p3", "mr"): {3: 6.0}})))
-    assert hint.startswith("rc10 mr on p3 (w = ")
-    assert hint.endswith("measured on the wrong place, or another mark?")
+    (hint,) = mark_hints(adjusted(tmp_path, "fiducial_images.csv", {("p3", "mr"): {3: 6.0}}))
+    assert hint.code == "film-check.marks.readings"
+    reading = hint.phrase.fields["readings"][0].fields
+    assert (reading["mark"], reading["photo"]) == ("rc10 mr", "p3")
 
 
 def test_all_marks_of_a_photo_are_of_another_camera(tmp_path: Path) -> None:
     """Corners farther out by 0.4 mm, and middles where they are: a cone of another camera."""
     out = {"ll": (-20.0, 20.0), "ul": (-20.0, -20.0), "ur": (20.0, -20.0), "lr": (20.0, 20.0)}
     change = {("p2", mark): {2: by[0], 3: by[1]} for mark, by in out.items()}
-    (hint,) = map(str, mark_hints(adjusted(tmp_path, "fiducial_images.csv", change)))
-    assert hint.startswith("nearly all fiducials of p2 fail their tests")
+    (hint,) = mark_hints(adjusted(tmp_path, "fiducial_images.csv", change))
+    assert (hint.code, hint.phrase.fields) == ("film-check.marks.all", {"photos": ["p2"]})
 
 
-@pytest.mark.parametrize(("axis", "where"), [(0, "left and right"), (1, "upper and lower")])
+@pytest.mark.parametrize(("axis", "where"), [(0, "column"), (1, "row")])
 def test_halves_of_a_scan_that_are_shifted_are_named(tmp_path: Path, axis: int, where: str) -> None:
     """Images and marks of one half of a photo lie 3 pixels lower, across the base."""
     for each in ARCHIVE.iterdir():
@@ -96,10 +98,10 @@ def test_halves_of_a_scan_that_are_shifted_are_named(tmp_path: Path, axis: int, 
                 line[3] = repr(float(line[3]) + 3.0)
         (tmp_path / table).write_text("\n".join(map(",".join, lines)) + "\n")
     result = diagnosed(adjust(read(tmp_path).block))
-    [hint] = map(str, seam_hints(result))
-    assert hint.startswith(f"the {where} halves of the scan of 83-2 are shifted")
-    assert hint in [str(each) for each in result.messages]
-    assert not any("measured on the wrong place" in str(each) for each in result.messages)
+    [hint] = seam_hints(result)
+    assert (hint.code, hint.phrase.fields["photo"]) == (f"film-check.seam.{where}", "83-2")
+    assert hint in result.messages
+    assert not any(each.code.startswith("film-check.marks") for each in result.messages)
 
 
 def test_whole_scans_have_no_seam(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from nested_codes import codes
 from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
 from photogram.diagnosis.orientation import MIRRORS
@@ -113,7 +114,7 @@ def test_section_13_the_sign_of_the_principal_distance(space):
     outcome = checked(block.replace(principal_distances=-block.principal_distances))
     (sign,) = found(outcome, "sign-of-principal-distance")
     assert sign.level == "grave"
-    assert "all photos" in sign.text
+    assert "group.all-photos" in codes(sign)
     assert sign.photos == block.photo_ids
     above = found(outcome, "control-above-camera")
     control = np.isfinite(block.point_sd).any(axis=1)
@@ -121,7 +122,7 @@ def test_section_13_the_sign_of_the_principal_distance(space):
         name for name, of in zip(block.point_ids, control, strict=True) if of
     ]
     # The sign comes before kappa in the text, and with it put right the rest of the block is clean.
-    assert above[0].text.index("sign of the principal distance?") < above[0].text.index("kappa?")
+    assert above[0].phrase.fields["point"] == above[0].points[0]
     assert {finding.kind for finding in outcome.grave} == {
         "sign-of-principal-distance",
         "control-above-camera",
@@ -140,18 +141,18 @@ def test_section_13_the_sign_of_one_of_two_cameras(block):
         checked(block.replace(principal_distances=distances, image_xy=xy)), "sign-of-principal-distance"
     )
     assert sign.photos == block.photo_ids[20:]
-    assert "principal distance 305.48 mm" in sign.text
+    assert sign.phrase.fields["group"].fields["distance"] == 305.48
 
 
 @pytest.mark.giant("13", "2 elevation check: sign of the principal distance, kappa")
-@pytest.mark.parametrize(("turn", "text"), [(np.pi, "by 180"), (np.pi / 2, "by -90"), (-np.pi / 2, "by 90")])
+@pytest.mark.parametrize(("turn", "degrees"), [(np.pi, 180), (np.pi / 2, -90), (-np.pi / 2, 90)])
 @pytest.mark.parametrize("photo_to_ground", [False, True])
-def test_section_13_the_kappa_of_one_photo(turn, text, photo_to_ground):
+def test_section_13_the_kappa_of_one_photo(turn, degrees, photo_to_ground):
     block = simulate(points_per_photo=30, seed=3, photo_to_ground=photo_to_ground).block
     outcome = checked(changed(block, "photo_attitudes", block.photo_ids.index("0304"), 2, turn))
     (kappa,) = found(outcome, "kappa")
     assert (kappa.level, kappa.photos) == ("grave", ["0304"])
-    assert f"turned {text} degrees" in kappa.text
+    assert kappa.phrase.fields["turn"] == degrees
     assert {finding.kind for finding in outcome.grave} <= {"kappa", "control-above-camera"}
 
 
@@ -160,7 +161,8 @@ def test_section_13_the_kappa_of_all_photos(block):
     outcome = checked(changed(block, "photo_attitudes", slice(None), 2, np.pi / 2))
     (kappa,) = found(outcome, "kappa")
     assert kappa.photos == block.photo_ids
-    assert "the kappa of all photos is wrong: turned by -90 degrees" in kappa.text
+    assert codes(kappa) == ["check.kappa.group", "group.all-photos"]
+    assert kappa.phrase.fields["turn"] == -90
 
 
 def test_the_sense_of_rotation():
@@ -178,7 +180,7 @@ def test_the_sense_of_rotation():
     assert {finding.kind for finding in kinds[True].grave} & {"kappa", "sense-of-rotation"} == set()
     (finding,) = [each for each in kinds[False].grave if each.kind != "control-above-camera"]
     # With kappa near +-90 degrees the other sense turns every photo over, as the sign would.
-    assert "sense" in finding.text
+    assert finding.phrase.code == "check.sense-of-rotation"
 
 
 @pytest.mark.giant("13", "1 blunder edit by intersection")
@@ -231,7 +233,7 @@ def test_a_mirrored_photo_is_named_once(mirror, seed):
     outcome = checked(block.replace(image_xy=xy))
     (mirrored,) = outcome.grave
     assert (mirrored.kind, mirrored.photos) == ("mirrored", [block.photo_ids[photo]])
-    assert f"is mirrored: {mirror};" in mirrored.text
+    assert f"mirror.{mirror}" in codes(mirrored)
     assert outcome.result.converged
 
 
@@ -245,7 +247,7 @@ def test_mirrored_plates_of_all_photos_are_named_once(axis, strips):
     outcome = checked(block.replace(image_xy=xy))
     (mirrored,) = outcome.grave
     assert (mirrored.kind, mirrored.photos) == ("mirrored", block.photo_ids)
-    assert f"{'xy'[axis]} has the wrong sign" in mirrored.text
+    assert f"mirror.{('mirrored', 'y down')[axis]}" in codes(mirrored)
     assert outcome.result.converged
 
 
@@ -256,7 +258,7 @@ def test_section_13_control_far_off_is_seen_by_intersection(block):
     outcome = checked(changed(block, "point_positions", point, 1, 3000.0))
     (difference,) = found(outcome, "control-difference")
     assert (difference.level, difference.points) == ("grave", [block.point_ids[point]])
-    assert "given Y" in difference.text
+    assert difference.phrase.fields["axis"] == "Y"
 
 
 # Step 2: adjustment
@@ -271,7 +273,7 @@ def test_section_13_a_gross_error_of_a_fifth_of_a_millimetre(block, photo, axis)
     assert (blunder.kind, blunder.photos) == ("blunder", [photo])
     assert blunder.points == [block.point_ids[block.image_points[row]]]
     assert blunder.values["error_um"] == pytest.approx(200, abs=60)
-    assert f"error of {'xy'[axis]}" in blunder.text
+    assert blunder.phrase.fields["axis"] == "xy"[axis]
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")
@@ -285,7 +287,7 @@ def test_section_13_with_two_rays_both_images_are_named(block):
     outcome = checked(changed(block, "image_xy", row, 1, 0.3))
     (blunder,) = outcome.grave
     assert set(blunder.photos) == {block.photo_ids[photo] for photo in others}
-    assert "it may as well be the image on photo" in blunder.text
+    assert "check.rival.two-rays" in codes(blunder)
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")
@@ -303,18 +305,15 @@ def test_section_13_blunders_do_not_drag_others_along():
 @pytest.mark.giant("13", "8 control: differences")
 @pytest.mark.parametrize(
     ("axes", "remedy"),
-    [([2], "the height only: lower the type (column 80: 4)"), ([0], "the planimetry only")],
+    [([2], "height"), ([0], "plan")],
 )
 def test_section_13_a_wrong_control_coordinate(block, axes, remedy):
     point = int(np.flatnonzero(np.isfinite(block.point_sd[:, 0]))[3])
     outcome = checked(changed(block, "point_positions", point, axes, 20.0))
     (misfit,) = outcome.grave
     assert (misfit.kind, misfit.points) == ("control-misfit", [block.point_ids[point]])
-    assert remedy in misfit.text
-    (number,) = [line for line in misfit.text.split("about ")[1].split() if line.replace(".", "").isdigit()][
-        :1
-    ]
-    assert float(number) == pytest.approx(20, abs=4)
+    assert {f"check.remedy.{remedy}", "check.remedy.type"} < {*codes(misfit)}
+    assert misfit.phrase.fields["components"][0].fields["error"] == pytest.approx(20, abs=4)
 
 
 @pytest.mark.giant("13", "8 control: differences")
@@ -341,8 +340,8 @@ def test_section_13_a_gross_error_of_control_is_given_in_full_and_spoils_nothing
     outcome = checked(changed(block, "point_positions", point, 1, 3000.0))
     (misfit,) = found(outcome, "control-misfit")
     assert misfit.points == [block.point_ids[point]]
-    assert "planimetry only" in misfit.text
-    assert float(misfit.text.split("error is about ")[1].split()[0]) == pytest.approx(3000, abs=2)
+    assert "check.remedy.plan" in codes(misfit)
+    assert misfit.phrase.fields["components"][0].fields["error"] == pytest.approx(3000, abs=2)
     # X and Z of the point agree with their predictions and are held again.
     row = outcome.result.block.point_ids.index(misfit.points[0])
     assert np.isfinite(outcome.result.block.point_sd[row]).tolist() == [True, False, True]
@@ -450,13 +449,14 @@ def test_section_13_the_key_numbers(block):
     iterations = [name for name in facts if "iteration" in name]
     assert len(iterations) == len(outcome.result.iterations)
     (weights,) = found(checked(block.replace(image_sd=np.array(0.03))), "weights")[:1]
-    assert "variance of unit weight is 0.1" in weights.text
+    assert weights.phrase.fields["variance"] == pytest.approx(0.1, abs=0.05)
 
 
 @pytest.mark.giant("13", "9 key numbers")
 def test_section_13_standard_deviations_beyond_the_usual_are_remarked_on(block):
-    texts = [finding.text for finding in found(checked(block.replace(image_sd=np.array(0.03))), "weights")]
-    assert any("usually 5 to 15 um" in text for text in texts)
+    findings = found(checked(block.replace(image_sd=np.array(0.03))), "weights")
+    usual = next(each.phrase.fields for each in findings if each.phrase.code == "check.weights.usual")
+    assert (usual["least"], usual["most"]) == (5.0, 15.0)
 
 
 @pytest.mark.giant("13", "3 clean-up")
@@ -616,9 +616,10 @@ def test_intersection_only_is_checked_with_fixed_stations(block):
 def test_every_kind_of_finding_is_documented():
     root = Path(__file__).parents[2]
     package = root / "python" / "photogram"
-    # The words of hypotheses.py with hyphens are of readings of angles, in sentences.
-    sources = [path for path in (package / "diagnosis").glob("*.py") if path.name != "hypotheses.py"]
-    kinds = {kind for path in sources for kind in re.findall(r'"([a-z]+(?:-[a-z]+)+)"', path.read_text())}
+    sources = "".join(path.read_text() for path in (package / "diagnosis").glob("*.py"))
+    kinds = {*re.findall(r'"check\.([a-z]+(?:-[a-z]+)+)', sources)} | {
+        *re.findall(r'finding\([^\n]*kind="([a-z-]+)"', sources)
+    }
     text = (root / "docs" / "giant-check.md").read_text() + (root / "docs" / "check.md").read_text()
     assert {kind for kind in kinds if f"`{kind}`" not in text} == set()
     assert len(kinds) > 15

@@ -18,6 +18,7 @@ from moving_blocks import (
     rolling,
     scanned,
 )
+from nested_codes import codes
 from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
@@ -33,51 +34,34 @@ SCANNED = ("pushbroom_strips", "three_line", "planetary_pair", "jitter")
 
 
 @pytest.mark.parametrize("millimetres", [False, True])
-@pytest.mark.parametrize(
-    ("direction", "said"),
-    [
-        ("down", "its rows, from the upper edge to the lower"),
-        ("up", "its rows, from the lower edge to the upper"),
-        ("right", "its columns, from the left edge to the right"),
-    ],
-)
-def test_a_rolling_shutter(direction, said, millimetres):
+@pytest.mark.parametrize("direction", ["down", "up", "right"])
+def test_a_rolling_shutter(direction, millimetres):
     """What its residuals were blamed for was the lens."""
     result = adjust(flown_frames(direction=direction, millimetres=millimetres))
     assert result.verdict.code in ("model", "gross-errors")
     found = diagnosed(result)
-    (hint,) = found.hints
-    assert said in hint
+    assert len(found.hints) == 1
+    hint = found.messages[0].phrase
+    assert hint.code == f"check.rolling-shutter.{direction}"
     assert found.verdict.code == "hint"
     assert found.verdict.exit == 4
     # 30 ms of the two seconds between two exposures.
-    share, sd = float(between(hint, ", in ", " %")), float(between(hint, "(sd ", ")"))
-    assert share == pytest.approx(1.5, abs=4 * sd)
-    assert float(between(hint, "would be ", " times")) > 1.2
-
-
-def between(text, before, after):
-    return text.split(before)[1].split(after)[0]
+    assert hint.fields["percent"] == pytest.approx(1.5, abs=4 * hint.fields["sd"])
+    assert hint.fields["times"] > 1.2
 
 
 def test_a_rolling_shutter_of_a_camera_that_turns_with_the_flight():
     """It is always moved the same way: relief alone tells the readout from an image that is stretched."""
     (hint,) = rolling_hints(adjust(flown_frames(turned=True, strips=4)))
-    assert "its rows, from the upper edge to the lower" in str(hint)
+    assert hint.code == "check.rolling-shutter.down"
     assert rolling_hints(adjust(flown_frames(turned=True, strips=4, relief=0.5))) == []
 
 
 def test_the_readout_time_is_not_put_too_exactly():
     """Photos turn meanwhile: the standard deviation is from how they differ."""
-    told = [str(each) for seed in range(6) for each in rolling_hints(adjust(flown_frames(seed=seed)))]
-    assert len(told) == 6
-    shares = np.array(
-        [
-            [between(each, "in ", " %"), between(each, "(sd ", ")")]
-            for each in (each.split("lower, ")[1] for each in told)
-        ],
-        dtype=float,
-    )
+    found = [each for seed in range(6) for each in rolling_hints(adjust(flown_frames(seed=seed)))]
+    assert len(found) == 6
+    shares = np.array([[each.phrase.fields[name] for name in ("percent", "sd")] for each in found])
     assert shares[:, 0].mean() == pytest.approx(1.5, abs=0.25)
     assert (np.abs(shares[:, 0] - 1.5) < 4 * shares[:, 1]).all()
 
@@ -120,25 +104,25 @@ def shuttered(block, **changes):
 
 READOUTS = {"free": Readout("drone", 0.02), "weighted": Readout("drone", 0.03, sd=0.003), "known": 0.03}
 MISTAKES = {
-    "edge": ({"edges": (HEIGHT, 0.0), "direction": "up"}, "shutters read in the other direction"),
-    "columns": ({"edges": (0.0, WIDTH), "direction": "right"}, "shutters read rows, not columns"),
+    "edge": ({"edges": (HEIGHT, 0.0), "direction": "up"}, "opposite"),
+    "columns": ({"edges": (0.0, WIDTH), "direction": "right"}, "rows.first"),
 }
 
 
 @pytest.mark.parametrize("readout", READOUTS)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_readouts_in_a_wrong_direction(readout, mistake):
-    changes, said = MISTAKES[mistake]
+    changes, cause = MISTAKES[mistake]
     result = adjust(shuttered(rolling(readout=READOUTS[readout]), **changes))
-    (hint,) = diagnosed(result).hints
-    assert hint.startswith(f"probably {said}")
+    hint = diagnosed(result).messages[0]
+    assert codes(hint)[:2] == ["mistake.likely", f"mistake.shutter.{cause}"]
 
 
 @pytest.mark.parametrize("readout", [30.0, Readout("drone", 30.0, sd=3.0), Readout("drone", 30.0)])
 def test_readout_times_in_milliseconds(readout):
     result = adjust(rolling(readout=readout))
-    (hint,) = diagnosed(result).hints
-    assert hint.startswith("probably readout times are milliseconds, not seconds")
+    hint = diagnosed(result).messages[0]
+    assert "mistake.shutter.milliseconds" in codes(hint)
 
 
 def test_a_readout_time_that_comes_out_negative():
@@ -147,7 +131,8 @@ def test_a_readout_time_that_comes_out_negative():
     result = adjust(shuttered(right, edges=(HEIGHT, 0.0)))
     found = diagnosed(result)
     assert found.hints == ()
-    assert str(found.messages[0]).startswith("readout drone is -0.03")
+    assert found.messages[0].code == "moving.backward-readout"
+    assert found.messages[0].phrase.fields["value"] == pytest.approx(-0.03, abs=0.01)
     kinds = [each.kind for each in diagnose(result.block, result).findings]
     assert kinds == ["moving"]
     assert remarks(adjust(right)) == []
@@ -175,24 +160,18 @@ def rolled(table):
 
 
 TABLES = {
-    "attitudes of the trajectories are matrices from object to photo": lambda table: replace(
-        table, attitudes=np.swapaxes(table.attitudes, 1, 2)
-    ),
-    "quaternions were given in the order": rolled,
-    "positions of the trajectories are in kilometres": lambda table: replace(
-        table, positions=table.positions / 1000
-    ),
-    "positions of the trajectories are in metres, all else in kilometres": lambda table: replace(
-        table, positions=table.positions * 1000
-    ),
+    "inverse": lambda table: replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2)),
+    "quaternions": rolled,
+    "kilometres": lambda table: replace(table, positions=table.positions / 1000),
+    "metres": lambda table: replace(table, positions=table.positions * 1000),
 }
 
 
 @pytest.mark.parametrize("photos", [False, True])
-@pytest.mark.parametrize("said", TABLES)
-def test_tables_of_trajectories(said, photos):
-    (hint,) = flown_hints(on_tables(scanned(photos=photos), TABLES[said]))
-    assert str(hint).startswith(f"probably {said}")
+@pytest.mark.parametrize("cause", TABLES)
+def test_tables_of_trajectories(cause, photos):
+    (hint,) = flown_hints(on_tables(scanned(photos=photos), TABLES[cause]))
+    assert f"mistake.table.{cause}" in codes(hint)
 
 
 def at_other_times(block, seconds):
@@ -212,25 +191,30 @@ def recorded_later(block, seconds):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "said"),
+    ("seconds", "scale", "table"),
     [
-        (-18.0, "are UTC, those of the trajectories' tables GPS: they lack +18 s"),
-        (37.0, "are TAI, those of the trajectories' tables UTC: they lack -37 s"),
-        (69.184, "are ET, those of the trajectories' tables UTC: they lack -69.184 s"),
-        (-51.184, "are GPS, those of the trajectories' tables ET: they lack +51.184 s"),
-        (-19.0, "are GPS, those of the trajectories' tables TAI: they lack +19 s"),
+        (-18.0, "UTC", "GPS"),
+        (37.0, "TAI", "UTC"),
+        (69.184, "ET", "UTC"),
+        (-51.184, "GPS", "ET"),
+        (-19.0, "GPS", "TAI"),
     ],
 )
-def test_scales_of_time(seconds, said):
+def test_scales_of_time(seconds, scale, table):
+    fields = {"scale": scale, "table": table, "seconds": pytest.approx(-seconds)}
+
     for photos in (False, True):
         moved = at_other_times(scanned(photos=photos), seconds)
         (hint,) = flown_hints(moved)
-        assert str(hint).startswith(f"probably times of the images {said}")
+        (cause,) = hint.phrase.fields["causes"]
+        assert (cause.code, cause.fields) == ("mistake.times.images", fields)
     (hint,) = flown_hints(recorded_later(scanned(), seconds))
-    assert str(hint).startswith(f"probably times of the observed positions {said}")
-    with pytest.raises(AdjustmentError, match="beyond the trajectory") as told, errors_explained(moved):
+    (record,) = hint.phrase.fields["causes"]
+    assert (record.code, record.fields) == ("mistake.times.records", fields)
+    with pytest.raises(AdjustmentError) as raised, errors_explained(moved):
         adjust(moved)
-    assert f"hint: probably times of the images {said}" in str(told.value)
+    assert raised.value.code.startswith("adjust.beyond-trajectory")
+    assert f"hint: probably {cause}" in str(raised.value)
 
 
 def test_another_shift_is_no_scale_of_time():
@@ -244,9 +228,10 @@ def test_an_offset_of_a_clock_that_is_a_difference_of_scales():
     late = late.replace(observations=[replace(each, clock=clock) for each in late.observations])
     result = adjust(late)
     assert result.converged
-    (said,) = remarks(result)
-    assert "clock receiver is 18.00" in str(said)
-    assert "the difference GPS - UTC (+18 s)" in str(said)
+    (remark,) = remarks(result)
+    assert remark.code == "moving.clock-offset"
+    assert remark.phrase.fields["offset"] == pytest.approx(18.0, abs=0.01)
+    assert [str(scale) for scale in remark.phrase.fields["scales"]] == ["GPS - UTC (+18 s)"]
     assert remarks(adjust(block)) == []
 
 
@@ -262,18 +247,22 @@ def scanned_lines(block, change):
 
 LAST = 8 / LINE
 COUNTED = {
-    "lines of the scanners are counted against the scan": lambda xy: np.abs([0.0, LAST] - xy),
-    "images of the scanners are turned by 180 degrees": lambda xy: [SAMPLES, LAST] - xy,
-    "samples of the scanners are counted from the other end": lambda xy: np.abs([SAMPLES, 0.0] - xy),
+    "reversed": lambda xy: np.abs([0.0, LAST] - xy),
+    "turned": lambda xy: [SAMPLES, LAST] - xy,
+    "mirrored samples": lambda xy: np.abs([SAMPLES, 0.0] - xy),
 }
 
 
-@pytest.mark.parametrize("said", COUNTED)
-def test_scans_that_are_turned(said):
-    (hint,) = flown_hints(scanned_lines(scanned(), COUNTED[said]))
+@pytest.mark.parametrize("cause", COUNTED)
+def test_scans_that_are_turned(cause):
+    (hint,) = flown_hints(scanned_lines(scanned(), COUNTED[cause]))
     # Of sensors along x the sign of the principal distance does the same.
-    rival = "it cannot be told which of these is so: the principal distance has the wrong sign; or "
-    assert str(hint).startswith(f"{rival if said.startswith('samples') else 'probably '}{said}")
+    assert f"mistake.scanner.{cause}" in codes(hint)
+    assert (
+        ("mistake.sign of c" in codes(hint))
+        == (hint.code == "convention.one-of")
+        == (cause == "mirrored samples")
+    )
 
 
 def of_a_better_unit(block):
@@ -312,14 +301,15 @@ def test_lines_that_are_counted_otherwise(off):
     (found,) = counted_lines(scanned_lines(block, lambda xy: xy - [0.0, off]), Adjuster({}))
     assert found.level == "look"
     assert found.values["lines"] == pytest.approx(off, abs=0.1)
-    assert found.text.startswith(f"lines of S1, S2 are {found.values['lines']:+.2f} lines off")
+    assert found.kind == "line-count"
+    assert found.photos == ["S1", "S2"]
 
 
 def test_the_check_names_what_is_wrong_with_a_scan():
-    turned = scanned_lines(scanned(), COUNTED["lines of the scanners are counted against the scan"])
+    turned = scanned_lines(scanned(), COUNTED["reversed"])
     found = diagnose(turned)
     assert found.grave[0].kind in ("convention", "not-converged")
-    assert any("counted against the scan" in each.text for each in found.grave)
+    assert any("mistake.scanner.reversed" in codes(each) for each in found.grave)
 
 
 # Good blocks

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
+from nested_codes import codes
 from photogram import Camera, Distance, InputError, RankError, Spheroid, adjust, diagnose, simulate
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints, verdicts
@@ -12,6 +13,7 @@ from photogram.diagnosis.regression import eligible, regressions, spread, view
 from photogram.giant import Project, write_project
 from photogram.network import project
 from photogram.network.directions import image_directions, without_lenses
+from photogram.words import Phrase
 
 IDENTITY = [[1, 0], [0, 1]]
 Y_DOWN, TURNED, MIRRORED = [[1, 0], [0, -1]], [[-1, 0], [0, -1]], [[-1, 0], [0, 1]]
@@ -70,7 +72,7 @@ NAMED = {
     "t in photo axes": "t for C",
     "X, Y exchanged": "X and Y of photos",
     "principal distance": "principal distance",
-    "control in feet": "feet in points",
+    "control in feet": "feet in positions of points",
     "control, X and Y": "X and Y of points",
 }
 
@@ -82,22 +84,22 @@ def test_mistakes_are_named(network, mistake):
     found = verdicts(block)
     assert [verdict.names for verdict in found] == [[NAMED[mistake]]]
     (hint,) = hints(block)
-    assert str(hint).startswith("probably ")
+    assert hint.code == "convention.likely"
 
 
 @pytest.mark.parametrize(
-    ("mistake", "said"),
+    ("mistake", "cause"),
     [
-        ("radians as degrees", "angles were given in radians and read as degrees"),
-        ("photo-to-ground", "angles are photo-to-ground, not ground-to-photo"),
-        ("gon", "angles were given in gon and read as degrees"),
-        ("sign of phi", "phi has the wrong sign"),
+        ("radians as degrees", "radians for degrees"),
+        ("photo-to-ground", "sense"),
+        ("gon", "gon"),
+        ("sign of phi", "sign of phi"),
     ],
 )
-def test_readings_of_angles_in_convergent_photos(mistake, said):
+def test_readings_of_angles_in_convergent_photos(mistake, cause):
     block = mistakes.mistakes(mistakes.golden_block("selfcal"), mistakes.HALF["selfcal"])[mistake]
     (hint,) = hints(block)
-    assert said in str(hint)
+    assert f"mistake.{cause}" in codes(hint)
 
 
 def test_small_angles_hide_what_they_mean():
@@ -125,7 +127,7 @@ def test_what_cannot_be_told_is_said():
     assert hints(vertical) == []
     (verdict,) = verdicts(vertical.replace(photo_attitudes=-angles))
     assert sorted(verdict.names) == ["sense", "sign of kappa"]
-    assert verdict.text.startswith("it cannot be told which of these is so: ")
+    assert verdict.message.code == "convention.one-of"
 
 
 @pytest.mark.parametrize("network", LOOKED_AT)
@@ -178,8 +180,8 @@ def test_a_single_photo():
     xy = block.image_xy.copy()
     xy[block.image_photos == 4] *= [-1, 1]
     (hint,) = hints(block.replace(image_xy=xy))
-    assert "photos are mirrored" in str(hint)
-    assert f"(on photo {block.photo_ids[4]})" in str(hint)
+    assert "mistake.mirrored" in codes(hint)
+    assert hint.phrase.fields["photos"].fields["photos"] == [block.photo_ids[4]]
 
 
 @pytest.mark.parametrize(
@@ -216,8 +218,8 @@ def explained(block):
 
 
 def weights_of(block):
-    found = [finding.text for finding in explained(block).findings]
-    return [text for text in found if text.startswith("standard deviations of ")]
+    found = [each.phrase for each in explained(block).findings if each.kind == "weights"]
+    return [each for each in found if each and each.code.startswith("weighting.")]
 
 
 def test_standard_deviations_that_are_wrong():
@@ -226,24 +228,24 @@ def test_standard_deviations_that_are_wrong():
     assert good.findings == []
     assert good.verdict.code == "accepted"
     (small,) = weights_of(right.replace(image_sd=right.image_sd / 3))
-    assert small.startswith("standard deviations of image coordinates are about 3 times too small: ")
+    assert codes(small) == ["weighting.small", "weighting.images"]
+    assert small.fields["factor"] == pytest.approx(3, rel=0.1)
     (large,) = weights_of(right.replace(image_sd=right.image_sd * 4))
-    assert "about 4 times too large" in large
+    assert large.code == "weighting.large"
+    assert large.fields["factor"] == pytest.approx(4, rel=0.1)
     xy = right.image_xy.copy()
     xy[100] += 0.5
     wrong = explained(right.replace(image_xy=xy))
     assert [finding.kind for finding in wrong.grave] == [wrong.verdict.code] == ["gross-errors"]
     told = explained(right.replace(image_sd=right.image_sd / 8)).result.messages
-    assert str(told[0]).startswith("standard deviations of image coordinates are about ")
+    assert codes(told[0]) == ["weighting.small", "weighting.images"]
 
 
 def test_longitude_and_latitude():
     block = simulate(strips=2, photos_per_strip=4, spheroid=Spheroid.wgs84(), seed=1).block
     free = {"photo_position_sd": np.inf, "photo_positions_observed": None}
     exchanged = block.replace(photo_positions=block.photo_positions[:, [1, 0, 2]], **free)
-    found = " ".join(str(hint) for hint in hints(exchanged))
-    assert "longitude and latitude" in found
-    assert "exchanged" in found
+    assert any("mistake.exchanged-axes" in codes(hint) for hint in hints(exchanged))
 
 
 def test_scale_bars_in_millimetres():
@@ -256,7 +258,7 @@ def test_scale_bars_in_millimetres():
     wrong = [Distance(p, q, 1000 * length, sd=1.0) for p, q, length in pairs]
     assert hints(block.replace(observations=good)) == []
     (hint,) = hints(block.replace(observations=wrong))
-    assert "observed distances are in millimetres, all else in metres" in str(hint)
+    assert hint.code == "convention.distances.mm"
 
 
 # Where hints are told
@@ -267,28 +269,27 @@ def test_adjustments_that_fail_are_explained_when_asked():
     down = block.replace(image_xy=block.image_xy * [1, -1])
     found = explained(down)
     assert not found.result.converged
-    assert "y of the images has the wrong sign" in str(found.result.messages[0])
-    assert "y of the images has the wrong sign" in found.grave[0].text
+    assert "mistake.y down" in codes(found.result.messages[0])
+    assert "mistake.y down" in codes(found.grave[0])
     sign = block.replace(principal_distances=-block.principal_distances)
-    with pytest.raises(RankError, match=r"do not intersect$") as raised:
+    with pytest.raises(RankError) as raised:
         adjust(sign)
     assert raised.value.points
-    with (
-        pytest.raises(RankError, match=r"do not intersect\n  hint: probably the principal distance"),
-        errors_explained(sign),
-    ):
+    assert raised.value.code == "adjust.no-intersection"
+    with pytest.raises(RankError) as raised, errors_explained(sign):
         adjust(sign)
-    assert "principal distance of all photos is wrong" in diagnose(sign).verdict.hints[0]
+    assert f"\n  hint: probably {Phrase('mistake.c or kappa')}" in str(raised.value)
+    assert "check.sign-of-principal-distance" in codes(diagnose(sign).grave[0])
 
 
 def test_the_command_line_tells_them(run, tmp_path):
     block = aerial(9)
     for name, changed, said in (
-        ("down", {"image_xy": block.image_xy * [1, -1]}, "y of the images has the wrong sign"),
+        ("down", {"image_xy": block.image_xy * [1, -1]}, str(Phrase("mistake.y down"))),
         (
             "sign",
             {"principal_distances": -block.principal_distances},
-            "hint: probably the principal distance",
+            f"hint: probably {Phrase('mistake.c or kappa')}",
         ),
     ):
         write_project(Project.from_block(block.replace(**changed)), tmp_path / name)
@@ -311,9 +312,8 @@ def test_good_adjustments_are_not_looked_at(monkeypatch):
 def test_the_check_of_a_project_tells_them():
     block = aerial(10)
     feet = block.replace(photo_positions=block.photo_positions / 0.3048)
-    found = [each.text for each in diagnose(Project.from_block(feet)).findings if each.kind == "convention"]
-    assert len(found) == 1
-    assert "positions of the photos are in feet" in found[0]
+    (found,) = [each for each in diagnose(Project.from_block(feet)).findings if each.kind == "convention"]
+    assert "mistake.feet.photos" in codes(found)
 
 
 def test_the_example(capsys):
@@ -322,13 +322,14 @@ def test_the_example(capsys):
     said = capsys.readouterr().out
     assert "no mistake:\n    nothing\n" in said
     assert "nothing\n" not in said.split("pixels from", 1)[1]
-    assert "y has the wrong sign" in said
+    assert str(Phrase("mistake.format.y down")) in said
     assert "positions of the photos are in feet" in said
 
 
 def test_what_is_no_block():
-    with pytest.raises(InputError, match="block is not a Block"):
+    with pytest.raises(InputError) as raised:
         hints("block")
+    assert raised.value.code == "error.at"
     with pytest.raises(InputError, match="result is the result of a block, not 3"):
         diagnose(aerial(1), 3)
     assert len(spread(np.arange(100), 12)) == 12

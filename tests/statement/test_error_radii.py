@@ -206,27 +206,41 @@ def test_a_share_is_not_rounded_up_by_a_rounding_error():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "name", "code"),
     [
-        (lambda: linear_error([1.0], 1.0), "a probability lies between 0 and 1: 1"),
-        (lambda: linear_error([0.1, -0.1], 0.9), r"sd\[1\] is negative"),
-        (lambda: linear_error([[0.1]], 0.9), r"sd has the shape \(1, 1\), not \(n,\)"),
-        (lambda: linear_error(["a"], 0.9), "sd is not an array of numbers"),
-        (lambda: circular_error(np.eye(2), 0.9), r"covariances has the shape \(2, 2\), not \(n, 2, 2\)"),
-        (lambda: circular_error([np.eye(2)], 0.9, [0.0, 0.0]), r"offsets has the shape \(2,\), not \(1, 2\)"),
+        (lambda: linear_error([1.0], 1.0), "probability", "error.range"),
+        (lambda: linear_error([0.1, -0.1], 0.9), "sd[1]", "error.not-negative"),
+        (lambda: linear_error([[0.1]], 0.9), "sd", "error.shape"),
+        (lambda: circular_error(np.eye(2), 0.9), "covariances", "error.shape"),
+        (lambda: circular_error([np.eye(2)], 0.9, [0.0, 0.0]), "offsets", "error.shape"),
         (
             lambda: circular_error([np.eye(2), np.diag([1.0, -1.0])], 0.9),
-            r"covariances\[1\] is not symmetric and positive semidefinite",
+            "covariances[1]",
+            "error.covariance-singular",
         ),
-        (lambda: spherical_error([np.eye(3) + np.eye(3, k=1)], 0.9), r"covariances\[0\] is not symmetric"),
-        (lambda: sample_radius([], 0.9), "values is not a list of finite numbers, one at least"),
-        (lambda: sample_radius([1.0, math.nan], 0.9), "values is not a list of finite numbers"),
-        (lambda: upper_order(-1, 0.9), "the count of values is not negative: -1"),
+        (
+            lambda: spherical_error([np.eye(3) + np.eye(3, k=1)], 0.9),
+            "covariances[0]",
+            "error.covariance-singular",
+        ),
+        (lambda: sample_radius([], 0.9), "values", "error.kind"),
+        (lambda: sample_radius([1.0, math.nan], 0.9), "values", "error.kind"),
+        (lambda: upper_order(-1, 0.9), "count", "error.not-negative"),
     ],
 )
-def test_what_is_no_covariance_or_probability_is_refused(call, said):
-    with pytest.raises(InputError, match=said):
+def test_what_is_no_covariance_or_probability_is_refused(call, name, code):
+    with pytest.raises(InputError) as caught:
         call()
+    fields = caught.value.phrase.fields
+    assert (str(fields.get("what", "")), getattr(fields.get("message"), "code", caught.value.code)) == (
+        name,
+        code,
+    )
+
+
+def test_standard_deviations_are_numbers():
+    with pytest.raises(InputError, match="sd"):
+        linear_error(["a"], 0.9)
 
 
 @pytest.mark.speed

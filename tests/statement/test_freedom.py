@@ -128,25 +128,30 @@ def test_degrees_of_freedom_are_truncated_to_whole_numbers():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "name", "code"),
     [
-        (lambda: effective_freedom([1.0, 2.0]), r"covariance has the shape \(2,\), not \(m, m\)"),
-        (lambda: effective_freedom([[1.0, 0.5], [0.0, 1.0]]), "not symmetric and positive semidefinite"),
-        (lambda: effective_freedom([[2.0, 0.0], [0.0, -1.0]]), "not symmetric and positive semidefinite"),
-        (lambda: rmse_interval(-1.0, 3), "a root mean square error is not negative: -1"),
-        (lambda: rmse_interval(1.0, 0), "degrees of freedom are positive: 0"),
-        (lambda: rmse_interval(1.0, 3, 1.5), "a level is a probability between 0 and 1, not 1.5"),
-        (lambda: welch_satterthwaite([1.0, -1.0], [1, 1]), r"u\[1\] is not a number of zero or more: -1"),
-        (lambda: welch_satterthwaite([1.0], [0]), r"freedom\[0\] is not positive"),
-        (lambda: welch_satterthwaite([1.0], [1, 2]), r"freedom has the shape \(2,\), not \(1,\)"),
-        (lambda: joint_freedom([1.0], np.eye(2)), r"covariance_of_components has the shape \(2, 2\)"),
-        (lambda: joint_freedom([1.0], [[-1.0]]), "covariance_of_components is not symmetric"),
-        (lambda: joint_freedom([1.0], [[1.0]], -1), "given is not a variance: -1"),
-        (lambda: joint_freedom([[1.0]], [[1.0]]), r"contributions has the shape \(1, 1\), not \(k,\)"),
-        (lambda: coverage_factor(95, 3), "a probability lies between 0 and 1: 95"),
-        (lambda: coverage_factor(0.95, -3), "degrees of freedom are positive: -3"),
+        (lambda: effective_freedom([1.0, 2.0]), "covariance", "error.shape"),
+        (lambda: effective_freedom([[1.0, 0.5], [0.0, 1.0]]), "", "error.covariance-singular"),
+        (lambda: effective_freedom([[2.0, 0.0], [0.0, -1.0]]), "", "error.covariance-singular"),
+        (lambda: rmse_interval(-1.0, 3), "rmse", "error.not-negative"),
+        (lambda: rmse_interval(1.0, 0), "freedom", "error.positive"),
+        (lambda: rmse_interval(1.0, 3, 1.5), "level", "error.range"),
+        (lambda: welch_satterthwaite([1.0, -1.0], [1, 1]), "u[1]", "error.not-negative"),
+        (lambda: welch_satterthwaite([1.0], [0]), "freedom[0]", "error.positive"),
+        (lambda: welch_satterthwaite([1.0], [1, 2]), "freedom", "error.shape"),
+        (lambda: joint_freedom([1.0], np.eye(2)), "covariance_of_components", "error.shape"),
+        (lambda: joint_freedom([1.0], [[-1.0]]), "", "error.covariance-singular"),
+        (lambda: joint_freedom([1.0], [[1.0]], -1), "given", "error.not-negative"),
+        (lambda: joint_freedom([[1.0]], [[1.0]]), "contributions", "error.shape"),
+        (lambda: coverage_factor(95, 3), "probability", "error.range"),
+        (lambda: coverage_factor(0.95, -3), "freedom", "error.positive"),
     ],
 )
-def test_what_is_no_variance_or_number_of_degrees_is_refused(call, said):
-    with pytest.raises(InputError, match=said):
+def test_what_is_no_variance_or_number_of_degrees_is_refused(call, name, code):
+    with pytest.raises(InputError) as caught:
         call()
+    fields = caught.value.phrase.fields
+    assert (str(fields.get("what", "")), getattr(fields.get("message"), "code", caught.value.code)) == (
+        name,
+        code,
+    )

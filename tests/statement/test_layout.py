@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from message_codes import codes
+from message_codes import nested_codes
 from photogram import InputError
 from photogram.network.hull import area, hull, outside
 from photogram.results.statement.layout import area_in_plan, layout
@@ -105,7 +105,7 @@ def test_a_hull_has_the_area_of_that_of_another_program_and_holds_its_points(poi
 def test_positions_that_are_none_are_refused(call, said):
     with pytest.raises(InputError) as error:
         call()
-    assert said in codes(error.value) or re.search(said, str(error.value))
+    assert said in nested_codes(error.value) or re.search(said, str(error.value))
 
 
 def test_the_hull_of_many_points_is_that_of_all():

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import photogram
-from message_codes import codes
+from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import asprs, iso_19157
 from photogram.results.statement.asprs import accuracy, three_d, verdict
@@ -363,7 +363,7 @@ BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
 def test_what_is_no_figure_is_refused(call, said):
     with pytest.raises(InputError) as error:
         call()
-    assert said in codes(error.value) or re.search(said, str(error.value))
+    assert said in nested_codes(error.value) or re.search(said, str(error.value))
 
 
 def test_a_line_runs_along_one_of_the_four_diagonals_of_the_volume():

@@ -10,7 +10,7 @@ import pytest
 from golden_statement import BLOCK, compare, golden
 
 import photogram
-from message_codes import codes
+from message_codes import nested_codes
 from photogram.formats import read
 from photogram.results.statement.comparison import compared
 from photogram.results.statement.honest import bias, prediction
@@ -120,7 +120,7 @@ def test_any_function_has_a_budget(stated):
 def test_quantities_that_there_are_not_are_refused(stated, quantity, said):
     with pytest.raises(photogram.InputError) as error:
         stated.budget(quantity)
-    assert said in [*codes(error.value), str(error.value)]
+    assert said in [*nested_codes(error.value), str(error.value)]
 
 
 def test_classes_are_judged(document):
@@ -381,7 +381,7 @@ def test_a_statement_of_what_has_not_converged_is_refused(result):
 def test_what_cannot_be_asked_for_is_refused(result, asked, said):
     with pytest.raises(photogram.InputError) as error:
         result.statement(**asked)
-    assert said in codes(error.value) or said in str(error.value)
+    assert said in nested_codes(error.value) or said in str(error.value)
 
 
 def test_calibrated_lengths_are_tested_with_their_covariance(result):

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 def orientation_findings(result: Orientation) -> Findings:
     """Return the tests of an orientation: w with standard deviations to be relied on, else t."""
 
-    def name(index: tuple[int, ...]) -> str:
-        return f"{'XYZ'[index[1]]} of {result.stations.ids[index[0]]}"
+    def name(index: tuple[int, ...]) -> Phrase:
+        station, axis = result.stations.ids[index[0]], "XYZ"[index[1]]
+        return Phrase("named.coordinate", {"axis": axis, "station": station})
 
     control = Tested("control", result.tested, name, "w")
     if not result.decided_by_w:
@@ -37,7 +38,7 @@ def orientation_findings(result: Orientation) -> Findings:
         global_test=result.test,
         untested=Phrase("untested.sd" if not result.weighted else "untested.freedom"),
         scaled=result.unit_variance != "unity",
-        hints=[str(message) for message in result.grave],
+        hints=[message.phrase or str(message) for message in result.grave],
         take_out=Phrase("advice.leave-station-out"),
         if_usable=if_usable,
     )

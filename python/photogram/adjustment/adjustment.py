@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -23,12 +23,13 @@ from photogram.adjustment.remarks import (
 )
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.taking_over import large_turns, stays, taken_over
-from photogram.adjustment.undetermined import one_place, outside, undetermined_combinations
-from photogram.arguments.arrays import number, one_of, shown, whole_number
+from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
+from photogram.arguments.arrays import argument_error, number, one_of, whole_number
+from photogram.arguments.objects import kind_error
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import threads_that_fit, turned
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import (
@@ -44,6 +45,7 @@ from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.result import Result, dropped_points
+from photogram.words import phrase
 
 __all__ = [
     "AsPublished",
@@ -192,7 +194,7 @@ def adjust(
     checked(block)
     keep = isinstance(covariance, str) and covariance == "verdict"
     if not (keep or isinstance(covariance, bool | np.bool_)):
-        raise InputError(f"covariance is True, False or 'verdict', not {shown(covariance)}")
+        raise kind_error("covariance", "True, False or `verdict`", covariance)
     check_datum(datum)
     options = core_options(
         unit_variance,
@@ -209,15 +211,15 @@ def adjust(
     result = _adjusted(block, options, processors, progress, inner, keep=keep)
     if not block.all_trajectories:
         return result
-    said: list[Message] = []
+    messages: list[Message] = []
     for _ in range(TURNS):
         if not (turns := large_turns(result)):
             break
-        said.append(taken_over(turns))
+        messages.append(taken_over(turns))
         block = started(result.restarted(turns))
         result = _adjusted(block, options, processors, progress, inner, keep=keep)
-    said += stays(result)
-    return replace(result, messages=[*said, *result.messages]) if said else result
+    messages += stays(result)
+    return replace(result, messages=[*messages, *result.messages]) if messages else result
 
 
 def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int | None:
@@ -259,9 +261,9 @@ def core_options(
         max_iterations = AS_PUBLISHED if as_published else 50 if row is None else 200
     check_iteration(ordering, max_iterations, limit)
     if unit_variance == "redundancy" and not covariance:
-        raise InputError("unit_variance='redundancy' needs redundancy numbers: covariance=True")
+        raise InputError(phrase("adjust.redundancy-numbers"))
     if row and as_published:
-        raise InputError("the 1987 program has no robust loss: AsPublished or loss")
+        raise InputError(phrase("adjust.loss-as-published"))
     return CoreOptions(
         criterion="percent" if as_published else "fraction",
         limit=limit,
@@ -299,8 +301,8 @@ def _adjusted(
     network = block_network(block, options)
     tested = tested_together(block) if keep else None
     try:
-        told = None if progress is None else teller(progress)
-        solution = network.adjust(datum=inner, threads=processors, progress=told, start=start, keep=tested)
+        call = None if progress is None else teller(progress)
+        solution = network.adjust(datum=inner, threads=processors, progress=call, start=start, keep=tested)
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
@@ -335,17 +337,16 @@ def messages_of(
     for before, after in pairwise(iterations):
         percent = 100 * (after.weighted_sum_of_squares / before.weighted_sum_of_squares - 1)
         if percent > NOTABLE_RISE:
-            rise = f"the weighted sum of squares rose by {percent:.2g} percent in iteration {after.number}"
-            messages.append(Message(rise))
+            messages.append(Message(phrase("adjust.rise", percent=percent, iteration=after.number)))
     return messages
 
 
 def teller(
     progress: Callable[[Progress], None],
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
-    """Return what the core calls: it tells `progress`; InputError where that is no function."""
+    """Return the function that the core calls, which calls `progress`."""
     if not callable(progress):
-        raise InputError(f"progress is no function: {shown(progress)}")
+        raise kind_error("progress", "a function", progress)
 
     def tell(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
@@ -354,12 +355,18 @@ def teller(
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
-    """Refuse an iteration that cannot be."""
+    """Refuse invalid options of an iteration."""
     one_of("ordering", ordering, get_args(Ordering))
-    if whole_number("max_iterations", max_iterations) < 1:
-        raise InputError("there must be one iteration at least")
-    if not number("the criterion", tolerance) > 0:
-        raise InputError("the criterion of convergence must be positive")
+    at_least("max_iterations", max_iterations, 1)
+    if not number("tolerance", tolerance) > 0:
+        raise argument_error("tolerance", "positive", value=tolerance)
+
+
+def at_least(name: str, value: object, least: int) -> int:
+    """Return a whole number that is not below a limit."""
+    if (whole := whole_number(name, value)) < least:
+        raise argument_error(name, "least", low=least, value=whole)
+    return whole
 
 
 def core_threads(threads: int | None) -> int:
@@ -368,9 +375,7 @@ def core_threads(threads: int | None) -> int:
         processors = os.cpu_count() or 1
         fit = threads_that_fit(processors)
         return 0 if fit == processors else fit
-    if whole_number("threads", threads) < 1:
-        raise InputError(f"threads must be positive, not {threads}")
-    return threads_that_fit(min(threads, 4 * (os.cpu_count() or 1)))
+    return threads_that_fit(min(at_least("threads", threads, 1), 4 * (os.cpu_count() or 1)))
 
 
 def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
@@ -379,19 +384,17 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
     dropped = dropped_points(block, solution)
-    messages += _left_out(dropped)
-    lost = [each.name for each in block.observations if dropped.keys() & set(each.points)]
-    if lost:
-        messages.append(Message(f"left out with their points: {listed(lost)}"))
-    return messages + refraction_remarks(block, solution.photo_positions)
-
-
-def _left_out(dropped: Mapping[str, str]) -> list[Message]:
-    """Return one message for each reason for which points are left out."""
     by_reason: dict[str, list[str]] = {}
     for point, reason in dropped.items():
         by_reason.setdefault(reason, []).append(point)
-    return [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
+    messages += [
+        Message(phrase("adjust.left-out", reason=reason, points=", ".join(points)))
+        for reason, points in by_reason.items()
+    ]
+    lost = [each.name for each in block.observations if dropped.keys() & set(each.points)]
+    if lost:
+        messages.append(Message(phrase("adjust.left-out.observations", observations=lost)))
+    return messages + refraction_remarks(block, solution.photo_positions)
 
 
 def named(
@@ -409,17 +412,17 @@ def named(
     if kind == "undetermined points":
         seen = sorted({int(p) for p in block.image_photos[np.isin(block.image_points, points)]})
         photo_names = [block.photo_ids[p] for p in seen]
-        text = f"the rays on photos {listed(photo_names)} do not determine the points {listed(point_names)}"
-        text += one_place(block, seen)
-        return RankError(text, photo_names, point_names)
+        code = "adjust.points.one-place" if in_one_place(block, seen) else "adjust.points.undetermined"
+        message_of_points = phrase(code, photos=photo_names, points=point_names)
+        return RankError(message_of_points, photo_names, point_names)
     if kind == "undetermined photos":
         return undetermined_combinations(block, combinations, unknowns)
     if kind == "no intersection":
-        return RankError(f"point {point_names[0]}: its rays do not intersect", [], point_names)
+        return RankError(phrase("adjust.no-intersection", point=point_names[0]), [], point_names)
     if kind == "coarse":
         return too_coarse([block.photo_ids[i] for i in combinations[0][0]], point_names)
     if kind == "memory":
         return OutOfMemoryError(message)
     if kind == "outside":
-        return AdjustmentError(outside(block, combinations[0][0][0], points, seconds))
+        return AdjustmentError(beyond_trajectory(block, combinations[0][0][0], points, seconds))
     return AdjustmentError(message)

@@ -17,7 +17,6 @@ from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import counted
 from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
@@ -27,6 +26,7 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Part, Remarks, Section
 from photogram.show.summary import Brief
 from photogram.statistics.components import WORTH_CHANGING
+from photogram.words import phrase
 
 __all__ = ["Cleaned", "clean"]
 
@@ -67,30 +67,25 @@ class Cleaned(Brief, Documented):
 
     @property
     def changes(self) -> list[str]:
-        """What was done to weights and observations, in sentences."""
-        count = len(self.snooped.removed)
-        taken = f"{counted(count, 'group')} of observations {'is' if count == 1 else 'are'} out"
-        said = [
-            f"{taken} after {counted(self.rounds, 'round')} of variance components"
-            if self.rounds
-            else f"nothing contradicts the given weights, which stay; {taken}"
-        ]
+        """Changes of weights and observations, in sentences."""
+        code = "cleaning.rounds" if self.rounds else "cleaning.unchanged"
+        messages = [phrase(code, n=len(self.snooped.removed), rounds=self.rounds)]
         if not self.settled:
-            said.append("weights and gross errors still change: look at both")
-        factors = zip(self.groups, self.factors.tolist(), strict=True)
-        return said + [
-            f"standard deviations of {name}: multiplied by {np.sqrt(factor):.3f}"
-            for name, factor in factors
+            messages.append(phrase("cleaning.unsettled"))
+        messages += [
+            phrase("cleaning.factor", group=name, factor=float(np.sqrt(factor)))
+            for name, factor in zip(self.groups, self.factors.tolist(), strict=True)
             if factor != 1.0
         ]
+        return [str(message) for message in messages]
 
     def section(self) -> Section:
         """Return the section on weights: what was done to them, and the components that are left."""
-        from photogram.results.components_document import components_parts, sentences
+        from photogram.results.components_document import components_section
 
-        parts: list[Part] = [Remarks(sentences(self.changes))]
+        parts: list[Part] = [Remarks(self.changes)]
         if self.components is not None:
-            parts += components_parts(self.components)
+            parts += components_section(self.components).parts
         intro = "Weights were estimated from the observations that are left: the adjustment has these."
         return Section("components", "Weights", parts, intro)
 

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.adjustment import adjust, adjusted_again
+from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import probability
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -21,6 +22,7 @@ from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
+from photogram.words import phrase
 
 __all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components"]
 
@@ -40,7 +42,7 @@ class Weighing:
         elif hasattr(network, "_adjust"):
             self.result = network._adjust(tolerance=DECREASE, threads=threads)
         else:
-            raise InputError(f"no block or collection: {shown(network)}")
+            raise kind_error("network", "a Block or a Collection", network)
         self.first = self.result
         self.given: Any = self.result.given
         self.network: Any = self.given
@@ -140,10 +142,8 @@ def variance_components(
     AdjustmentError, RankError
         As of the adjustment.
     """
-    if not 0 < tolerance < 1:
-        raise InputError(f"the tolerance of components is between 0 and 1, not {tolerance:g}")
-    if max_steps < 1:
-        raise InputError("there must be one step at least")
+    probability("tolerance", tolerance)
+    at_least("max_steps", max_steps, 1)
     grouping = grouped(observables(network), groups)
     settings = Settings(tolerance, max_steps, least_redundancy, level, equality, probing or Probing())
     return of_grouping(network, grouping, settings, held=held, threads=threads, progress=progress)
@@ -173,7 +173,7 @@ def of_grouping(
     """Estimate the components of groups that are numbered already; see :func:`variance_components`."""
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
-        raise InputError(f"no group is called {shown(unknown[0])}; there are {', '.join(names[:20])}")
+        raise InputError(phrase("weighting.unknown-group", group=unknown[0], groups=list(names)))
     own = Weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * settings.tolerance))
     number = 0
 
@@ -181,7 +181,7 @@ def of_grouping(
         nonlocal number
         result = own.adjust(grouping, factors[:-1]) if number else own.first
         if not np.isfinite(result.redundancy[result.used_images]).all():
-            raise InputError("the network is not determined: there are no redundancy numbers")
+            raise InputError(phrase("weighting.undetermined"))
         if progress is not None:
             progress(number, factors[:-1].copy())
         number += 1
@@ -203,7 +203,7 @@ def of_grouping(
         equality=settings.equality,
     )
     if not any(each.redundancy > 0 for each in found.components):
-        raise InputError("the network has no redundancy: nothing can be said of its weights")
+        raise InputError(phrase("weighting.no-redundancy"))
     last = own.adjust(grouping, found.factors[:-1])
     return VarianceComponents(_without_nothing(found), own.network, last, own.first)
 

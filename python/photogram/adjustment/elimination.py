@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 from photogram.adjustment.adjustment import UnitVariance, adjust
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import probability
+from photogram.arguments.objects import kind_error
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_terms, terms_test
 from photogram.results.result import Result
+from photogram.words import phrase
 
 __all__ = ["Elimination", "eliminate_terms"]
 
@@ -40,12 +42,21 @@ class Elimination:
     result: Result
 
     def log(self) -> list[str]:
-        """Say what was left out and why, and what stays."""
-        lines = [f"{_named(each)}: left out, {_why(each, self.level)}" for each in self.removed]
-        return lines + [
-            f"{_named(each)}: stays, probability {each.probability:.2g}, up to {each.effect:.3g} standard"
-            " deviations of an image"
-            for each in self.kept
+        """Return removed terms with the reason, then the remaining terms."""
+        codes = ["improbable" if not each.probability < self.level else "small" for each in self.removed]
+        rows = [*zip(codes, self.removed, strict=True), *(("kept", each) for each in self.kept)]
+        return [
+            str(
+                phrase(
+                    f"elimination.{code}",
+                    names=each.names,
+                    camera=each.camera,
+                    probability=each.probability,
+                    level=self.level,
+                    effect=each.effect,
+                )
+            )
+            for code, each in rows
         ]
 
 
@@ -81,13 +92,12 @@ def eliminate_terms(
         As of the adjustment.
     """
     if not isinstance(block, Block) or not block.cameras:
-        raise InputError(f"no block with cameras: {shown(block)}")
-    if not 0 < level < 1:
-        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
+        raise kind_error("block", "a Block with cameras", block)
+    probability("level", level)
     result = adjust(block, unit_variance=unit_variance, threads=threads)
     first = [(camera.name, names) for camera in result.cameras for names in _groups(camera, groups)]
     if not first:
-        raise InputError("no term of a lens is estimated: there is nothing to ask about")
+        raise InputError(phrase("elimination.no-terms"))
     own = level / len(first)
     removed: list[TermsTest] = []
     while True:
@@ -130,22 +140,12 @@ def _without(block: Block, test: TermsTest) -> Block:
     place = block.camera_names.index(test.camera)
     camera = block.cameras[place]
     if camera.covariance is not None and set(camera.covariance[0]) & set(test.names):
-        raise InputError(f"{_named(test)} was observed with others: give the camera without its covariance")
+        raise InputError(phrase("elimination.covariance", names=test.names, camera=test.camera))
     zero = dict.fromkeys(test.names, 0.0)
     sd = camera.sd if isinstance(camera.sd, dict) else dict(zip(camera.names, camera.deviations, strict=True))
     changed = camera.replace(parameters={**camera.parameters, **zero}, sd={**sd, **zero})
     cameras = [changed if k == place else each for k, each in enumerate(block.cameras)]
     return block.replace(cameras=cameras)
-
-
-def _named(test: TermsTest) -> str:
-    return f"{', '.join(test.names)} of {test.camera}"
-
-
-def _why(test: TermsTest, level: float) -> str:
-    if not test.probability < level:
-        return f"probability {test.probability:.2g}, limit {level:.2g}"
-    return f"no image is moved by more than {test.effect:.2g} standard deviations"
 
 
 check_arguments(globals(), ["eliminate_terms"])

@@ -18,6 +18,7 @@ from photogram.network.observations import Attitude, Observation
 from photogram.network.observations.observation import with_unknowns
 from photogram.network.rays import meet
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
+from photogram.words import phrase
 
 FLAT = 1e-3
 """Points of a plane whose spread across their longest extent is less, in parts of this, lie on a line."""
@@ -68,10 +69,8 @@ class _Sites:
         places[unknown] = self._met(rows[unknown])
         found = places[np.isfinite(places).all(axis=1)]
         if len(found) < least:
-            raise InputError(
-                f"{of.title} has no value to start from: {len(found)} of its {len(rows)} points have a place,"
-                f" by coordinates or by rays of photos with poses, and {least} are needed"
-            )
+            fields = {"n": len(found), "all": len(rows), "least": least}
+            raise InputError(phrase("first.unknown.points", unknown=of.title, **fields))
         return np.asarray(found)
 
     def _met(self, rows: Indices) -> Floats:
@@ -119,14 +118,14 @@ def _plane(sites: _Sites, plane: Unknown, own: Sequence[Observation]) -> Unknown
     places = sites.places(_points(own), plane, 3)
     middle, axes, spread = _principal(places)
     if spread[1] <= FLAT * spread[0]:
-        raise InputError(f"{plane.title} has no value to start from: its points lie on a line")
+        raise InputError(phrase("first.unknown.line", unknown=plane.title))
     return plane.replace(normal=sites.local(middle) @ axes[2], through=sites.place(middle))
 
 
 def _line(sites: _Sites, line: Unknown, own: Sequence[Observation]) -> Unknown:
     middle, axes, spread = _principal(sites.places(_points(own), line, 2))
     if not spread[0] > 0:
-        raise InputError(f"{line.title} has no value to start from: its points lie at one place")
+        raise InputError(phrase("first.unknown.place", unknown=line.title))
     return line.replace(direction=sites.local(middle) @ axes[0], through=sites.place(middle))
 
 
@@ -144,7 +143,7 @@ def _level(sites: _Sites, level: Unknown, own: Sequence[Observation]) -> Unknown
             height = sites.axes.from_cartesian(met)[0, 2] if np.isfinite(met).all() else np.nan
         heights.append(height - each.observed[0])
     if not np.isfinite(heights).any():
-        raise InputError(f"{level.title} has no value to start from: none of its points has a height")
+        raise InputError(phrase("first.unknown.height", unknown=level.title))
     return level.replace(height=float(np.nanmean(heights)))
 
 
@@ -183,13 +182,9 @@ def _sensor(sites: _Sites, sensor: Unknown, own: Sequence[Observation]) -> Unkno
             places.append(place)
             turns.append(turn)
     flown = [each.photo for each in sites.block.timed if each.sensor is sensor]
-    if not places and flown:
-        raise InputError(
-            f"{sensor.title} has no value to start from: the photo {flown[0]}, which has it, is on a"
-            " trajectory; give value and matrix"
-        )
     if not places:
-        raise InputError(f"{sensor.title} has no value to start from: on no frame have both photos a pose")
+        code = "first.unknown.trajectory" if flown else "first.unknown.frame"
+        raise InputError(phrase(code, unknown=sensor.title, photo=flown[0] if flown else ""))
     return sensor.replace(value=np.median(places, axis=0), matrix=_mean_rotation(turns))
 
 

@@ -18,9 +18,9 @@ from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
-from photogram.network.block import Block, flown_by
+from photogram.network.block import Block, flown_by, require_block
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.film_reduction import as_seen, is_scanned
 from photogram.network.geometry import Cartesian
@@ -29,6 +29,7 @@ from photogram.network.observations import Distance
 from photogram.network.similarity import similarity
 from photogram.network.subset import kept_images, of_photos, with_rejected_points
 from photogram.show.summary import Brief
+from photogram.words import Phrase, phrase
 
 __all__ = ["FirstValues", "first_values"]
 
@@ -38,12 +39,7 @@ NEEDED = 4  # Known points of a photo that is resected
 DOUBTFUL = 0.3  # Part of the images of control that do not fit where the control, or the start, is doubted
 ESTIMATES = 3  # Times that free cameras are estimated and photos are searched again, at most
 IN_COMMON = 3  # What a model must have in common with what is known
-SOURCES = {
-    "given": "given",
-    "resected": "resected from known points",
-    "observed": "from observed positions and attitudes",
-    "oriented": "oriented relative to each other",
-}
+SOURCES = ("given", "resected", "observed", "oriented")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,8 +142,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     >>> adjust(started.block).status
     'converged'
     """
-    if not isinstance(block, Block):
-        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    require_block(block)
     if is_scanned(block):
         found = first_values(as_seen(block), keep_all=keep_all)
         own = ("image_xy", "image_sd", "passages", "observations")
@@ -163,7 +158,9 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     search, orienting = (search, []) if nominal is None else nominal
     positions, attitudes, how, points, aside, against, first, misfit = search
     names = block.photo_ids
-    missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
+    missing = {
+        photo: str(_reason(*why)) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES
+    }
     sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
     kept = truth_value("keep_all", keep_all)
     control = tuple(np.array(block.point_ids, dtype=object)[against])
@@ -174,7 +171,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     aside = aside & ~((images == 1) & np.isfinite(block.point_sd).any(axis=1))[block.image_points]
     if not sources:
         hints = "".join(f"\n  hint: {hint}" for hint in mirrored)
-        raise AdjustmentError(f"no photo could be started: {_reasons(missing)}{hints}")
+        raise AdjustmentError(phrase("first.none", reasons=_reasons(missing), hints=hints))
     if first is not None:
         scale = _scale(block, points)
         positions, points = positions * scale, points * scale
@@ -206,7 +203,7 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
     stay = timed | np.isfinite(poses).all(axis=1)
     names = np.array(block.photo_ids, dtype=object)
     sources = dict.fromkeys(names[stay].tolist(), "given")
-    moving = Message(f"{counted(int(timed.sum()), 'photo')} on trajectories stay where they are given")
+    moving = Message(phrase("first.moving", n=int(timed.sum())))
     found = FirstValues(
         block=block,
         sources=sources,
@@ -223,9 +220,7 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
         return found
     own = first_values(at_rest(block), keep_all=keep_all)
     if own.first_photo is not None:
-        raise AdjustmentError(
-            f"nothing gives a datum to {listed(names[~stay].tolist())}: photos on trajectories have theirs"
-        )
+        raise AdjustmentError(phrase("first.no-datum-of-photos", photos=names[~stay].tolist()))
     changes: dict[str, Floats] = {}
     for name in ("photo_positions", "photo_attitudes"):
         changes[name] = _with(getattr(block, name), ~timed, getattr(own.block, name))
@@ -363,16 +358,14 @@ def _on_nominal(
     scale, turn, shift, residual = similarity(points[rows], given[rows])
     if not np.isfinite(residual):
         return None
-    names = listed([block.point_ids[row] for row in rows.tolist()])
-    said = Message(
-        f"the photos are oriented by nominal coordinates of {counted(len(rows), 'point')}: {names}"
-    )
+    names = [block.point_ids[row] for row in rows.tolist()]
+    message = Message(phrase("first.nominal", n=len(names), points=names))
     carried = scale * positions @ turn.T + shift, turn @ attitudes, how, scale * points @ turn.T + shift
-    return (*carried, aside, against, None, misfit), [said]
+    return (*carried, aside, against, None, misfit), [message]
 
 
 def _mirrored(block: Block, known: Known, directions: Floats, started: int, against: Bools) -> list[Message]:
-    """Say where control does not fit, and whether it would if photos were mirrored.
+    """Return remarks on control that does not fit, or that fits mirrored photos.
 
     Relative orientation does not see a mirrored photo; control that is not in a plane does.
     """
@@ -386,34 +379,20 @@ def _mirrored(block: Block, known: Known, directions: Floats, started: int, agai
     others = sum(why[0] in SOURCES for why in found[2])
     still = int(np.count_nonzero((found[4] | found[5][block.image_points]) & of_control))
     if others >= max(started, len(block.photo_ids) // 2) and (others > 2 * started or 5 * still < misses):
-        return [
-            Message(
-                "probably the photos are mirrored: with the other sign of x (or of y) they fit the control,"
-                " as they are they do not; or east and north of the control are exchanged"
-            )
-        ]
-    if not doubtful:
-        return []
-    count = np.count_nonzero(of_control)
-    return [Message(f"{misses} of {count} images of control points do not fit: look at the control")]
+        return [Message(phrase("first.mirrored"))]
+    count = int(np.count_nonzero(of_control))
+    return [Message(phrase("first.control-images", n=misses, all=count))] if doubtful else []
 
 
 def _of_control(block: Block, contradicted: tuple[str, ...], aside: Bools) -> list[Message]:
     """Report control points that their images contradict, and those without an image that fits."""
     messages = []
     if contradicted:
-        text = (
-            f"control points {listed(list(contradicted))}: the image observations agree with each other but"
-            " not with the coordinates; they take part, and the adjustment tests them"
-        )
-        messages.append(Message(text))
+        messages.append(Message(phrase("first.contradicted", points=list(contradicted))))
     held = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     lost = np.setdiff1d(block.image_points[aside & held[block.image_points]], block.image_points[~aside])
     if lost.size:
-        names = listed([block.point_ids[point] for point in lost.tolist()])
-        messages.append(
-            Message(f"control points {names}: no image observation fits; check points and images")
-        )
+        messages.append(Message(phrase("first.lost", points=[block.point_ids[row] for row in lost.tolist()])))
     return messages
 
 
@@ -450,20 +429,10 @@ def _scale(block: Block, points: Floats) -> float:
     return float(np.median(known)) if known else 1.0
 
 
-def _reason(kind: str, count: int, photos: int) -> str:
-    if kind == "points":
-        return f"{count} points in common with started photos and control, {NEEDED} needed"
-    if kind == "misfit":
-        return f"no position shows most of its {count} known points where they are"
-    if count < IN_COMMON:
-        return (
-            f"its model of {photos} photos has {count} points or positions in common with what is known,"
-            f" {IN_COMMON} needed"
-        )
-    return (
-        f"what its model of {photos} photos has in common with what is known ({count} points or positions) is"
-        " on one line, or does not agree"
-    )
+def _reason(kind: str, count: int, photos: int) -> Phrase:
+    fields = {"n": count, "photos": photos, "least": NEEDED if kind == "points" else IN_COMMON}
+    few = "few" if count < IN_COMMON else "line"
+    return phrase(f"first.reason.{kind if kind in ('points', 'misfit') else few}", **fields)
 
 
 def _reasons(missing: dict[str, str]) -> str:
@@ -483,18 +452,16 @@ def _messages(
     kept: bool,
 ) -> list[Message]:
     counts = {source: sum(own == source for own in sources.values()) for source in SOURCES}
-    parts = [f"{count} {SOURCES[source]}" for source, count in counts.items() if count]
-    messages = [Message(f"{len(sources)} of {len(block.photo_ids)} photos have a pose: {', '.join(parts)}")]
+    parts = [phrase(f"first.source.{source}", count=count) for source, count in counts.items() if count]
+    messages = [phrase("first.sources", n=len(sources), all=len(block.photo_ids), sources=parts)]
     if missing:
-        messages.append(Message(f"not started: {_reasons(missing)}"))
+        messages.append(phrase("first.missing", reasons=_reasons(missing)))
     if first is not None:
-        messages.append(
-            Message(f"nothing gives a datum: coordinates are counted from the photo {first}, in bases")
-        )
+        messages.append(phrase("first.no-datum", photo=first))
     if aside.any():
         points = sorted({block.point_ids[point] for point in block.image_points[aside]})
-        done = "take part all the same" if kept else "were set aside"
-        messages.append(Message(f"{int(aside.sum())} images do not fit and {done}: points {listed(points)}"))
+        code = "first.images.kept" if kept else "first.images.aside"
+        messages.append(phrase(code, n=int(aside.sum()), points=points))
     if block.refraction is not None:
-        messages.append(Message("refraction was left out of the first values"))
-    return messages
+        messages.append(phrase("first.refraction"))
+    return [Message(message) for message in messages]

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from photogram.adjustment.adjustment import Ordering, Progress, adjust
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network import geometry
 from photogram.network.block import Block, checked, of_images_alone, refuse_trajectories
 from photogram.network.cameras import images_of
@@ -24,6 +25,7 @@ from photogram.network.observations import Attitude, Position, Rate, Smoothness,
 from photogram.network.projecting import projected_images
 from photogram.network.subset import image_rows
 from photogram.results.result import Result
+from photogram.words import phrase
 
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
 
@@ -80,15 +82,14 @@ def predict(
         progress=progress,
     )
     if not result.converged:
-        raise AdjustmentError(f"the adjustment of computed image coordinates has {result.status}")
+        raise AdjustmentError(phrase("predict.not-converged", status=result.status))
     # Residuals of observations that do not agree with the given values are none of the network's.
     for kind in result.kinds.values():
         tests = np.abs(kind.residuals / kind.sd)
         if (tests > _AGREES).any():
             name = kind.names[int(np.argwhere(tests > _AGREES)[0][0])]
-            raise InputError(f"predict: the {kind.kind} of {name} does not agree with what is given")
-    remark = Message("predicted: image coordinates are computed, not observed; residuals mean nothing")
-    return replace(result, messages=[remark, *result.messages])
+            raise InputError(phrase("predict.disagrees", kind=kind.kind, name=name))
+    return replace(result, messages=[Message(phrase("predict.computed")), *result.messages])
 
 
 def computed_images(block: Block) -> Floats:
@@ -127,7 +128,7 @@ def at_adjusted(result: Result) -> Block:
     InputError: photos on trajectories.
     """
     if not result.converged:
-        raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")
+        raise AdjustmentError(phrase("predict.not-converged", status=result.status))
     block, used = result.block, result.used_images
     refuse_trajectories(block, "the plan of an adjusted block")
     return block.replace(
@@ -165,35 +166,26 @@ def _check_observations(block: Block) -> Block:
     if not block.timed:
         return of_images_alone(block, "predict")
     if block.mounts:
-        raise InputError("predict: the block has photos on frames, which are not taken there")
+        raise InputError(phrase("block.unsupported.mounts", what="predict"))
     moving = {each.photo for each in block.timed}
     for each in block.observations:
         photos = each.photos
         of_motion = each.moment is not None or isinstance(each, Smoothness)
         if not (of_motion or (isinstance(each, _OF_POSES) and moving.issuperset(photos))):
-            raise InputError(f"predict: the {each.KIND} is of no trajectory, which is not taken there")
+            raise InputError(phrase("predict.observation", kind=each.KIND))
     return block
 
 
 def _check_positions(block: Block) -> None:
     """Refuse points that cannot be projected: unknown, or behind a photo (collinearity knows no behind)."""
-    unknown = np.isnan(block.point_positions[block.image_points]).any(axis=1)
-    if unknown.any():
-        points = _names(block.point_ids, block.image_points[unknown])
-        raise InputError(
-            f"a prediction needs positions for all points with images; there are none for {points}"
-        )
-    shared = on_shared(block)[block.image_photos]
-    if block.timed and (unseen := ~np.isfinite(computed_images(block)).all(axis=1)).any():
-        photos = _names(block.photo_ids, block.image_photos[unseen])
-        points = _names(block.point_ids, block.image_points[unseen])
-        raise InputError(f"never seen by the photos that show them ({photos}): {points}")
-    behind = ~(image_depths(block) > 0) & ~shared
-    if behind.any():
-        points = _names(block.point_ids, block.image_points[behind])
-        photos = _names(block.photo_ids, block.image_photos[behind])
-        raise InputError(f"not in front of the photos that show them ({photos}): {points}")
 
+    def refuse(code: str, images: Any) -> None:
+        if images.any():
+            points = [block.point_ids[row] for row in np.unique(block.image_points[images])]
+            photos = [block.photo_ids[row] for row in np.unique(block.image_photos[images])]
+            raise InputError(phrase(code, points=points, photos=photos))
 
-def _names(ids: list[str], rows: Indices) -> str:
-    return listed([ids[row] for row in np.unique(rows)])
+    refuse("predict.unknown", np.isnan(block.point_positions[block.image_points]).any(axis=1))
+    if block.timed:
+        refuse("predict.unseen", ~np.isfinite(computed_images(block)).all(axis=1))
+    refuse("predict.behind", ~(image_depths(block) > 0) & ~on_shared(block)[block.image_photos])

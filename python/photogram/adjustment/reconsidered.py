@@ -20,14 +20,14 @@ from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError
-from photogram.messages import Message, counted
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.geometry import Cartesian
 from photogram.network.motion import timed_photos
 from photogram.network.subset import kept_images
 from photogram.results.result import Result
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 FITS = 10.0
 """Standard deviations, by the median of the images that take part, within which an image returns: the tests
@@ -134,16 +134,8 @@ def _named(started: FirstValues) -> tuple[Phrase, ...]:
 def _returned(first: FirstValues, last: FirstValues) -> list[Message]:
     aside, missing = int(first.set_aside.sum()), len(first.missing)
     images, photos = aside - int(last.set_aside.sum()), missing - len(last.missing)
-    said = []
-    if images > 0:
-        said.append(
-            f"{images} of {counted(aside, 'image')} that were set aside fit the adjusted block and take part"
-        )
-    if photos:
-        said.append(
-            f"{photos} of {counted(missing, 'photo')} without a pose have one by the adjusted cameras"
-        )
-    return [Message(each) for each in said]
+    messages = [Message(phrase("first.returned.images", n=images, all=aside))] if images > 0 else []
+    return messages + ([Message(phrase("first.returned.photos", n=photos, all=missing))] if photos else [])
 
 
 check_arguments(globals(), ["adjust_started"])

@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import (
+    argument_error,
     length,
     names,
     number,
     numbers,
     shaped,
-    shown,
     truth_value,
+    value_field,
     whole_number,
 )
 from photogram.arguments.types import Floats
@@ -34,20 +35,13 @@ from photogram.show.methods import Judged
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
+from photogram.words import phrase
 
 __all__ = ["Pose", "Resection", "resect"]
 
 
-REASONS = {
-    "too few points": "fewer than three points do not determine a pose",
-    "collinear": "the points are on one line, about which the photo can turn",
-    "danger cylinder": (
-        "the projection centre is on the danger cylinder, the right cylinder over the circle through three"
-        " points, where these do not determine the pose"
-    ),
-    "undetermined": "the observations do not determine the pose",
-}
-"""What :class:`RankError` says, by the kind of failure."""
+RANK_FAILURES = ("too few points", "collinear", "danger cylinder", "undetermined")
+"""Failures of the core that are a :class:`RankError`."""
 SOLVED = (
     *("status", "cofactors", "pose_redundancy", "point_positions", "point_cofactors", "point_redundancy"),
     *("residuals", "redundancy", "standardized", "degrees_of_freedom", "outside_danger_cylinder"),
@@ -255,7 +249,7 @@ def resect(
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
     if spheroid is not None and not isinstance(spheroid, Spheroid):
-        raise InputError(f"spheroid is a Spheroid or None, not {shown(spheroid)}")
+        raise argument_error("spheroid", "kind", kind="a Spheroid or None", value=spheroid)
     truth_value("photo_to_ground", photo_to_ground)
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
@@ -263,7 +257,8 @@ def resect(
     )
     limit = number("tolerance", tolerance)
     if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
-        raise InputError("there must be one iteration at least, and a positive criterion of convergence")
+        name, value = ("tolerance", limit) if max_iterations >= 1 else ("max_iterations", max_iterations)
+        raise argument_error(name, "positive", value=value)
     known_sd = np.concatenate(
         [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
     )
@@ -331,7 +326,7 @@ class Observed:
         count = length("image_xy", xy)
         ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
-            raise InputError(f"point_ids has {len(ids)} names, but image_xy has {count} rows")
+            raise argument_error("point_ids", "count", count=count, actual=len(ids))
         made = cls(
             points=shaped("object_points", points, (count, 3)),
             point_sd=_deviations("object_sd", point_sd, (count, 3)),
@@ -340,19 +335,17 @@ class Observed:
             principal_distance=number("principal_distance", principal_distance),
             names=ids,
         )
-        weighs = (made.xy_sd > 0) & np.isfinite(made.xy_sd)
-        checks = [
-            ("object_points", made.points, np.isfinite(made.points), "is not finite"),
-            ("object_sd", made.point_sd, np.isfinite(made.point_sd), "is not a finite standard deviation"),
-            ("image_xy", made.xy, np.isfinite(made.xy), "is not finite"),
-            ("image_sd", made.xy_sd, weighs, "is not positive and finite"),
-        ]
-        for name, values, good, why in checks:
-            rows = np.flatnonzero(~good.all(axis=1))
-            if rows.size:
-                raise InputError(f"{name} of point {ids[rows[0]]} {why}: {values[rows[0]].tolist()}")
+        checks = {"object_points": made.points, "object_sd": made.point_sd, "image_xy": made.xy}
+        for name, values in {**checks, "image_sd": made.xy_sd}.items():
+            good = np.isfinite(values) & ((values > 0) | (name != "image_sd"))
+            if (rows := np.flatnonzero(~good.all(axis=1))).size:
+                code = "positive" if name == "image_sd" else "finite"
+                value = value_field(values[rows[0]].tolist())
+                raise argument_error(f"{name} of point {ids[rows[0]]}", code, value=value)
         if not math.isfinite(made.principal_distance) or made.principal_distance == 0:
-            raise InputError(f"the principal distance cannot be {made.principal_distance}")
+            raise InputError(
+                phrase("block.not-zero", name="principal_distance", value=made.principal_distance)
+            )
         return made
 
 
@@ -393,8 +386,8 @@ def solve(
         )
     except _photocore.ResectionError as error:
         kind, message = error.args
-        if kind in REASONS:
-            raise RankError(REASONS[kind], [], observed.names) from None
+        if kind in RANK_FAILURES:
+            raise RankError(phrase(f"resection.{kind}"), [], observed.names) from None
         raise AdjustmentError(message) from None
 
 
@@ -405,7 +398,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         array = np.broadcast_to(array, shape)
     deviations = shaped(name, array, shape)
     if not (deviations >= 0).all():
-        raise InputError(f"{name} holds what is no standard deviation: {deviations[~(deviations >= 0)][0]}")
+        raise argument_error(name, "not-negative", value=float(deviations[~(deviations >= 0)][0]))
     return deviations
 
 
@@ -413,39 +406,27 @@ def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
     """Return known values, NaN where nothing is known."""
     if value is None:
         if np.isfinite(numbers(f"{name}_sd", sd)).any():
-            raise InputError(f"{name}_sd is finite, but {name} is not given")
+            raise InputError(phrase("resection.value-missing", name=name))
         return np.full(3, np.nan)
     values = shaped(name, value, (3,))
     if not np.isfinite(values).all():
-        raise InputError(f"{name} is not finite: {values.tolist()}")
+        raise argument_error(name, "finite", value=values.tolist())
     return values
 
 
 def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> list[Message]:
     messages = []
-    count = len(solution.alternatives)
-    if count:
-        messages.append(
-            Message(
-                f"{count} other pose{'s fit' if count > 1 else ' fits'} about as well;"
-                " more points, or a known position or attitude, would tell which is right"
-            )
-        )
+    if count := len(solution.alternatives):
+        messages.append(phrase("resection.alternatives", n=count))
     if solution.undetermined is not None:
-        messages.append(
-            Message(f"another pose that fits is not determined: {REASONS[solution.undetermined]}")
-        )
+        reason = phrase(f"resection.{solution.undetermined}")
+        messages.append(phrase("resection.undetermined-alternative", reason=reason))
     outside = solution.outside_danger_cylinder
     if outside is not None and abs(outside) < DOUBTFUL * _largest_position_sd(solution, spheroid):
-        messages.append(
-            Message(
-                f"the projection centre is {abs(outside):.4g} from the danger cylinder of the points, less"
-                f" than {DOUBTFUL:g} standard deviations: its covariance is too optimistic there"
-            )
-        )
+        messages.append(phrase("resection.near-cylinder", distance=abs(outside), limit=DOUBTFUL))
     if solution.degrees_of_freedom == 0:
-        messages.append(Message("there is no redundancy: nothing checks the observations"))
-    return messages
+        messages.append(phrase("resection.no-redundancy"))
+    return [Message(message) for message in messages]
 
 
 def _largest_position_sd(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> float:

@@ -7,9 +7,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import number, one_of
-from photogram.errors import InputError
+from photogram.arguments.arrays import argument_error, number, one_of
 from photogram.messages import Message
+from photogram.words import phrase
 
 __all__ = ["SCALES", "Loss", "LossName", "loss_row", "remark"]
 
@@ -31,7 +31,7 @@ def loss_row(loss: Loss | None) -> tuple[str, float] | None:
     if isinstance(loss, tuple) and len(loss) == 2:
         name, scale = loss[0], number("the scale of the loss", loss[1])
         if not 0 < scale < np.inf:
-            raise InputError(f"the scale of the loss must be positive and finite, not {scale:g}")
+            raise argument_error("scale of the loss", "positive", value=scale)
         one_of("loss", name, get_args(LossName))
         return (name, scale)
     one_of("loss", loss, get_args(LossName))
@@ -39,15 +39,10 @@ def loss_row(loss: Loss | None) -> tuple[str, float] | None:
 
 
 def remark(row: tuple[str, float] | None, weights: NDArray[np.float64]) -> list[Message]:
-    """Say that a loss has modified weights, and what that means for the statistics."""
+    """Return the remark on weights that a loss has modified."""
     if row is None:
         return []
     used = weights[np.isfinite(weights)]
-    modified, halved = np.count_nonzero(used < 1), np.count_nonzero(used < NOTABLE)
-    return [
-        Message(
-            f"{row[0].capitalize()} loss of scale {row[1]:g}: weights of {modified} of {len(used)} image"
-            f" points were modified, of {halved} to less than half; sums of squares, variance, covariances"
-            " and redundancy numbers hold for the modified weights"
-        )
-    ]
+    modified, halved = int(np.count_nonzero(used < 1)), int(np.count_nonzero(used < NOTABLE))
+    fields = {"loss": row[0], "scale": row[1], "modified": modified, "images": len(used), "halved": halved}
+    return [Message(phrase("adjust.loss", **fields))]

@@ -17,6 +17,7 @@ from photogram.adjustment.adjustment import (
     UnitVariance,
     adjust,
     adjusted_from,
+    at_least,
     core_options,
     core_threads,
     iteration_limit,
@@ -24,7 +25,8 @@ from photogram.adjustment.adjustment import (
 )
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.remarks import check_cameras
-from photogram.arguments.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.arrays import argument_error, number, one_of, truth_value
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
@@ -52,6 +54,7 @@ from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
+from photogram.words import Phrase, phrase
 
 __all__ = [
     "block_trial",
@@ -133,13 +136,10 @@ def snoop(
         truth_value("robust", robust)
     family = number("level", level) if fdr is None else number("fdr", fdr)
     if not 0 < family < 1:
-        raise InputError(
-            f"{'level' if fdr is None else 'fdr'} is a probability between 0 and 1, not {family:g}"
-        )
-    if whole_number("max_rounds", max_rounds) < 1:
-        raise InputError("there must be one round at least")
+        raise argument_error("level" if fdr is None else "fdr", "range", low=0, high=1, value=family)
+    at_least("max_rounds", max_rounds, 1)
     if not isinstance(block, Block) and not hasattr(block, "_snoop"):
-        raise InputError(f"snoop takes a Block or a Collection, not {type(block).__name__}")
+        raise kind_error("block", "a Block or a Collection", block)
     snoop_network = partial(_snoop_block, block) if isinstance(block, Block) else block._snoop
     return snoop_network(
         Settings(
@@ -242,7 +242,7 @@ def finished(
     said = list(outcome.remarks)
     if not math.isinf(largest):
         with suppress(AdjustmentError):
-            said += map(str, held_remark(held(), largest))
+            said += held_remark(held(), largest)
     found = Snooped(
         result=dataclasses.replace(result, messages=[*map(Message, said), *result.messages]),
         outcome=outcome,
@@ -288,7 +288,7 @@ def _snooped_from(
             return trial, snooped(trial, attempt)
         except (LostSupportError, _photocore.BlockError) as error:
             reason: Exception = error
-    raise AdjustmentError(f"the block cannot be tested: {reason.args[0]}") from reason
+    raise AdjustmentError(phrase("adjust.untested", reason=str(reason.args[0]))) from reason
 
 
 def block_trial(
@@ -363,7 +363,7 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
     found = None if block.mounts or block.timed else _consensus(block)
     if found is None:
         return None
-    wrong = {
+    wrong: dict[int, str | Phrase] = {
         photo: found.missing[name] for photo, name in enumerate(block.photo_ids) if name in found.contradicted
     }
     if len(wrong) > MOST_PHOTOS * len(block.photo_ids) or not (wrong or found.set_aside.any()):

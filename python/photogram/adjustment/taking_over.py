@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_images
 from photogram.network.observations import Prior, Smoothness
 from photogram.network.trajectories import Coefficient, Polynomial, RotationCoefficient, Trajectory
 from photogram.results.result import Result
 from photogram.results.trajectories import AdjustedTrajectory
+from photogram.words import phrase
 
 LARGE = 0.5  # Radians
 TIMES = 1000  # At which a trajectory is looked at, at the most
@@ -36,25 +37,15 @@ def large_turns(result: Result) -> dict[str, Floats]:
 
 
 def taken_over(turns: dict[str, Floats]) -> Message:
-    """Say what tables have taken over, from the first to the last time."""
+    """Return the remark on rotations that tables have taken over, from the first to the last time."""
     parts = [f"{name} ({np.linalg.norm(turn):.2f} rad)" for name, turn in turns.items()]
-    return Message(
-        f"attitudes were far from what is given of them: the tables of {listed(parts)} have taken over what"
-        " was missing; corrections count from there, and the block of the result has these tables"
-    )
+    return Message(phrase("adjust.rotations.tables", tables=parts))
 
 
 def stays(result: Result) -> list[Message]:
-    """Say which corrections are large, and stay: they are weighted, or vary by so much."""
+    """Return the remark on large rotations that tables cannot contain."""
     large = [own.name for own, _ in _large(result) if own.given.angles == "vector"]
-    if not large:
-        return []
-    return [
-        Message(
-            f"rotations of {listed(large)} are more than {LARGE} rad from their tables, which cannot take"
-            " this over: it is weighted, or differs from time to time; a nearer table would hold"
-        )
-    ]
+    return [Message(phrase("adjust.rotations.large", trajectories=large, limit=LARGE))] if large else []
 
 
 def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:

@@ -16,6 +16,7 @@ from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import moments
 from photogram.network.trajectories import Coefficient, Spline, Trajectory
 from photogram.network.unknowns import Unknown
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -32,14 +33,6 @@ _AFFINITY = frozenset({"b1", "b2"})
 _OF_RING = frozenset({"b1", "yp", "cy", "fx", "fy"})
 """What photos on a ring that are not turned about their axes leave open, with c or each other."""
 _ALONG = 0.8  # Cosine of the angle between the view and an axis that is moved along it
-_PARTS = {
-    "along": "flying heights (positions along the view)",
-    "across": "positions across the view",
-    "tilt": "tilts",
-    "swing": "turns about the view",
-}
-
-
 _PARALLEL = 0.99  # Cosine of the angle between views that are about parallel
 _UPRIGHT = 0.05  # Photos whose x axes are across one direction to this sine are not turned about their axes
 MOST = 40  # Lines of a message
@@ -49,23 +42,18 @@ _ON_LINE = 1e-3  # Places whose spread across a line is less than this part of t
 
 @dataclass(frozen=True)
 class Setting:
-    """How the photos of a block stand, as far as their words depend on it.
-
-    They are `parallel` where all look in about the same direction, `upright` where none is turned about its
-    axis: the x axes, or the y axes, of all are across one direction. `control` is known of points, `heights`
-    of a point or photo; `on_line` are all known places, of points and photos, on one straight line.
-    """
+    """Geometry of the photos of a block that explains undetermined unknowns."""
 
     photos: int = 0
-    parallel: bool = False
-    upright: bool = False
-    control: bool = False
-    heights: bool = True
-    on_line: bool = False
+    parallel: bool = False  # Whether all photos look in about the same direction
+    upright: bool = False  # Whether the x axes, or the y axes, of all photos are across one direction
+    control: bool = False  # Whether any coordinate of a point is control
+    heights: bool = True  # Whether any height of a point or photo is known
+    on_line: bool = False  # Whether all known places of points and photos are on one straight line
 
 
 def setting_of(block: Block) -> Setting:
-    """Return how the photos of a block stand at their initial values."""
+    """Return the setting of a block at its initial values."""
     photos = len(block.photo_ids)
     control = bool(np.isfinite(block.point_sd).any())
     moving = on_shared(block) | scanners(block)
@@ -92,19 +80,12 @@ def setting_of(block: Block) -> Setting:
     )
 
 
-def one_place(block: Block, photos: Sequence[int]) -> str:
-    """Return what it means that photos were all taken from one place; nothing where they were not."""
+def in_one_place(block: Block, photos: Sequence[int]) -> bool:
+    """Return whether some photos were all taken from one place."""
     stations = block.photo_positions[list(photos)]
-    if (on_shared(block) | scanners(block))[list(photos)].any():
-        return ""
-    if len(stations) < 2 or np.ptp(stations, axis=0).max() > _ONE_PLACE * max(1.0, np.abs(stations).max()):
-        return ""
-    return (
-        ": all photos were taken from one place, directions are determined, distances of points are not; a"
-        " base between the photos, or depths from control or distances, point by point, would determine them;"
-        " if only the camera is asked for, points at infinity do, which are directions only (stars: photogram"
-        " stellar-camera)"
-    )
+    if len(stations) < 2 or (on_shared(block) | scanners(block))[list(photos)].any():
+        return False
+    return bool(np.ptp(stations, axis=0).max() <= _ONE_PLACE * max(1.0, np.abs(stations).max()))
 
 
 def undetermined_combinations(
@@ -127,93 +108,77 @@ def undetermined_combinations(
     camera_names = [block.camera_names[row] for row in sorted(cameras)]
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
-    lines = [f"the observations leave {len(rows)} combinations of unknowns undetermined:"]
-    at = setting_of(block)
-    words = [_said(block, each, at, common) for each in sorted(set(rows))]
+    distinct, at = sorted(set(rows)), setting_of(block)
+    causes = [_cause(block, combination, at, common) for combination in distinct]
     moving = [
         _moved(block, of, by, named_unknowns(block, [common[row] for row in others]))
-        for of, by, others, *_ in sorted(set(rows))
+        for of, by, others, *_ in distinct
     ]
-    for each, said, moved in zip(sorted(set(rows)), words, moving, strict=True):
-        line = f"  {rows.count(each)} moving {moved}"
-        lines += [line, f"    {said}"] if said else [line]
-    if len(lines) > MOST:
-        lines = [*lines[:MOST], f"  and {len(lines) - MOST} lines more"]
-    if not np.isfinite(block.point_sd).any() and not any(words):
-        weighted = np.isfinite(block.photo_position_sd).any()
-        remedy = (
-            "the standard deviations of the photos are too large to give a datum in double precision"
-            if weighted
-            else "standard deviations for the positions and attitudes of photos would give a datum"
-            if not flown_by(block)
-            else "records of GNSS, or standard deviations of coefficients, would give a datum"
-        )
-        lines.append(f"  there is no control; {remedy}")
-    what = "; ".join(dict.fromkeys(said or moved for said, moved in zip(words, moving, strict=True)))
-    return RankError("\n".join(lines), names, point_names, camera_names, what)
+    lines: list[str] = []
+    for combination, cause, moved in zip(distinct, causes, moving, strict=True):
+        lines.append(f"  {rows.count(combination)}: {moved}")
+        lines += [f"    {cause}"] if cause else []
+    if len(lines) >= MOST:
+        lines = [*lines[: MOST - 1], f"  ... ({len(lines) - MOST + 1})"]
+    if not np.isfinite(block.point_sd).any() and not any(causes):
+        weighted = bool(np.isfinite(block.photo_position_sd).any())
+        remedy = "large-sd" if weighted else "trajectories" if flown_by(block) else "photos"
+        lines.append(f"  {phrase(f'adjust.no-datum.{remedy}')}")
+    what = "; ".join(dict.fromkeys(str(cause or moved) for cause, moved in zip(causes, moving, strict=True)))
+    message = phrase("adjust.undetermined", n=len(rows), lines="\n".join(["", *lines]))
+    return RankError(message, names, point_names, camera_names, what)
 
 
-def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: list[str]) -> str:
-    """Say which photos, cameras and common unknowns a combination moves."""
-    of_cameras = listed([block.camera_names[camera] for camera in cameras])
-    others = listed(unknowns)
-    if not photos:
-        parts = [f"the parameters of {of_cameras}"] if cameras else []
-        return " and ".join([*parts, *([others] if unknowns else [])])
-    on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
-    moved = (
-        f"all {len(photos)} photos together"
-        if len(photos) == len(block.photo_ids) > 1
-        else f"photos {listed([block.photo_ids[photo] for photo in photos])}"
-    )
-    if cameras:
-        moved += f" with the parameters of {of_cameras}"
+def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: list[str]) -> Phrase:
+    """Return the photos, cameras and common unknowns that a combination moves."""
+    parts = [phrase("moved.cameras", cameras=[block.camera_names[row] for row in cameras])] if cameras else []
     if unknowns:
-        moved += f" with {others}"
-    held = f"hold the points {listed([block.point_ids[p] for p in on])}" if on.size else "have no images"
-    return f"{moved}, which {held}"
+        parts.append(phrase("moved.unknowns", names=unknowns))
+    if not photos:
+        return phrase("moved", parts=parts)
+    on = np.unique(block.image_points[np.isin(block.image_photos, photos)])
+    whole = len(photos) == len(block.photo_ids) > 1
+    return phrase(
+        f"moved.{'all' if whole else 'photos'}",
+        n=len(photos),
+        photos=[block.photo_ids[photo] for photo in photos],
+        points=phrase("moved.points", points=[block.point_ids[p] for p in on])
+        if on.size
+        else phrase("moved.none"),
+        parts=parts,
+    )
 
 
-def _said(block: Block, combination: _Combination, at: Setting, common: Sequence[Unknown]) -> str:
-    """Name parameters and parts of poses, then what that is; nothing where it has no name."""
+def _cause(block: Block, combination: _Combination, at: Setting, common: Sequence[Unknown]) -> Phrase | None:
+    """Return parameters and parts of poses with the cause and the remedy; None if it has no name."""
     photos, cameras, others, moved, poses = combination
     if not moved:
-        return "" if cameras else _of_unknowns(block, {common[row].KIND for row in others}, len(photos), at)
+        kinds = {common[row].KIND for row in others}
+        return None if cameras else _of_unknowns(block, kinds, len(photos), at)
     by_camera: dict[int, list[str]] = {}
     for camera, k in moved:
         by_camera.setdefault(camera, []).append(block.cameras[camera].names[k])
-    parts = [f"{', '.join(names)} of {block.camera_names[camera]}" for camera, names in by_camera.items()]
-    parts += [_PARTS[part] for part in poses]
-    words = in_words({name for names in by_camera.values() for name in names}, set(poses), at)
-    return " with ".join(parts) + (f": {words}" if words else "")
+    parts = [
+        phrase("moved.parameters", names=names, camera=block.camera_names[camera])
+        for camera, names in by_camera.items()
+    ]
+    parts += [phrase(f"moved.{part}") for part in poses]
+    cause = in_words({name for names in by_camera.values() for name in names}, set(poses), at)
+    return phrase("weak.cause" if cause else "weak.parts", parts=parts, cause=cause)
 
 
-def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> str:
-    """Say what positions with shifts and drifts, motions, or control on a line, leave open."""
-    if said := of_motion(kinds, placed=at.control or bool(block.observations)):
-        return said
+def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> Phrase | None:
+    """Return the cause if shifts, drifts, motions, or control on a line leave unknowns open."""
+    if cause := of_motion(kinds, placed=at.control or bool(block.observations)):
+        return cause
     if kinds == {"lever arm", "shift"}:
-        return (
-            "lever arm and shift move together, all photos having the same attitude: the lever arm measured"
-            " (to 1 or 2 cm), the shift held where base and datum are sure, strips in opposite headings (for"
-            " its parts along and across them) or tilted photos"
-        )
+        return phrase("weak.lever-arm")
     if "drift" in kinds:
-        return (
-            "the drift of a strip takes whatever scale and turn control does not fix: control at both ends,"
-            " two points each, no free drift for short strips, or one shift and drift for the whole flight"
-            " and a cross strip"
-        )
-    if photos == at.photos > 0 and not kinds and at.control and not at.heights:
-        return "height and tilts of the whole: no height is known; heights of control, or positions of photos"
-    if photos == at.photos > 0 and at.on_line:
-        return (
-            "roll of the strip about the line of its control: heights beside the line are not determined; one"
-            " height aside of it, GNSS and control whose lines do not coincide, roll from an IMU with a known"
-            " boresight, or a second strip with control of its own (one that is only tied to the first rolls"
-            " with it)"
-        )
-    return ""
+        return phrase("weak.drift")
+    whole = photos == at.photos > 0
+    if whole and not kinds and at.control and not at.heights:
+        return phrase("weak.heights")
+    return phrase("weak.roll") if whole and at.on_line else None
 
 
 def weak_parameters(block: Block, solution: _photocore.BlockSolution) -> list[tuple[int, int]]:
@@ -225,8 +190,8 @@ def weak_parameters(block: Block, solution: _photocore.BlockSolution) -> list[tu
     return [*own, *solution.weak_cameras]
 
 
-def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
-    """Say what the combination is that no step could follow to its end; see :func:`in_words`."""
+def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> Phrase | None:
+    """Return the cause of the combination that no step could follow to its end; see :func:`in_words`."""
     names = {block.cameras[camera].names[k] for camera, k in weak_parameters(block, solution)}
     at = setting_of(block)
     if not names:
@@ -252,78 +217,42 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
     return _of_setting(names | free, at) or in_words(names, poses, at) or _of_distances(names, poses)
 
 
-def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> str:
-    """Return what parameters of cameras and parts of poses cannot be told apart, and what would help.
+def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> Phrase | None:
+    """Return why parameters of cameras and parts of poses cannot be separated, and the remedy.
 
-    Parts are `along`, `across`, `tilt`, `swing`; None stands for a setting that is not known. Nothing for
-    what has no name.
+    Parts are `along`, `across`, `tilt`, `swing`. A setting is None if it is unknown.
     """
     at = setting or Setting()
     radial = {name for name in names if name[0] in "KkA" and name[1:].isdigit()}
     if radial and radial == names and not poses:
-        return "radial terms among each other, which is harmless: the curve is determined; fewer terms do"
-    if names and names <= _DISTANCES | _POINTS | _AFFINITY and (words := _of_setting(names, at)):
-        return words
-    if names <= _DISTANCES and (poses == {"along"} or (at.parallel and at.control)):
-        return (
-            "principal distance and flying height of all photos: a longer camera higher up gives the same"
-            " pictures of a flat field; the principal distance given, convergent photos, observed heights of"
-            " the photos (GNSS without a free shift) or relief with known heights tell them apart"
-        )
-    if names <= _DISTANCES and poses >= {"along", "across"}:
-        return "principal distance and scale of the network: a distance or control tells them apart"
-    if names <= _POINTS and poses & {"across", "tilt"}:
-        turned = "" if at.parallel and at.control else ", photos turned by 90 or 180 degrees about their axes"
-        return (
-            "principal point and position or tilt of all photos: the principal point given, convergent"
-            f" photos, relief of known heights{turned} or positions observed without a free shift tell them"
-            " apart"
-        )
-    if names <= _POINTS | _DECENTRING and names & _DECENTRING and names & _POINTS:
-        return "decentring and principal point, as with long lenses: leave the decentring out"
-    if names <= _DISTANCES | radial and radial and names & _DISTANCES:
-        return "radial terms and principal distance: balanced terms (r0) are hardly correlated with it"
-    if "b1" in names and not names - _DISTANCES - {"b1"}:
-        return "affinity and scale: photos turned by 90 degrees tell them apart"
-    if names == {"b2"} and "swing" in poses:
-        return "shear and kappa of all photos: photos turned by 90 degrees tell them apart"
-    return ""
+        return phrase("weak.radial")
+    if names and names <= _DISTANCES | _POINTS | _AFFINITY and (cause := _of_setting(names, at)):
+        return cause
+    vertical = at.parallel and at.control
+    cases = {
+        "weak.height": names <= _DISTANCES and (poses == {"along"} or vertical),
+        "weak.scale": names <= _DISTANCES and poses >= {"along", "across"},
+        f"weak.point{'.parallel' if vertical else ''}": names <= _POINTS and poses & {"across", "tilt"},
+        "weak.decentring": names <= _POINTS | _DECENTRING and names & _DECENTRING and names & _POINTS,
+        "weak.distance-terms": names <= _DISTANCES | radial and radial and names & _DISTANCES,
+        "weak.affinity": "b1" in names and not names - _DISTANCES - {"b1"},
+        "weak.shear": names == {"b2"} and "swing" in poses,
+    }
+    return next((phrase(code) for code, holds in cases.items() if holds), None)
 
 
-def _of_distances(names: set[str], poses: set[str]) -> str:
-    """Return what helps if principal distances are weak together with positions; nothing for others."""
-    if not (names and names <= _DISTANCES and poses):
-        return ""
-    return (
-        "principal distance and distances from the photos to the points: control at different depths,"
-        " convergent photos, or a fixed principal distance separate them"
-    )
+def _of_distances(names: set[str], poses: set[str]) -> Phrase | None:
+    return phrase("weak.depths") if names and names <= _DISTANCES and poses else None
 
 
-def _of_setting(names: set[str], at: Setting) -> str:
-    """Return what the way the photos stand leaves open of their camera."""
+def _of_setting(names: set[str], at: Setting) -> Phrase | None:
+    """Return the parameters of cameras that the directions of the photos leave open."""
     if at.photos == 2:
-        return (
-            "two photos determine at most two numbers of the camera, and not even the principal distance"
-            " when their axes are parallel or meet at equal distances, or the object is flat: the camera"
-            " given, a third photo from aside, inclined and turned, or three control points at different"
-            " depths, not on a line"
-        )
+        return phrase("weak.two-photos")
     if at.parallel and not at.control:
-        return (
-            "all photos look in the same direction, and the pictures fit an object stretched along the view"
-            " or sheared across it: a photo that is tilted, the camera given, or four control points not on a"
-            " plane; a photo turned by 90 degrees about its axis settles the principal point, not the"
-            " principal distance"
-        )
-    if at.upright and not at.parallel and names & _OF_RING:
-        return (
-            "no photo is turned about its axis: the ratio of the two image scales cannot be separated from a"
-            " stretch of the object along the axis of the ring, nor yp from its growing towards one end:"
-            " every second photo turned by 90 degrees, b1 held at 0 and yp or c given, two rings of different"
-            " height (weaker), or distances along and across the axis"
-        )
-    return ""
+        return phrase("weak.parallel")
+    ring = at.upright and not at.parallel and names & _OF_RING
+    return phrase("weak.ring") if ring else None
 
 
 def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
@@ -355,53 +284,38 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
     return f"{trajectory.name} between {begin:.10g} and {end:.10g} s"
 
 
-def outside(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> str:
-    """Say what is at a time that its trajectory does not reach.
+def beyond_trajectory(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> Phrase:
+    """Return the message on a time that its trajectory does not reach.
 
-    Records on trajectories stand behind the photos; `points` has the point of the image, none where it is the
-    photo itself, or a record. `seconds` are that time, and the first and the last that the trajectory
-    reaches, from its origin.
+    Records on trajectories follow the photos; `points` has the point of the image, none for the photo itself
+    or a record. `seconds` are the time and the reach of the trajectory, from its origin.
     """
-    count = len(block.photo_ids)
-    if photo < count:
-        what = f"the photo {block.photo_ids[photo]}"
-        if points:
-            what = f"the image of point {block.point_ids[points[0]]} on {what}"
+    if photo < len(block.photo_ids):
+        name = block.photo_ids[photo]
         trajectories = zip(block.timed, block.trajectories, strict=True)
-        trajectory = next(on for own, on in trajectories if own.photo == block.photo_ids[photo])
+        trajectory = next(on for own, on in trajectories if own.photo == name)
+        subject = phrase("named.photo", photo=name)
+        if points:
+            subject = phrase("named.image", point=block.point_ids[points[0]], photo=name)
     else:
-        record = moments(block.observations)[photo - count]
+        record = moments(block.observations)[photo - len(block.photo_ids)]
         trajectory = record.trajectory
-        what = f"what was observed of {record.name}"
-    time, first, last = (trajectory.origin + each for each in seconds)
-    return (
-        f"{what} is at {time:.12g} s, beyond the trajectory {trajectory.name}, which reaches from {first!r}"
-        f" to {last!r} s: half a record beyond its table, within its knots"
-    )
+        subject = phrase("adjust.record", name=record.name)
+    time, first, last = (trajectory.origin + second for second in seconds)
+    fields = {"subject": subject, "trajectory": trajectory.name, "time": time, "first": first, "last": last}
+    return phrase("adjust.beyond-trajectory", **fields)
 
 
-def of_motion(kinds: set[str], *, placed: bool) -> str:
-    """Say what unknowns of motion of such kinds cannot be told apart, and what would help; else nothing.
+def of_motion(kinds: set[str], *, placed: bool) -> Phrase | None:
+    """Return why unknowns of motion cannot be separated.
 
-    `placed`: there is control, or anything beside images, so that it may not be the datum that is open.
+    `placed`: there is control, or an observation besides images, so that the datum may be determined.
     """
     coefficients = kinds & {"position coefficient", "rotation coefficient"}
     if "readout" in kinds and coefficients:
-        return (
-            "readout time and motion of the photos, of which only the products are seen: the readout time"
-            " given or weighted, velocities of GNSS, rates that are weighted, or a trajectory that several"
-            " exposures share"
-        )
+        return phrase("weak.readout")
     if "clock" in kinds and coefficients:
-        return (
-            "clock offset and position along the track: strips in opposite directions, control, or an offset"
-            " that is given or weighted"
-        )
+        return phrase("weak.clock")
     if not placed or not coefficients or coefficients != kinds:
-        return ""
-    if len(coefficients) == 2:
-        return (
-            "position and attitude of the trajectory: along the track and pitch, or across and roll: weights,"
-            " a second line that looks elsewhere, or control"
-        )
-    return "nothing there tells them: weights or smoothness of coefficients, a lower degree, or fewer knots"
+        return None
+    return phrase("weak.motion" if len(coefficients) == 2 else "weak.coefficients")

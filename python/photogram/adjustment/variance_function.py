@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.adjustment.adjustment import at_least
 from photogram.adjustment.components import Weighing
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shaped, shown
+from photogram.arguments.arrays import argument_error, shaped
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
@@ -19,6 +21,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.variance_function import Bin, VarianceFunction
 from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
+from photogram.words import phrase
 
 __all__ = ["variance_function"]
 
@@ -93,8 +96,8 @@ def variance_function(
         As of the adjustment.
     """
     probing = probing or Probing()
-    if bins < 2 or max_steps < 1:
-        raise InputError("there must be two bins and one step at least")
+    at_least("bins", bins, 2)
+    at_least("max_steps", max_steps, 1)
     seen = observables(network)
     images = len(seen.given.image_photos)
     own = Weighing(network, threads=threads, tolerance=TOLERANCE)
@@ -102,7 +105,7 @@ def variance_function(
     used = own.first.used_images
     largest = float(values[used].max(initial=0.0))
     if not largest > 0 or not np.isfinite(own.first.redundancy[used]).all():
-        raise InputError("the values are all zero, or there are no redundancy numbers")
+        raise InputError(phrase("weighting.no-function"))
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
     # A group for each image coordinate, and nothing else.
@@ -130,12 +133,12 @@ def variance_function(
 def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) -> Floats:
     if isinstance(of, str):
         if of != "radius":
-            raise InputError(f"variances are a function of the radius or of values, not of {shown(of)}")
+            raise kind_error("of", "`radius` or an array", of)
         middle = shaped("center", center, (2,))
         return np.asarray(np.linalg.norm(focal_images(own.network) - middle, axis=1))
     values = shaped("of", of, (images,))
     if not ((values >= 0) & np.isfinite(values)).all():
-        raise InputError("values that a variance is a function of are finite and not negative")
+        raise argument_error("of", "not-negative", value=values)
     return np.asarray(values)
 
 

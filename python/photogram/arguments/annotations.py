@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import is_masked, number, one_of, shown, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.words import phrase
 
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
@@ -255,7 +256,7 @@ def _array(name: str, value: Any) -> Any:
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
+        raise InputError(phrase("argument.array", name=name, of="numbers", reason=str(error))) from None
     if array.dtype.kind == "O":
         try:
             value = array = array.astype(float)
@@ -264,7 +265,7 @@ def _array(name: str, value: Any) -> Any:
     if array.dtype.kind not in "biuf":
         raise _refused(name, value, "an array of numbers")
     if is_masked(value):
-        raise InputError(f"{name} has masked values")
+        raise InputError(phrase("argument.masked", name=name))
     return value
 
 
@@ -293,4 +294,4 @@ def _numpy(kind: type[np.generic]) -> Check:
 
 
 def _refused(name: str, value: object, what: str) -> InputError:
-    return InputError(f"{name} is {shown(value)}, not {what}")
+    return InputError(phrase("argument.other", name=name, what=what, value=shown(value)))

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_remark, print_sections
+from photogram.cli.command_classes import misuse
+from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
-from photogram.cli.options import Quiet, Strict, default_out, out_option
-from photogram.cli.projects import Additions, Example, project_path, read_project
+from photogram.cli.options import Quiet, default_out
+from photogram.cli.projects import Additions, project_path, read_project
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
@@ -27,282 +28,178 @@ EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
 
-ModelPointSd = Annotated[
-    float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
-]
+ModelPointSd = Annotated[float, typer.Option(min=0.0)]
 
 
 @with_job
 def absolute_orientation(
     job: Job,
     *,
-    file: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="FILE", help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I."
-        ),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Orient the packaged example instead, with its points.")
-    ] = False,
-    points: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE", help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number."
-        ),
-    ] = None,
-    points_out: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="CSV file for the transformed points. Default: POINTS-transformed.csv in --out.",
-        ),
-    ] = None,
-    out: Annotated[
-        OutputFolder,
-        out_option("Directory for report.html, report.txt and transformed points. Default: FILE-oriented."),
-    ] = None,
+    file: InputFile = None,
+    example: bool = False,
+    points: InputFile = None,
+    points_out: OutputFile = None,
+    out: OutputFolder = None,
     documents: OfPrograms,
-    trace: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
-            " fill-in).",
-        ),
-    ] = None,
-    reject: Annotated[
-        list[str] | None,
-        typer.Option(metavar="ID", help="Station whose control takes no part; may be repeated."),
-    ] = None,
-    restart: Annotated[
-        InputFile,
-        typer.Option(metavar="FILE", help="Start from a former result: its --json, or its --restart-out."),
-    ] = None,
-    part_two: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the two records that part II reads (TB 19, step 12): A, s, B, identification.",
-        ),
-    ] = None,
-    restart_out: Annotated[
-        OutputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Write the record that a new solution starts from (step 12): sines, s, B, identification.",
-        ),
-    ] = None,
-    ident: Annotated[
-        str | None,
-        typer.Option(metavar="WORD", help="Identification on these records. Default: that of the cards."),
-    ] = None,
-    start: Annotated[
-        Literal["auto", "report", "closed-form"] | None,
-        typer.Option(help="Initial values. Default: auto, or report with the report's methods."),
-    ] = None,
-    scale: Annotated[
-        float | None,
-        typer.Option(help="Held: model units per ground unit, where it is known. Default: found."),
-    ] = None,
-    method: Annotated[
-        Literal["rigorous", "report", "fill-in"],
-        typer.Option(help="Least squares by the engine, or the cycles of the report."),
-    ] = "rigorous",
-    unit_variance: Annotated[
-        Literal["estimated", "unity"],
-        typer.Option(
-            metavar="NAME",
-            help="`estimated`: covariances are scaled by sigma0 squared; `unity`: they are not (with standard"
-            " deviations).",
-        ),
-    ] = "estimated",
+    trace: OutputFile = None,
+    reject: list[str] | None = None,
+    restart: InputFile = None,
+    part_two: OutputFile = None,
+    restart_out: OutputFile = None,
+    ident: str | None = None,
+    start: Literal["auto", "report", "closed-form"] | None = None,
+    scale: float | None = None,
+    method: Literal["rigorous", "report", "fill-in"] = "rigorous",
+    unit_variance: Literal["estimated", "unity"] = "estimated",
     point_sd: ModelPointSd = 0.0,
-    decimals: Annotated[
-        int | None, typer.Option(min=0, max=15, help="Decimals of transformed points.")
-    ] = None,
-    format: Annotated[  # noqa: A002  # the name of the option
-        Literal["auto", "csv", "cards"], typer.Option(help="Format of FILE; auto looks for a header.")
-    ] = "auto",
-    zero_missing: Annotated[
-        bool,
-        typer.Option(
-            "--zero-missing", help="In cards a control coordinate of 0 is missing, as in the report."
-        ),
-    ] = False,
-    ground_unit: Annotated[str, typer.Option(help="Name of the unit of the control.")] = "ground unit",
-    model_unit: Annotated[str, typer.Option(help="Name of the unit of the model.")] = "model unit",
-    strict: Strict = False,
+    decimals: Annotated[int | None, typer.Option(min=0, max=15)] = None,
+    format: Literal["auto", "csv", "cards"] = "auto",  # noqa: A002  # the name of the option
+    zero_missing: bool = False,
+    ground_unit: str = "ground unit",
+    model_unit: str = "model unit",
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
-    Prints problems, figures, parameters and residuals; writes reports and transformed points to --out.
-    Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
+    Prints problems, key figures, parameters and residuals; writes reports and transformed points to --out.
+    Stations without control are transformed, too. Exit code 3: no convergence, or control that does not fit.
     """
     if trace and method == "rigorous":
-        raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
-    with job:
-        from photogram import orient
-        from photogram.messages import Message
+        raise misuse("--trace", "requires", options="--method report or fill-in")
+    from photogram import orient
+    from photogram.absolute_orientation.trace import trace_text
+    from photogram.messages import Message
 
-        if file is None:
-            directory = job.packaged(EXAMPLE)
-            file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-            points = points or directory / "points.csv"
-            job.reads(file, points)
-        folder = out or (Path("example-oriented") if example else default_out(file, "-oriented"))
-        target = points_out
-        if points and not target:
-            target = folder / f"{points.stem}-transformed.csv"
-        pictures = documents.announce(job, folder, TEXT, picture="residuals")
-        if target and target is not points_out:
-            job.writes(target)
-        deck = _read(file, format, zero_missing, ground_unit, model_unit)
-        result = orient(
-            deck.stations,
-            method=method,
-            start=start,
-            former=_restart(restart, deck) if restart else deck.former,
-            reject=reject or (),
-            unit_variance=unit_variance,
-            trace=trace is not None,
-            scale=scale,
-        )
-        result.messages[:0] = deck.messages
-        if points and not result.usable:
-            result.messages.append(Message("no points were transformed: the orientation is not to be used"))
-            points = None
-        made = _small_files(result, folder, pictures, trace, None if points else documents.json)
-        name = deck.identification if ident is None else ident
-        made |= _records(result, part_two, restart_out, name)
-        title = file.name
-        made |= documents.page(
-            job, "absolute-orientation", folder, lambda: replace(result.document(), title=title)
-        )
-        written = list(made)
-        with job.outputs() as outputs:
-            if points and target:
-                _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
-                written = [target, *([documents.json] if documents.json else []), *written]
-            for path, content in made.items():
-                outputs.write(path, content)
-        job.conclude(
-            written,
-            summary=lambda: _summarize(result, title),
-            code=result.verdict.exit_code(strict=strict),
-        )
-
-
-def _summarize(result: Orientation, title: str) -> None:
-    """Print verdict, parameters, control and problems."""
-    from photogram.show.forms import summary
-
-    for line in summary(replace(result.document(), title=title), "parameters", "control"):
-        output.print(escape(line))
-    for problem in result.problems:
-        print_remark(problem)
+    if file is None:
+        directory = job.packaged(EXAMPLE)
+        file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
+        points = points or directory / "points.csv"
+        job.reads(file, points)
+    folder = out or default_out(file, "-oriented", example)
+    target = points_out or (folder / f"{points.stem}-transformed.csv" if points else None)
+    pictures = documents.announce(job, folder, TEXT, picture="residuals")
+    if target:
+        job.writes(target)
+    deck = _read(file, format, zero_missing, ground_unit, model_unit)
+    result = orient(
+        deck.stations,
+        method=method,
+        start=start,
+        former=_restart(restart, deck) if restart else deck.former,
+        reject=reject or (),
+        unit_variance=unit_variance,
+        trace=trace is not None,
+        scale=scale,
+    )
+    result.messages[:0] = deck.messages
+    if points and not result.usable:
+        result.messages.append(Message.of("orientation.no-points"))
+        points = None
+    made = {folder / TEXT: result.report().encode()}
+    if pictures:
+        made |= {path: result.plot().render(path.suffix[1:]) for path in pictures}
+    if trace:
+        made[trace] = trace_text(result).encode()
+    if not points:
+        made |= documents.as_json(result)
+    made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
+    document = replace(result.document(), title=file.name)
+    made |= documents.page(job, "absolute-orientation", folder, lambda: document)
+    written = list(made)
+    with job.outputs() as outputs:
+        if points and target:
+            _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
+            written = [target, *([documents.json] if documents.json else []), *written]
+        for path, content in made.items():
+            outputs.write(path, content)
+    job.conclude(
+        written,
+        summary=lambda: print_document(document, "parameters", "control", remarks=result.problems),
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 @with_job
 def transform(
     job: Job,
     *,
-    result: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="RESULT", help="The --json of an orientation, or the two records of part II."),
-    ],
-    points: Annotated[
-        Path,
-        Reads.FILE,
-        typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number."),
-    ],
-    out: Annotated[Path, Writes.FILE, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
+    result: Annotated[Path, Reads.FILE],
+    points: Annotated[Path, Reads.FILE],
+    out: Annotated[Path, Writes.FILE],
     point_sd: ModelPointSd = 0.0,
-    decimals: Annotated[int, typer.Option(min=0, max=15, help="Decimals of transformed points.")] = 6,
+    decimals: Annotated[int, typer.Option(min=0, max=15)] = 6,
     quiet: Quiet = False,
 ) -> None:
-    """Transform any number of model points by a former orientation (part II)."""
-    with job:
-        from photogram.absolute_orientation import read_similarity, transform_file
-        from photogram.absolute_orientation.cards import read_transformation
+    """Transform any number of model points with an earlier orientation (part II)."""
+    from photogram.absolute_orientation import read_similarity, transform_file
+    from photogram.absolute_orientation.cards import read_transformation
 
-        similarity = (
-            read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
+    similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
+    with job.outputs() as outputs, _progress(job, points) as progress:
+        count = transform_file(
+            similarity,
+            points,
+            out,
+            decimals=decimals,
+            point_sd=point_sd,
+            outputs=outputs,
+            progress=progress,
         )
-        with job.outputs() as outputs, _progress(job, points) as progress:
-            count = transform_file(
-                similarity,
-                points,
-                out,
-                decimals=decimals,
-                point_sd=point_sd,
-                outputs=outputs,
-                progress=progress,
-            )
-        job.conclude([out], summary=lambda: output.print(f"{count} points"))
+    job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
 @with_job
 def relative(
     job: Job,
     *,
-    path: Annotated[InputFile, typer.Argument(metavar="PATH", help="A project: a folder or file.")] = None,
-    out: Annotated[
-        OutputFile, typer.Argument(metavar="OUT", help="CSV id,X,Y,Z,x,y,z: stations to be oriented.")
-    ] = None,
-    example: Example = False,
-    photos: Annotated[
-        str | None, typer.Option(metavar="A,B,...", help="Photos in the order of the strip. Default: all.")
-    ] = None,
+    path: InputFile = None,
+    out: OutputFile = None,
+    example: bool = False,
+    photos: str | None = None,
     added: Additions,
     quiet: Quiet = False,
 ) -> None:
-    """Orient pairs of photos relatively, and join their models to a strip.
+    """Orient pairs of photos relatively and join their models to a strip.
 
-    Each pair of neighbours is adjusted by its common points in a minimum datum; models are joined by
-    similarities over common points and the projection centre that both have. The control of the project
-    stands beside its points. Exit code 3: a model that has not converged, 4: one that
-    nothing checks.
+    Each pair of neighbours is adjusted in a minimum datum. Similarities over common points and the common
+    projection centre join the models. The table contains the control of the project and the model points.
+    Exit code 3: a model did not converge. Exit code 4: a model without redundancy.
     """
     assert out is not None
-    with job:
-        import numpy as np
+    import numpy as np
 
-        from photogram.absolute_orientation.models import strip_of
-        from photogram.formats.reduced_coordinates import given_control
-        from photogram.io.csv_text import csv_text
+    from photogram.absolute_orientation.models import strip_of
+    from photogram.formats.reduced_coordinates import given_control
+    from photogram.io.csv_text import csv_text
 
-        project = read_project(job, project_path(job, path), added)
-        names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
-        strip = strip_of(project.block, names)
-        control = given_control(project)
-        unknown = np.full(3, np.nan), np.zeros(3, dtype=bool)
-        ground = [
-            np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)
-        ]
-        columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
-        columns |= dict(zip("xyz", strip.positions.T, strict=True))
-        models = [
-            f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
-            f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
-            f" {each.result.degrees_of_freedom} degrees of freedom"
-            for each in strip.models
-        ]
-        joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
-        sections = [
-            ("Models", models),
-            ("Joints, in bases of the first model", joints or ["none: one model"]),
-        ]
-        if strip.unchecked:
-            text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
-            sections.insert(0, ("Not to be used as it is", [text]))
-        job.finish(
-            {out: csv_text(columns)},
-            summary=lambda: print_sections(sections, "OUT"),
-            code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
-        )
+    project = read_project(job, project_path(job, path), added)
+    names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
+    strip = strip_of(project.block, names)
+    control = given_control(project)
+    unknown = np.full(3, np.nan), np.zeros(3, dtype=bool)
+    ground = [np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)]
+    columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
+    columns |= dict(zip("xyz", strip.positions.T, strict=True))
+    models = [
+        f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
+        f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
+        f" {each.result.degrees_of_freedom} degrees of freedom"
+        for each in strip.models
+    ]
+    joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
+    sections = [
+        ("Models", models),
+        ("Joints, in bases of the first model", joints or ["none: one model"]),
+    ]
+    if strip.unchecked:
+        text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
+        sections.insert(0, ("Not to be used as it is", [text]))
+    job.finish(
+        {out: csv_text(columns)},
+        summary=lambda: print_sections(sections, "OUT"),
+        code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
+    )
 
 
 def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
@@ -332,7 +229,7 @@ def _is_document(path: Path) -> bool:
 def _records(
     result: Orientation, part_two: Path | None, restart: Path | None, ident: str
 ) -> dict[Path, bytes]:
-    """Make the files of step 12; of an orientation that is not to be used there is none for part II."""
+    """Return the files of step 12; an unusable orientation gets only the restart."""
     from photogram.absolute_orientation.cards import restart_record, transformation_records
 
     made = {}
@@ -340,23 +237,6 @@ def _records(
         made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
     if restart:
         made[restart] = f"{restart_record(result.similarity, ident)}\n".encode()
-    return made
-
-
-def _small_files(
-    result: Orientation, folder: Path, pictures: list[Path], trace: Path | None, json: Path | None
-) -> dict[Path, bytes]:
-    """Make everything that is small, before anything is written."""
-    made = {folder / TEXT: result.report().encode()}
-    if pictures:
-        plot = result.plot()
-        made |= {path: plot.render(path.suffix[1:]) for path in pictures}
-    if trace:
-        from photogram.absolute_orientation.trace import trace_text
-
-        made[trace] = trace_text(result).encode()
-    if json:
-        made[json] = result.to_json()
     return made
 
 

@@ -1,4 +1,4 @@
-"""What a user of `photogram calibrate` says of board, pictures and lens, and asks of their uncertainty."""
+"""Options of `photogram calibrate`: board, images, lens, uncertainty."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.job import InputFile, Job
 from photogram.cli.options import pair
-from photogram.cli.projects import Deviations, OriginName
+from photogram.cli.projects import OriginName
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -21,11 +22,9 @@ if TYPE_CHECKING:
 
 
 ShapeName = Literal["held", "bend", "points"]
-"""What of a board is unknown."""
 
 
 ViewName = Literal["name", "time"]
-"""What tells which images are of one view."""
 
 
 SyncName = Literal["known", "none", "offset"]
@@ -41,86 +40,25 @@ PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a user says of the board, of images and of the lens, with the options that say it."""
+class CalibrationInput:
+    """Options for board, images and lens."""
 
-    board: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR|FILE",
-            help="Corners along x and y of a chessboard, or its description: board.toml, Kalibr's target."
-            " Default: what lies in PATH.",
-        ),
-    ] = None
-    spacing: Annotated[
-        float | None, typer.Option(metavar="S", help="With --board CxR: from corner to corner.")
-    ] = None
-    unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.")] = None
-    shape: Annotated[
-        ShapeName | None,
-        typer.Option(help="What of the board is unknown. Default: points with 8 views or more, else held."),
-    ] = None
-    cameras: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATTERN",
-            help="Names of the images of a camera, 'left*.jpg'; again for each camera. What is left of a name"
-            " is its view.",
-        ),
-    ] = None
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Width and height of the pictures, where no file says it."),
-    ] = None
-    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = "name"
-    within: Annotated[
-        float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
-    ] = 0.005
-    sync: Annotated[
-        SyncName,
-        typer.Option(
-            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
-            " whose offsets are unknown."
-        ),
-    ] = "known"
-    offsets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset",
-            metavar="CAMERA=S[,SD]",
-            help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
-        ),
-    ] = None
-    pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
-        "center"
-    )
-    model: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="The lens: opencv4, opencv5, opencv8, opencv12, or a model of docs/cameras.md. Default:"
-            " opencv5 below 90 degrees of field, opencv8 above.",
-        ),
-    ] = None
-    knots: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR",
-            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
-        ),
-    ] = None
-    knot_sd: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R,T",
-            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
-            " stereographic image. Default: 1,0.1.",
-        ),
-    ] = None
-    sd: Deviations = None
-    regularise: Annotated[
-        PriorName | None, typer.Option(help="Weak priors of the lens and of its centre, as mrcal has them.")
-    ] = None
+    board: str | None = None
+    spacing: float | None = None
+    unit: str | None = None
+    shape: ShapeName | None = None
+    cameras: list[str] | None = None
+    size: str | None = None
+    views: ViewName = "name"
+    within: Annotated[float, typer.Option(min=0.0)] = 0.005
+    sync: SyncName = "known"
+    offsets: Annotated[list[str] | None, typer.Option("--offset")] = None
+    pixel_origin: OriginName = "center"
+    model: str | None = None
+    knots: str | None = None
+    knot_sd: str | None = None
+    sd: list[str] | None = None
+    regularise: PriorName | None = None
 
     @property
     def size_of_pictures(self) -> tuple[int, int] | None:
@@ -133,7 +71,7 @@ class Seen:
         return None if self.knots is None else pair(self.knots, "--knots")
 
     def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
-        """Read what lies at a path; `progress` is told which photograph is searched."""
+        """Read corners or photographs of a path; `progress` receives the current photograph."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -162,16 +100,16 @@ class Seen:
         )
 
     def _of_project(self, path: Path) -> Calibration:
-        """Return the calibration that a plain project is, with what a user says otherwise."""
+        """Return the calibration of a plain project with the options of the user."""
         from photogram import formats
         from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
-        said = Seen(
+        said = CalibrationInput(
             shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
         )
         if self != said or self.sync == "none":
-            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
+            raise misuse(PLAIN_GOES, "project-views")
         changes: dict[str, Any] = {}
         if self.sync == "offset":
             changes["sync"] = self.sync
@@ -190,11 +128,11 @@ class Seen:
 
         if self.board is None or Path(self.board).is_file():
             if self.spacing is not None:
-                raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
+                raise misuse("--spacing", "requires", options="--board CxR")
             return None if self.board is None else Path(self.board)
         columns, rows = pair(self.board, "--board")
         if self.spacing is None:
-            raise typer.BadParameter("needs --spacing", param_hint="--board")
+            raise misuse("--board", "requires", options="--spacing")
         return Board(columns=columns, rows=rows, spacing=self.spacing)
 
     def sd0(self) -> float | None:
@@ -203,7 +141,7 @@ class Seen:
 
         found = deviations(self.sd or [])
         if found.keys() - {"images"} or len(found.get("images", (1.0,))) > 1:
-            raise typer.BadParameter("is images=S here: of a corner in x and y", param_hint="--sd")
+            raise misuse("--sd", "form", form="images=S for x and y of a corner", value=self.sd)
         return found["images"][0] if found else None
 
 
@@ -212,7 +150,7 @@ def _deviations(text: str) -> tuple[float, float]:
     try:
         radial, tangential = map(float, text.split(","))
     except ValueError:
-        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
+        raise misuse("--knot-sd", "form", form="two numbers, such as 1,0.1", value=text) from None
     return radial, tangential
 
 
@@ -226,7 +164,7 @@ def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
         except ValueError:
             offset = sd = math.nan
         if not (camera and math.isfinite(offset) and sd >= 0):
-            raise typer.BadParameter(f"is CAMERA=S or CAMERA=S,SD, not {each}", param_hint="--offset")
+            raise misuse("--offset", "form", form="CAMERA=S or CAMERA=S,SD", value=each)
         found[camera] = offset, sd
     return found
 
@@ -236,50 +174,22 @@ NOT_GOOD_ENOUGH = 4
 
 
 DatumName = Literal["corners", "mean-frames", "image", "axes"]
-"""What holds still while a calibration is uncertain."""
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What a user wants to know of the uncertainty of cameras, with the options that ask for it."""
+    """Options for the uncertainty of a calibration."""
 
-    map_distance: Annotated[
-        str | None,
-        typer.Option(
-            "--distance",
-            metavar="D,D,..",
-            help="Distances of maps of uncertainty, 1,inf. Default: infinity, and the boards' median.",
-        ),
-    ] = None
-    map_datum: Annotated[
-        DatumName, typer.Option("--datum", help="What holds still in them (docs/targets.md).")
-    ] = "corners"
-    noise_only: Annotated[
-        bool, typer.Option("--noise-only", help="Errors of corners alone, not of priors, as mrcal has it.")
-    ] = False
-    need: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0,
-            metavar="PX",
-            help="End with exit code 4 where a map is above it within the area where the board was seen.",
-        ),
-    ] = None
-    cross_validate: Annotated[
-        str,
-        typer.Option(
-            metavar="odd|halves|K|none", help="How views are split to be adjusted against each other."
-        ),
-    ] = "odd"
-    compare_with: Annotated[
-        InputFile, typer.Option("--compare", metavar="PATH", help="Another calibration, to be compared.")
-    ] = None
-    suggest: Annotated[
-        int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
-    ] = 0
+    map_distance: Annotated[str | None, typer.Option("--distance")] = None
+    map_datum: Annotated[DatumName, typer.Option("--datum")] = "corners"
+    noise_only: bool = False
+    need: Annotated[float | None, typer.Option(min=0.0)] = None
+    cross_validate: str = "odd"
+    compare_with: Annotated[InputFile, typer.Option("--compare")] = None
+    suggest: Annotated[int, typer.Option(min=0)] = 0
 
     def asked(self) -> WorthOptions:
-        """Return what is asked of a calibration."""
+        """Return the options of the uncertainty of a calibration."""
         from photogram.targets.calibration_result import WorthOptions
 
         return WorthOptions(
@@ -292,7 +202,7 @@ class Uncertainty:
 
     @property
     def distances(self) -> list[float]:
-        """Of maps; none: the usual ones."""
+        """Distances of maps; None: defaults."""
         return distances_of(self.map_distance, "--distance")
 
     def _split(self) -> Into | None:
@@ -301,22 +211,12 @@ class Uncertainty:
         if self.cross_validate in ("odd", "halves"):
             return cast("Into", self.cross_validate)
         if not (self.cross_validate.isdecimal() and int(self.cross_validate) > 1):
-            raise typer.BadParameter(
-                f"is odd, halves, none, or a number from 2, not {self.cross_validate}",
-                param_hint="--cross-validate",
-            )
+            form = "odd, halves, none, or a number greater than 1"
+            raise misuse("--cross-validate", "form", form=form, value=self.cross_validate)
         return int(self.cross_validate)
 
     def told(self, job: Job, found: Calibrated, calibrated: Callable[[Path], Calibrated]) -> Calibrated:
-        """Return an adjusted calibration with what it is worth.
-
-        Parameters
-        ----------
-        job, found
-            The job, and the calibration.
-        calibrated
-            Reads and adjusts another one, with the options of this.
-        """
+        """Return an adjusted calibration with its uncertainty; `calibrated` reads and adjusts another one."""
         from photogram.targets.appraisal import appraise
         from photogram.targets.findings import judged
         from photogram.targets.uncertainty import difference
@@ -341,5 +241,5 @@ def distances_of(text: str | None, option: str) -> list[float]:
     except ValueError:
         found = [math.nan]
     if not all(each > 0 for each in found):
-        raise typer.BadParameter(f"is a list of distances, 1,inf, not {text}", param_hint=option)
+        raise misuse(option, "form", form="a list of distances, such as 1,inf", value=text)
     return found

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.documents import PageAndJson
 from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, default_out, out_option
+from photogram.cli.options import Quiet, default_out
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -25,93 +27,57 @@ EXAMPLE = ("certificate", "rc10.toml")
 def certificate(
     job: Job,
     *,
-    path: Annotated[
-        InputFile,
-        typer.Argument(metavar="FILE", help="Certificate as TOML, or a table of fiducials (*.csv)."),
-    ] = None,
-    example: Annotated[
-        bool, typer.Option("--example", help="Check the packaged example instead: a camera of eight marks.")
-    ] = False,
-    camera: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which camera of a table of several.")
-    ] = None,
-    out: Annotated[OutputFolder, out_option("Directory for the report for the browser.")] = None,
+    path: InputFile = None,
+    example: bool = False,
+    camera: str | None = None,
+    out: OutputFolder = None,
     documents: PageAndJson,
     quiet: Quiet = False,
 ) -> None:
     """Check a camera's certificate: typing errors, marks from distances, lens from its table.
 
-    Distances are compared with coordinates; of distances alone the marks are adjusted; a table of distortion
-    becomes a lens: all with covariance. A distance that differs from its coordinates by more than 0.010 mm,
-    with what single change of a figure would explain it, ends with exit code 4.
+    The command compares distances with coordinates, adjusts marks that have only distances, and fits a lens
+    to a table of distortion, all with covariance. Exit code 4: a distance differs from its coordinates by
+    more than 0.010 mm. The report lists single changes of a figure that explain it.
     """
-    with job:
-        from photogram.film import Certificate
+    from photogram.film import Certificate
 
-        found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
-        documents.conclude(job, "certificate", found, out, text=False)
+    found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
+    documents.conclude(job, "certificate", found, out, text=False)
 
 
 @with_job
-def compare(
+def compare_certificates(
     job: Job,
     *,
-    calibrations: Annotated[
-        list[Path] | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="FILE...", help="Certificates (TOML), or camera.json of `photogram stellar-camera`."
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Compare six simulated certificates instead: a focal length steps."),
-    ] = False,
-    day: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="DATE",
-            help="1983-05-11: of a file that says none; again for each of these, in their order.",
-        ),
-    ] = None,
-    name: Annotated[
-        str, typer.Option(metavar="NAME", help="What the camera of a file that does not name it is called.")
-    ] = "1",
-    angle: Annotated[
-        float | None,
-        typer.Option(
-            min=0.1,
-            max=89.0,
-            metavar="DEG",
-            help="Compare images up to this angle from the axis. Default: as far as all certificates reach.",
-        ),
-    ] = None,
-    out: Annotated[
-        OutputFolder, out_option("Directory for the report. Default: FILE-compared beside the first FILE.")
-    ] = None,
+    calibrations: Annotated[list[Path] | None, Reads.FILE] = None,
+    example: bool = False,
+    day: list[str] | None = None,
+    name: str = "1",
+    angle: Annotated[float | None, typer.Option(min=0.1, max=89.0)] = None,
+    out: OutputFolder = None,
     documents: PageAndJson,
     quiet: Quiet = False,
 ) -> None:
     """Compare calibrations of cameras over years: drift, steps, control charts.
 
-    Images of directions are compared, not parameters, which share what they explain. What has changed is
-    named, and the exit code is 4.
+    The command compares images of directions instead of parameters, because parameters are correlated. Exit
+    code 4: a camera has changed.
     """
-    with job:
-        from photogram.film.years import compare_cameras
+    from photogram.film.years import compare_cameras
 
-        if example:
-            from photogram.film.years.example import simulated_certificates
+    if example:
+        from photogram.film.years.example import simulated_certificates
 
-            read: list[Certificate | DatedCamera] = [*simulated_certificates()]
-            folder = out or Path("camera-compared")
-        else:
-            paths = calibrations or []
-            read = _read(paths, day or [], name)
-            folder = out or default_out(paths[0], "-compared")
-        found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-        tables = ("calibrations", "series")
-        documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
+        read: list[Certificate | DatedCamera] = [*simulated_certificates()]
+        folder = out or Path("camera-compared")
+    else:
+        paths = calibrations or []
+        read = _read(paths, day or [], name)
+        folder = out or default_out(paths[0], "-compared")
+    found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
+    tables = ("calibrations", "series")
+    documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:
@@ -128,10 +94,10 @@ def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | D
             found.append(Certificate.read(path))
             continue
         if not left:
-            raise InputError("says no day: give it with --day 1983-05-11", file=path)
+            raise InputError(phrase("command.no-day"), file=path)
         found.append(DatedCamera(_day(left.pop(0)), camera_from(path, name), source=path.stem))
     if left:
-        raise typer.BadParameter(f"{left[0]} is of no file: all others say theirs", param_hint="--day")
+        raise misuse("--day", "day-without-file", day=left[0])
     return found
 
 
@@ -139,4 +105,4 @@ def _day(text: str) -> date:
     try:
         return date.fromisoformat(text)
     except ValueError:
-        raise typer.BadParameter(f"{text!r} is no day such as 1983-05-11", param_hint="--day") from None
+        raise misuse("--day", "form", form="a date such as 1983-05-11", value=text) from None

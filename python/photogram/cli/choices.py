@@ -1,4 +1,4 @@
-"""What a user of `photogram adjust` chooses where a project says it otherwise, or not at all."""
+"""Options of `photogram adjust` that override the settings of a project."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.components import UnitVarianceName
 from photogram.lazy_dataclasses import dataclass, replace
 
@@ -15,64 +16,25 @@ if TYPE_CHECKING:
     from photogram.formats import Project
 
 LossName = Literal["none", "huber", "cauchy"]
-"""What is minimised."""
-
-KeepAll = Annotated[
-    bool,
-    typer.Option("--keep-all", help="Begin with all images, those too that first values would set aside."),
-]
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What a user chooses where a project says it otherwise, or not at all, with the options that say it."""
+    """Options that override the settings of a project."""
 
-    datum: Annotated[
-        Literal["control", "minimum", "inner"] | None,
-        typer.Option(
-            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints."
-        ),
-    ] = None
-    hold: Annotated[
-        str | None,
-        typer.Option(
-            metavar="POINT=AXES,...",
-            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
-        ),
-    ] = None
-    loss: Annotated[
-        LossName | None, typer.Option(help="Robust loss of image coordinates. Default: what PATH says.")
-    ] = None
-    unit_variance: Annotated[
-        UnitVarianceName | None,
-        typer.Option(
-            metavar="NAME",
-            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
-            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
-        ),
-    ] = None
-    iterations: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Largest number of iterations [PATH, else 50; 200 with a loss or free cameras].",
-        ),
-    ] = None
-    self_calibrate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Free camera parameters (f,cx,cy,k1,k2: pinholes get lens terms), or `all` of the model.",
-        ),
-    ] = None
+    datum: Literal["control", "minimum", "inner"] | None = None
+    hold: str | None = None
+    loss: LossName | None = None
+    unit_variance: UnitVarianceName | None = None
+    iterations: Annotated[int | None, typer.Option(min=1)] = None
+    self_calibrate: str | None = None
 
     def datum_of(self, project: Project) -> str | None:
-        """Return the name of the datum: what is chosen, else that of the project."""
+        """Return the name of the datum of the option, else of the project."""
         return self.datum or project.options.datum
 
     def loss_of(self, project: Project) -> Loss | None:
-        """Return the robust loss: what is chosen, else that of the project; None for least squares."""
+        """Return the robust loss of the option, else of the project; None for least squares."""
         if self.loss is None:
             return project.options.loss
         return None if self.loss == "none" else self.loss
@@ -101,7 +63,7 @@ class Choices:
         project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
         options = project.options
         if self.hold and self.datum in ("inner", "minimum"):
-            raise typer.BadParameter("cannot be combined with --hold", param_hint="--datum")
+            raise misuse("--datum", "conflict", options="--hold")
         return project.replace(
             options=replace(
                 options,

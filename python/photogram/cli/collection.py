@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, Found, snooped
+from photogram.cli.command_classes import misuse
+from photogram.cli.components import COMPONENTS, Basis, Found, snooped
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
-from photogram.cli.job import InputFile, Job, OutputFolder, Without, with_job
-from photogram.cli.options import (
-    Ordering,
-    OrderingName,
-    Quiet,
-    Snooping,
-    Strict,
-    Threads,
-    UnitWeight,
-    check_alone,
-    example_out,
-    out_option,
-)
-from photogram.cli.progress import adjustment_status
+from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
+from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, UnitWeight, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -35,31 +25,15 @@ PACKED = (".bz2", ".gz")
 
 
 @dataclass(frozen=True)
-class Fit:
-    """What is minimised, and when that ends, with the options that say it."""
+class CollectionFit:
+    """Options for the loss function and its minimization."""
 
-    loss: Annotated[
-        Literal["squares", "huber", "cauchy"],
-        typer.Option(help="What is minimised: squares, or a robust loss of them."),
-    ] = "squares"
-    scale: Annotated[
-        float | None,
-        typer.Option(
-            help="Where the loss sets in, in standard deviations. Default: 1.50 (huber), 2.55 (cauchy)."
-        ),
-    ] = None
-    sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, pixels.")] = 1.0
-    tolerance: Annotated[
-        float | None,
-        typer.Option(
-            help="Stop when a step lowers the cost by less than this fraction."
-            " Default: 1e-8, with a loss 1e-6."
-        ),
-    ] = None
-    max_iterations: Annotated[int, typer.Option(min=1, help="Iterations at the most.")] = 200
-    covariance: Annotated[
-        bool, typer.Option("--covariance/--no-covariance", help="Compute covariances and redundancy numbers.")
-    ] = True
+    loss: Literal["squares", "huber", "cauchy"] = "squares"
+    scale: float | None = None
+    sd: float = 1.0
+    tolerance: float | None = None
+    max_iterations: Annotated[int, typer.Option(min=1)] = 200
+    covariance: Annotated[bool, typer.Option("--covariance/--no-covariance")] = True
 
     @property
     def robust(self) -> robust.Loss | None:
@@ -67,7 +41,7 @@ class Fit:
         if self.loss != "squares":
             return self.loss if self.scale is None else (self.loss, self.scale)
         if self.scale is not None:
-            raise typer.BadParameter("is that of a loss: give --loss too", param_hint="--scale")
+            raise misuse("--scale", "requires", options="--loss")
         return None
 
 
@@ -75,90 +49,69 @@ class Fit:
 def collection(
     job: Job,
     *,
-    problem: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="FILE",
-            help='Problem of "Bundle Adjustment in the Large" or Bundle file (0.3), plain, .bz2 or .gz.',
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Adjust the packaged example instead: 8 photos around 60 points."),
-    ] = False,
-    out: Annotated[
-        OutputFolder,
-        out_option(
-            "Directory for report.html, report.txt and the adjusted collection: adjusted.txt, or"
-            " adjusted.out for a Bundle"
-            " file, packed as FILE is."
-            " Default: no files."
-        ),
-    ] = None,
+    problem: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: Annotated[Documents, Without("xlsx", "crs", "map")],
-    fit: Fit,
-    components: Components = None,
-    ordering: Ordering = "auto",
+    fit: CollectionFit,
+    components: list[Basis] | None = None,
+    ordering: OrderingName = "auto",
     threads: Threads = None,
     snooping: Annotated[Snooping, Without("unit_weight")],
-    unit_weight: Annotated[
-        UnitWeight, typer.Option(help="With --snoop: whether --sd is right, or but for a common factor.")
-    ] = "unknown",
-    strict: Strict = False,
+    unit_weight: UnitWeight = "unknown",
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start."""
+    """Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values."""
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
-        raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
-    with job:
-        from photogram.collection import to_bytes
-        from photogram.collection.formats import recognised
-        from photogram.show.forms import text
+        raise misuse("--out", "folder", name="adjusted.txt")
+    from photogram.collection import to_bytes
+    from photogram.collection.formats import recognised
+    from photogram.show.forms import text
 
-        if problem is None:
-            problem = job.packaged(*EXAMPLE)
-            out = example_out(out, documents.plots, "example-adjusted")
-            job.reads(problem)
-        packing = problem.suffix if problem.suffix in PACKED else ""
-        photos, found = recognised(problem)
-        adjusted = f"adjusted{found.suffix}{packing}"
-        documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
-        pictures = documents.pictures(job, out)
-        photos = photos.replace(image_sd=fit.sd)
-        if snooping.snoop:
-            check_alone(job, "--snoop", ("--loss", "--scale"))
-        # Nothing vouches for --sd: the default is not that of blocks.
-        snooping = replace(snooping, unit_weight=unit_weight)
-        result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
-        result = result.estimated(job, photos, components, threads)
-        written = pictures.of(result.result)
-        if out is not None:
-            written[out / TEXT] = text(result.document).encode()
-            written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
-            written |= result.files(out)
-        title = problem.name
-        written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
-        written |= documents.as_json(result.told)
+    if example and documents.plots:
+        out = out or Path("example-adjusted")
+    problem = job.input(problem, *EXAMPLE)
+    packing = problem.suffix if problem.suffix in PACKED else ""
+    photos, found = recognised(problem)
+    adjusted = f"adjusted{found.suffix}{packing}"
+    documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
+    documents.check_plots(job, out)
+    photos = photos.replace(image_sd=fit.sd)
+    if snooping.snoop:
+        check_alone(job, "--snoop", ("--loss", "--scale"))
+    # Nothing vouches for --sd: the default is not that of blocks.
+    snooping = replace(snooping, unit_weight=unit_weight)
+    result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
+    result = result.estimated(job, photos, components, threads)
+    written = documents.plots_of(result.result, out)
+    if out is not None:
+        written[out / TEXT] = text(result.document).encode()
+        written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
+        written |= result.files(out)
+    title = problem.name
+    written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
+    written |= documents.as_json(result.told)
 
-        def summarize() -> None:
-            print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
-            print_summary(result.document, "the report")
+    def summarize() -> None:
+        print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
+        print_summary(result.document, "the report")
 
-        job.finish(
-            written,
-            documents.data(result.result),
-            documents.charts(result.result),
-            summary=summarize,
-            code=result.verdict.exit_code(strict=strict),
-        )
+    job.finish(
+        written,
+        documents.data(result.result),
+        documents.charts(result.result),
+        summary=summarize,
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 def _adjusted(
     job: Job,
     photos: Collection,
-    fit: Fit,
+    fit: CollectionFit,
     snooping: Snooping,
-    components: Components,
+    components: list[Basis] | None,
     ordering: OrderingName,
     threads: int | None,
 ) -> Found[AdjustedCollection]:

@@ -2,75 +2,81 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+from copy import copy
+from functools import cache
+from inspect import Parameter
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin
 
+import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.models import OptionInfo
 
-PANELS = {
-    "Input": "example day name packaged file_format control control_crs columns roles images names camera sd"
-    " settings cubes jigsaw photos_dir photos_crs gnss gnss_crs gnss_antenna mrk_antenna pixel_origin model"
-    " angles grid hand against against_spacing against_position_sd catalogue utc epoch faintest points"
-    " point_sd decimals"
-    " format zero_missing ground_unit model_unit restart start reject photos kind board spacing unit"
-    " shape knots knot_sd cameras size views within sync offsets",
-    "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
-    " pdf to trace points_out part_two restart_out ident date",
-    "Adjustment": "datum datum_points hold loss scale tolerance max_iterations iterations covariance"
-    " unit_variance self_calibrate keep_all keep_repeated as_published weights method polynomial"
-    " estimate_grid each_case angle lens common_scale without any_roll blind air_refraction"
-    " water_refraction water_level water_index limits invert extrapolate components regularise"
-    " together calibrate radius distances intrinsics_only knot_grid",
-    "Gross errors": "snoop level fdr unit_weight outliers",
-    "Uncertainty": "map_distance map_datum noise_only need cross_validate compare_with suggest",
-    "Planned views": "plan_views view_field focal away",
-    "Features": "distance line plane circle sphere cylinder k coverage",
-    "Statement": "standard class_h class_v class_3d area without independent language text budget project"
-    " client firm surveyor statement",
-    "In parts": "cluster workers parts memory run plan",
-    "Simulated block": "strips photos_per_strip forward_overlap side_overlap principal_distance frame_size"
-    " flying_height relief points_per_photo crab tilt control_spacing control_sd image_sd"
-    " position_sd attitude_sd spheroid origin photo_to_ground check_points position_error"
-    " attitude_error blunders blunder_size seed",
-    "Motion": "readout readout_sd readout_direction speed speed_sd rate rate_sd scanner view_angle pitch"
-    " every knots scenes",
-    "Run": "ordering threads strict quiet help",
-}
-"""Options by the names of their parameters; what is in none is under `Options`."""
+from photogram.words import phrase
 
-PANEL_OF = {option: panel for panel, options in PANELS.items() for option in options.split()}
+
+@cache
+def declarations() -> dict[str, tuple[str, str | None, str]]:
+    """Return panel, placeholder and help text of options and arguments by name; see `options.toml`."""
+    panel, table = "", {}
+    for line in Path(__file__).with_name("options.toml").read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            panel = line.strip('[]"')
+        elif line and not line.startswith("#"):
+            name, _, value = line.partition(" = ")
+            texts = json.loads(value)  # strings and lists of them are the same in JSON
+            placeholder, text = (None, texts) if isinstance(texts, str) else texts
+            table[name.strip('"')] = panel, placeholder, text
+    return table
+
+
+def misuse(option: str, code: str, /, **fields: Any) -> typer.BadParameter:
+    """Return the error of an option or argument: a code of the family `usage` with fields."""
+    return typer.BadParameter(str(phrase(f"usage.{code}", **fields)), param_hint=option)
+
+
+def declared(parameter: Parameter, owner: str) -> Parameter:
+    """Return an option or argument of a command, or a class of options, with its declaration."""
+    annotated = get_origin(parameter.annotation) is Annotated
+    kind, *marks = get_args(parameter.annotation) if annotated else (parameter.annotation,)
+    table, name = declarations(), parameter.name
+    panel, placeholder, text = table.get(f"{owner}.{name}") or table[name]
+    options = [mark for mark in marks if isinstance(mark, OptionInfo)]
+    if panel == "Arguments":
+        info = typer.Argument(metavar=placeholder, help=text)
+    else:
+        flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
+        info = copy(options[0]) if options else typer.Option(*flag)
+        info.metavar, info.help, info.rich_help_panel = placeholder, text, panel
+    others = [mark for mark in marks if mark not in options]
+    return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[(kind, info, *others)])
 
 
 class Command(TyperCommand):
-    """A command whose help has panels, and says of a switch nothing but what it does."""
+    """A command whose help has panels and switches without a type."""
 
     def __init__(self, *args: Any, **values: Any) -> None:
         super().__init__(*args, **values)
         # Lines of a docstring are lines of the source.
         self.help = self.help and "\n\n".join(" ".join(each.split()) for each in self.help.split("\n\n"))
-        for each in self.params:
-            _arrange(each)
+        for parameter in self.params:
+            # typer shows the type of a switch, but a user writes none.
+            if getattr(parameter, "is_flag", False) and parameter.metavar is None:
+                parameter.metavar = ""
 
     def get_help_option(self, ctx: Any) -> Any:
         """Return --help in its panel."""
-        option = super().get_help_option(ctx)
+        option: Any = super().get_help_option(ctx)
         if option is not None:
-            _arrange(option)
+            option.rich_help_panel, option.metavar = "Run", ""
         return option
 
 
-def _arrange(parameter: Any) -> None:
-    if parameter.param_type_name != "option":
-        return
-    parameter.rich_help_panel = PANEL_OF.get(parameter.name)
-    # typer shows the type of a switch, which is none that a user writes.
-    if parameter.is_flag and parameter.metavar is None:
-        parameter.metavar = ""
-
-
 class GroupWithMain(TyperGroup):
-    """A group whose first command is run when the first word names none.
+    """A group whose first command is the default command.
 
-    The job that people come for needs no name; a directory with the name of a side command is `./check`.
+    A folder with the name of a side command must be written as `./check`.
     """
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -78,7 +84,7 @@ class GroupWithMain(TyperGroup):
         return list(self.commands)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command; the help of the main one, which is that of the group, names the others."""
+        """Return a command; the help of the main command lists the others."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and cmd_name == self._main:
             others = [self.commands[name] for name in self.list_commands(ctx) if name != self._main]
@@ -98,7 +104,7 @@ class GroupWithMain(TyperGroup):
         return list(super().parse_args(ctx, args))
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Return the side commands, and what the main command begins with."""
+        """Return completions: the side commands and those words that complete the main command."""
         main = self.commands[self._main]
         with main.make_context(self._main, [], parent=ctx, resilient_parsing=True) as own:
             return [*super().shell_complete(ctx, incomplete), *main.shell_complete(own, incomplete)]

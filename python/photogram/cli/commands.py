@@ -1,8 +1,4 @@
-"""The commands: one for each program, and what goes with blocks of any format.
-
-A command is loaded when it is called: of the others the command line knows no more than their help, so that
-each of them, and `photogram --help`, is quick.
-"""
+"""The commands of all programs. Each is loaded when it is called, so that other commands are quick."""
 
 from __future__ import annotations
 
@@ -25,41 +21,44 @@ ADJUST = (
 
 COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
     "adjust": (
-        "Adjust a block in whatever files it lies: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
+        "Adjust a block of any supported format: tables, COLMAP, OpenDroneMap, BlocksExchange, GIANT ...",
         "adjust.adjust",
     ),
     "calibrate": (
-        "Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.",
+        "Calibrate cameras and rigs with images of a board: cameras with their uncertainty.",
         "calibrate.calibrate",
     ),
     "check": (
-        "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
+        "Search for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
         "check.check_project",
     ),
     "info": (
-        "Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks.",
-        "info.info",
+        "Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.",
+        "project_commands.info",
     ),
-    "convert": ("Write a project in another format, and say what that has no place for.", "convert.convert"),
+    "convert": (
+        "Write a project in another format and list the data that the format cannot contain.",
+        "project_commands.convert",
+    ),
     "convert-lens": (
-        "Fit a lens of another model to what a camera shows, and say what it misses.",
+        "Fit a lens of another model to a camera and report the differences.",
         "convert_lens.convert_lens",
     ),
     "metadata": (
-        "Say where photos were taken by their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
-        "metadata.metadata",
+        "List positions of photographs from their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
+        "project_commands.metadata",
     ),
     "features": (
         "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
         "features.features",
     ),
     "statement": (
-        "State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.",
+        "Write an accuracy statement of a block by published standards: page, PDF, JSON document, tables.",
         "statement.statement",
     ),
-    "new": ("Write a small real project as tables, with comments that say what may stand there.", "new.new"),
+    "new": ("Write a small real project as tables with comments on their contents.", "project_commands.new"),
     "collection": (
-        "Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start.",
+        "Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values.",
         "collection.collection",
     ),
     "perspective-center": (
@@ -67,11 +66,11 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "perspective_center.perspective_center",
     ),
     "plan": (
-        "Predict the accuracy of a network before it is flown: two patterns of control side by side.",
+        "Predict the accuracy of a network before the flight for two patterns of control.",
         "plan.plan",
     ),
     "simulate": (
-        "Write a simulated block as a GIANT project, or as tables if it moves, and its truth as truth.json.",
+        "Write a simulated block as a GIANT project, or as tables if cameras move, with its truth.",
         "simulate.simulate",
     ),
     "certificate": (
@@ -96,10 +95,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         {
             "calibrate": "comparator.comparator",
             "correct": "comparator.correct",
-            "compare": "comparator.compare",
+            "compare": "comparator.compare_calibrations",
         },
     ),
-    "camera": ("Compare calibrations of cameras over years.", {"compare": "camera.compare"}),
+    "camera": ("Compare calibrations of cameras over years.", {"compare": "camera.compare_certificates"}),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",
         {
@@ -109,17 +108,11 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         },
     ),
 }
-"""What each is for, and the file and function that do it: those of side commands, the main one first."""
+"""Purpose of each command, and file and function; a group lists its commands, the main command first."""
 
 
 def application(word: str | None = None) -> typer.Typer:
-    """Return the command line.
-
-    Parameters
-    ----------
-    word
-        The first one that was given: only the command that it names is loaded. None: all are.
-    """
+    """Return the command line."""
     made = typer.Typer(
         name="photogram",
         help="Photogrammetric least-squares adjustment with the covariance of every result.",
@@ -148,7 +141,7 @@ def _function(home: str) -> Any:
 
 
 def _not_loaded() -> None:
-    """Stand for a command that was not called."""
+    """Replace a command that is not loaded."""
 
 
 def _version(asked: bool) -> None:

@@ -1,4 +1,4 @@
-"""Variance components on the command line, and what the variance of unit weight is based on."""
+"""Variance components on the command line, and the basis of the variance of unit weight."""
 
 from __future__ import annotations
 
@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
-import typer
-
-from photogram.cli.job import Job
-from photogram.cli.progress import estimation_status
+from photogram.cli.job import Job, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -24,15 +21,13 @@ if TYPE_CHECKING:
 
 Network = TypeVar("Network", bound="AdjustedNetwork")
 COMPONENTS = "components.txt"
-"""What goes to the output directory where variance components are asked for."""
 
 
 UnitVarianceName = Literal["constrained", "unity", "redundancy"]
-"""What the variance of unit weight is based on."""
 
 
 class Basis(StrEnum):
-    """What groups of observations are made by."""
+    """Criteria for groups of observations."""
 
     KIND = "kind"
     CAMERA = "camera"
@@ -43,17 +38,6 @@ class Basis(StrEnum):
     RAYS = "rays"
 
 
-Components = Annotated[
-    list[Basis] | None,
-    typer.Option(
-        "--components",
-        help="Estimate variance components of groups of observations: by which factors their standard"
-        " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
-        " given weights; with --snoop those of the weights that what is left bears out.",
-    ),
-]
-
-
 def _groups(bases: list[Basis]) -> list[str]:
     return [basis.replace("-", " ") for basis in bases]
 
@@ -61,7 +45,7 @@ def _groups(bases: list[Basis]) -> list[str]:
 def snooped(
     network: object, bases: list[Basis] | None, threads: int | None, options: Mapping[str, Any]
 ) -> tuple[Snooped, Cleaned | None]:
-    """Take gross errors out, with options of snooping; where weights are asked for, estimate them in turn."""
+    """Remove gross errors; estimate weights alternately if components are requested."""
     if bases:
         from photogram.adjustment.cleaning import clean
 
@@ -74,30 +58,29 @@ def snooped(
 
 @dataclass(frozen=True)
 class Found(Generic[Network]):
-    """What the adjustment of a network gave: the result, and of what else was asked for."""
+    """The outcome of an adjustment: result, removed observations, variance components."""
 
     result: Network
     log: Snooped | None = None
-    """What was taken out."""
     made: Cleaned | None = None
-    """Weights and what was taken out, found in turn."""
+    """Weights and removed observations of an alternating estimation."""
     components: VarianceComponents | None = None
-    """Of the given weights, which the result keeps."""
+    """Components of the given weights, which the result retains."""
 
     @property
     def told(self) -> Snooped | Network:
-        """What reports are of."""
+        """The subject of reports."""
         return self.log or self.result
 
     @property
     def verdict(self) -> Verdict:
-        """What the command ends by."""
+        """The verdict that determines the exit code."""
         return (self.components or self.told).verdict
 
     def estimated(
         self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
     ) -> Found[Network]:
-        """Return it with the components that are asked for, where they are not found already."""
+        """Return the outcome with requested components if it lacks them."""
         if self.made is not None or not bases:
             return self
         from photogram.adjustment.components import variance_components
@@ -107,7 +90,7 @@ class Found(Generic[Network]):
         return replace(self, components=found)
 
     def files(self, out: Path) -> dict[Path, bytes]:
-        """Return what goes to the output directory of variance components."""
+        """Return the file of variance components in the output folder."""
         weights = self.made or self.components
         return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
 

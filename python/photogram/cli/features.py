@@ -2,50 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photogram.cli.adjust import result_at
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, OutputFolder, with_job
-from photogram.cli.options import JsonFile, Quiet, Strict, Threads, out_option
-from photogram.cli.projects import Additions, Example, ProjectPath
+from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, with_job
+from photogram.cli.options import Quiet, Threads
+from photogram.cli.projects import Additions
 from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.results.features import Definition
 
-Given = list[str] | None
-
-
-def _option(kind: str, what: str) -> Any:
-    return typer.Option(f"--{kind}", metavar="NAME=POINT,..", help=what)
-
 
 @dataclass(frozen=True)
-class Wanted:
-    """Features, with the options that say what they go through; all may be given more than once."""
+class FeatureOptions:
+    """Definitions of features; all options can be repeated."""
 
-    distance: Annotated[Given, _option("distance", "Between two points.")] = None
-    line: Annotated[Given, _option("line", "Through 2 or more points: axis, straightness.")] = None
-    plane: Annotated[Given, _option("plane", "Through 3 or more: normal, flatness.")] = None
-    circle: Annotated[
-        Given, _option("circle", "Through 3 or more: diameter, centre, normal, roundness; bore='hole-*'.")
-    ] = None
-    sphere: Annotated[Given, _option("sphere", "Through 4 or more: diameter, centre, sphericity.")] = None
-    cylinder: Annotated[Given, _option("cylinder", "Through 6 or more: diameter, axis, cylindricity.")] = None
+    distance: list[str] | None = None
+    line: list[str] | None = None
+    plane: list[str] | None = None
+    circle: list[str] | None = None
+    sphere: list[str] | None = None
+    cylinder: list[str] | None = None
 
     def definitions(self) -> dict[str, Definition]:
-        """Return what is asked for, by its name."""
+        """Return the requested features by name."""
         found: dict[str, Definition] = {}
         for each in fields(self):
             for given in getattr(self, each.name) or ():
                 name, equals, points = (part.strip() for part in given.partition("="))
                 if not (name and equals and points):
-                    raise typer.BadParameter(f"{given} is not NAME=POINT,...", param_hint=f"--{each.name}")
+                    raise misuse(f"--{each.name}", "form", form="NAME=POINT,...", value=given)
                 if name in found:
-                    raise typer.BadParameter(f"two features are called {name}", param_hint=f"--{each.name}")
+                    raise misuse(f"--{each.name}", "feature-repeated", name=name)
                 found[name] = (each.name, [point.strip() for point in points.split(",")])
         return found
 
@@ -54,56 +47,47 @@ class Wanted:
 def features(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    wanted: Wanted,
-    k: Annotated[float, typer.Option("-k", metavar="K", min=0.01, help="Coverage factor: U = k sd.")] = 2.0,
-    coverage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P",
-            min=0.01,
-            max=0.999999,
-            help="A probability in place of -k: 0.95. k is Student's where the unit weight is estimated.",
-        ),
-    ] = None,
-    out: Annotated[OutputFolder, out_option("Directory for tables of values and of deviations.")] = None,
-    json: JsonFile = None,
+    path: InputFile = None,
+    example: bool = False,
+    wanted: FeatureOptions,
+    k: Annotated[float, typer.Option("-k", min=0.01)] = 2.0,
+    coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None,
+    out: OutputFolder = None,
+    json: OutputFile = None,
     added: Additions,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.
 
-    PATH is a result that `photogram adjust --parquet` has written, or a project, which is adjusted first.
-    --example is that of `photogram new --kind metrology`.
-    Those that the project declares are fitted where no option names others.
+    PATH is a result of `photogram adjust --parquet`, or a project that is adjusted first. Features of the
+    project are fitted if no option defines features. --example is the project of `photogram new --kind
+    metrology`.
     """
     path = job.packaged("flange") if path is None else path
-    with job:
-        from photogram import features as fitted
-        from photogram.formats.adjusted import feature_files
-        from photogram.io.json import to_json
-        from photogram.results.features_report import features_document, features_section
-        from photogram.show.forms import titled_lines
-        from photogram.show.judgement import judged
-        from photogram.show.page import Document
+    from photogram import features as fitted
+    from photogram.formats.adjusted import feature_files
+    from photogram.io.json import to_json
+    from photogram.results.features_report import features_document, features_section
+    from photogram.show.forms import titled_lines
+    from photogram.show.judgement import judged
+    from photogram.show.page import Document
 
-        definitions = wanted.definitions()
-        result, project = result_at(job, path, added, threads, fitted=False)
-        if project is not None:
-            declared = dict(project.features)
-        else:
-            declared = {} if result.features is None else result.features.definitions
-        if not (definitions or declared):
-            raise typer.BadParameter("name what to fit: --circle bore=p1,p2,p3 ...", param_hint="PATH")
-        found = fitted(result, definitions or declared, k=k, coverage=coverage)
-        verdict = result.verdict
-        document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
-        job.finish(
-            {} if out is None else {out / name: each for name, each in feature_files(found).items()},
-            {} if json is None else {json: to_json(features_document(found))},
-            summary=lambda: print_sections(titled_lines(document), "--json FILE"),
-            code=verdict.exit_code(strict=strict),
-        )
+    definitions = wanted.definitions()
+    result, project = result_at(job, path, added, threads, fitted=False)
+    if project is not None:
+        declared = dict(project.features)
+    else:
+        declared = {} if result.features is None else result.features.definitions
+    if not (definitions or declared):
+        raise misuse("PATH", "no-features")
+    found = fitted(result, definitions or declared, k=k, coverage=coverage)
+    verdict = result.verdict
+    document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
+    job.finish(
+        {} if out is None else {out / name: each for name, each in feature_files(found).items()},
+        {} if json is None else {json: to_json(features_document(found))},
+        summary=lambda: print_sections(titled_lines(document), "--json FILE"),
+        code=verdict.exit_code(strict=strict),
+    )

@@ -5,16 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from photogram.cli.adjust import adjusted_block, started_block
 from photogram.cli.console import print_sections
 from photogram.cli.documents import PageAndJson
-from photogram.cli.job import Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, Strict, Threads, default_out, out_option
-from photogram.cli.projects import NOTHING, Additions, Example, ProjectPath, read_project
+from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
+from photogram.cli.options import Quiet, Threads, default_out
+from photogram.cli.projects import NOTHING, Additions, read_project
 from photogram.lazy_dataclasses import replace
 from photogram.messages import counted
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -28,32 +27,30 @@ EXAMPLE = ("archive",)
 def film(
     job: Job,
     *,
-    path: ProjectPath = None,
-    example: Example = False,
-    out: Annotated[
-        OutputFolder, out_option("Directory for report.txt and report.html. Default: PATH-film.")
-    ] = None,
+    path: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: PageAndJson,
     added: Additions,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Adjust a block on film in one step and in two: what films that are fitted before leave out.
+    """Adjust a block on film in one step and in two steps, and report the differences.
 
-    PATH is a plain project with films. It is adjusted with films inside, and with films that are fitted to
-    their marks and then errorless: by how much points and their standard deviations differ.
-    The verdict and the exit code are those of the one step, as `photogram adjust` has it.
-    --example is that of `photogram new --kind archive`.
+    PATH is a plain project with films. One adjustment contains the films. The other one uses films that were
+    fitted to their marks before, without errors. The report lists the differences of points and standard
+    deviations. Verdict and exit code are of one step.
+
+    --example is the project of `photogram new --kind archive`.
     """
     source = job.packaged(*EXAMPLE) if path is None else path
-    target = out or (Path("example-film") if example else default_out(source, "-film"))
-    with job:
-        from photogram.film import compare_steps
+    target = out or default_out(source, "-film", example)
+    from photogram.film import compare_steps
 
-        found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
-        code = found.inside.verdict.exit_code(strict=strict)
-        documents.conclude(job, "film", found, target, code=code)
+    found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
+    code = found.inside.verdict.exit_code(strict=strict)
+    documents.conclude(job, "film", found, target, code=code)
 
 
 def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: int | None) -> Result:
@@ -63,7 +60,7 @@ def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: in
     settings = [*(added.settings or []), f"film.interior={interior}"]
     project = read_project(job, path, replace(added, settings=settings))
     if not project.block.passages:
-        raise InputError("has no photo on film: a column `film` of its photos says which are", file=path)
+        raise InputError(phrase("command.no-film"), file=path)
     block, started = started_block(project, keep_all=False)
     return adjusted_block(job, project, started or block, threads=threads)
 
@@ -72,36 +69,30 @@ def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: in
 def marks(
     job: Job,
     *,
-    path: Annotated[
-        Path,
-        Reads.PROJECT,
-        typer.Argument(metavar="DIR", help="Folder of MicMac with Ori-InterneScan, or a project with films."),
-    ],
-    out: Annotated[OutputFolder, out_option("Directory for the tables, or for the files of MicMac.")] = None,
-    name: Annotated[
-        str, typer.Option(metavar="NAME", help="What the camera is called that MicMac does not name.")
-    ] = "1",
+    path: Annotated[Path, Reads.PROJECT],
+    out: OutputFolder = None,
+    name: str = "1",
     quiet: Quiet = False,
 ) -> None:
-    """Make tables of the fiducial marks of MicMac, or files for MicMac of the marks of a project.
+    """Write tables of the fiducial marks of MicMac, or MicMac files of the marks of a project.
 
-    Of MicMac `MeasuresCamera.xml`, `MeasuresIm-*.xml` and `id_fiducial.txt` are read, and `fiducials.csv` and
-    `fiducial_images.csv` are tables of a plain project; of a project the same files of MicMac are written.
+    From MicMac the command reads `MeasuresCamera.xml`, `MeasuresIm-*.xml` and `id_fiducial.txt`, and writes
+    `fiducials.csv` and `fiducial_images.csv` of a plain project. From a project it writes the same files of
+    MicMac.
     """
-    with job:
-        from photogram.formats.micmac import has_marks, write_marks
+    from photogram.formats.micmac import has_marks, write_marks
 
-        if has_marks(path):
-            files, told = _tables(job, path, name)
-        else:
-            files = write_marks(read_project(job, path, NOTHING))
-            told = [("For MicMac", [counted(len(files), "file")])]
-        written = {} if out is None else {out / file: content for file, content in files.items()}
-        job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
+    if has_marks(path):
+        files, told = _tables(job, path, name)
+    else:
+        files = write_marks(read_project(job, path, NOTHING))
+        told = [("For MicMac", [counted(len(files), "file")])]
+    written = {} if out is None else {out / file: content for file, content in files.items()}
+    job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
 
 
 def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], list[Section]]:
-    """Return the tables of the marks of MicMac by their files, and what is told of them."""
+    """Return tables of the marks of MicMac from its files, and remarks."""
     from photogram.formats.micmac import read_marks
     from photogram.io.csv_text import csv_text
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
-from photogram.cli.job import Job, OutputFolder
-from photogram.cli.progress import adjustment_status
+from photogram.cli.job import Job, OutputFolder, adjustment_status
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.cli.choices import Choices
@@ -30,42 +29,18 @@ TAKEN = frozenset(
 
 @dataclass(frozen=True)
 class Parts:
-    """How a user divides an adjustment, with the options that say it."""
+    """Options for an adjustment in parts."""
 
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS|local",
-            help="Adjust in parts on a Dask cluster: its scheduler, or `local` for workers on this machine.",
-        ),
-    ] = None
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Workers of a local cluster; one for each processor.")
-    ] = None
-    parts: Annotated[
-        int | None, typer.Option(metavar="P", help="Parts. Default: some for each worker, that fit.")
-    ] = None
-    memory: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SIZE",
-            help="Memory of a worker, or of this process (4GB, 1.5GiB): what takes more goes in parts.",
-        ),
-    ] = None
-    run: Annotated[
-        OutputFolder,
-        typer.Option(
-            metavar="DIR",
-            help="Keep parts and states there, for all workers: the same command takes up a run that died.",
-        ),
-    ] = None
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Print parts, work, memory, traffic and time, and adjust nothing.")
-    ] = False
+    cluster: str | None = None
+    workers: int | None = None
+    parts: int | None = None
+    memory: str | None = None
+    run: OutputFolder = None
+    plan: bool = False
 
     @property
     def division(self) -> Division | None:
-        """As :func:`photogram.adjust_in_parts` takes it; None where nothing is asked for."""
+        """Options of :func:`photogram.adjust_in_parts`; None without an option."""
         if replace(self, plan=False) == Parts():
             return None
         from photogram.distributed import Division
@@ -84,7 +59,7 @@ def print_plan(plan: PartsPlan) -> None:
 def adjusted_on_disk(
     job: Job, path: Path, target: Path, divided: Parts, choices: Choices, threads: int | None
 ) -> bool:
-    """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
+    """Plan or adjust a project batch by batch; return False if it must be read completely."""
     division = divided.division
     if division is None:
         return False
@@ -95,12 +70,8 @@ def adjusted_on_disk(
         return False
     for name in job.given:
         if name not in TAKEN:
-            typed = ", ".join(each for each in job.given if each in DIVIDING)
-            raise typer.BadParameter(
-                f"cannot be combined with {typed} if images are in Parquet, which are then read in batches;"
-                " images in CSV are read whole",
-                param_hint=name,
-            )
+            typed = [option for option in job.given if option in DIVIDING]
+            raise misuse(name, "parquet-in-parts", options=typed)
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
@@ -116,7 +87,7 @@ def adjusted_on_disk(
         found = in_parts.adjusted_on_disk(
             path, wishes, folder, division, **chosen, threads=threads, progress=progress
         )
-    lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
+    lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
     job.finish(
         {target / "report.txt": ("\n".join(lines) + "\n").encode()},
         summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"),

@@ -1,4 +1,4 @@
-"""What the commands on projects of any format share: options, reading, telling what was found."""
+"""Common parts of commands on projects of any format: options, reading, description."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.job import InputFile, Job
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
@@ -22,158 +23,60 @@ EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
 
 OriginName = Literal["corner", "center"]
-"""Which place of the first pixel is 0, 0."""
-ProjectPath = Annotated[
-    InputFile,
-    typer.Argument(
-        metavar="PATH", help="A project: a folder or file of any format that docs/formats.md lists."
-    ),
-]
-Example = Annotated[
-    bool, typer.Option("--example", help="Take the packaged example instead, that of `photogram new`.")
-]
-Deviations = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--sd",
-        metavar="TABLE=S[,S,S]",
-        help="Standard deviations where PATH has none: images=0.5, control=0.02,0.02,0.03, gnss=...",
-    ),
-]
-PhotosCrs = Annotated[
-    str | None,
-    typer.Option(
-        "--photos-crs",
-        metavar="CRS",
-        help="System of these, also of heights, where it is not said: EPSG:4326+geoid=46.5.",
-    ),
-]
-MrkAntenna = Annotated[bool, typer.Option("--mrk-antenna", help=".MRK positions are of antennas.")]
 
 
 @dataclass(frozen=True)
 class Additions:
-    """What a user adds to a project, with the options that say it."""
+    """Options for additional data of a project."""
 
-    file_format: Annotated[
-        str | None, typer.Option("--format", metavar="NAME", help="Format of PATH. Default: found out.")
-    ] = None
-    control: Annotated[InputFile, typer.Option(metavar="FILE", help="Table of control and check points.")] = (
-        None
-    )
-    control_crs: Annotated[
-        str | None,
-        typer.Option(metavar="CRS", help="CRS of --control (EPSG:25832 ...), where it is not that of PATH."),
-    ] = None
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COLUMN=HEADING,..",
-            help="What the columns of control are: point=Name,x=East,y=-South; -=Heading is not read;"
-            " point,y,x,z or PNEZD without a header.",
-        ),
-    ] = None
-    roles: Annotated[
-        str | None,
-        typer.Option(metavar="WORD=ROLE,..", help="What words of control mean: KP=check, PP=control, X=off."),
-    ] = None
-    images: Annotated[
-        InputFile, typer.Option(metavar="FILE", help="Further measurements: photo, point, column, row.")
-    ] = None
-    names: Annotated[InputFile, typer.Option(metavar="FILE", help="Other names of points: point, name.")] = (
-        None
-    )
-    camera: Annotated[
-        InputFile, typer.Option(metavar="FILE", help="Table of cameras, for formats that have none.")
-    ] = None
-    sd: Deviations = None
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="What project.toml is to say: film.model=affine, adjust.loss=huber.",
-        ),
-    ] = None
-    photos_dir: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="DIR",
-            help="Photographs: positions in their files (EXIF, XMP, .MRK, geo.txt) are observations.",
-        ),
-    ] = None
-    photos_crs: PhotosCrs = None
-    gnss: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Positions of photos: table, geo.txt, .MRK, RTKLIB events.",
-        ),
-    ] = None
-    gnss_crs: Annotated[
-        str | None,
-        typer.Option(metavar="CRS", help="CRS of --gnss. Default: of PATH."),
-    ] = None
-    gnss_antenna: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z[,SD]",
-            help="Antenna: right, up, back of the camera (m; SD 0).",
-        ),
-    ] = None
-    mrk_antenna: MrkAntenna = False
-    pixel_origin: Annotated[
-        OriginName | None,
-        typer.Option(help="Corner or center of the first pixel is 0, 0, in tables of pixels."),
-    ] = None
-    model: Annotated[
-        int | None,
-        typer.Option(
-            min=0, metavar="N", help="Which of several models of a file, from 0. Default: the largest."
-        ),
-    ] = None
-    angles: Annotated[
-        Literal["deg", "gon", "rad"] | None, typer.Option(help="Unit of angles in files that do not say it.")
-    ] = None
-    keep_repeated: Annotated[
-        bool,
-        typer.Option(
-            "--keep-repeated",
-            help="Second images of a point on a photo count too: their mean with the first.",
-        ),
-    ] = False
-    cubes: Annotated[InputFile, typer.Option(metavar="LIST", help="Cubes or ISDs of a control network.")] = (
-        None
-    )
-    jigsaw: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE ...", help="Settings of jigsaw, in quotes, or a file.")
-    ] = None
+    file_format: Annotated[str | None, typer.Option("--format")] = None
+    control: InputFile = None
+    control_crs: str | None = None
+    columns: str | None = None
+    roles: str | None = None
+    images: InputFile = None
+    names: InputFile = None
+    camera: InputFile = None
+    sd: list[str] | None = None
+    settings: Annotated[list[str] | None, typer.Option("--set")] = None
+    photos_dir: InputFile = None
+    photos_crs: str | None = None
+    gnss: InputFile = None
+    gnss_crs: str | None = None
+    gnss_antenna: str | None = None
+    mrk_antenna: bool = False
+    pixel_origin: OriginName | None = None
+    model: Annotated[int | None, typer.Option(min=0)] = None
+    angles: Literal["deg", "gon", "rad"] | None = None
+    keep_repeated: bool = False
+    cubes: InputFile = None
+    jigsaw: str | None = None
 
 
 NOTHING = Additions()
 
 
 def project_path(job: Job, path: Path | None) -> Path:
-    """Return the path that a user gives, or that of the packaged example."""
+    """Return the path of the user, or of the packaged example."""
     return job.packaged(*EXAMPLE) if path is None else path
 
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:
-    """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
+    """Read a project with additional data; its files become inputs of the job."""
     from photogram.formats import GnssFile, PhotoFiles, Wishes, read
     from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
     from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
 
     if added.photos_dir is None and added.photos_crs:
-        raise typer.BadParameter("requires --photos-dir DIR", param_hint="--photos-crs")
+        raise misuse("--photos-crs", "requires", options="--photos-dir DIR")
     if added.photos_dir is None and added.gnss is None and added.mrk_antenna:
-        raise typer.BadParameter("requires --photos-dir DIR or --gnss FILE", param_hint="--mrk-antenna")
+        raise misuse("--mrk-antenna", "requires", options="--photos-dir DIR or --gnss FILE")
     if added.gnss is None and (added.gnss_crs or added.gnss_antenna):
         option = "--gnss-crs" if added.gnss_crs else "--gnss-antenna"
-        raise typer.BadParameter("requires --gnss FILE", param_hint=option)
+        raise misuse(option, "requires", options="--gnss FILE")
     if added.cubes is None and added.jigsaw is not None:
-        raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
+        raise misuse("--jigsaw", "requires", options="--cubes LIST")
     job.reads_inside(path)
     sd = deviations(added.sd or [])
     columns = columns_given(added.columns, added.roles)
@@ -218,15 +121,13 @@ def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
     except ValueError:
         sd = x = y = z = math.nan
     if not (math.isfinite(x + y + z) and sd >= 0):
-        raise typer.BadParameter(
-            f"must be 3 or 4 numbers in metres, as 0.0,0.08,0.1,0.01, got {text!r}",
-            param_hint="--gnss-antenna",
-        )
+        form = "3 or 4 numbers in metres, such as 0.0,0.08,0.1,0.01"
+        raise misuse("--gnss-antenna", "form", form=form, value=text)
     return x, y, z, sd
 
 
 def described(project: Project) -> list[Section]:
-    """Return what was read, as titled sections."""
+    """Return a description of a project as titled sections."""
     import numpy as np
 
     from photogram.formats.block_contents import motions
@@ -289,7 +190,7 @@ def described(project: Project) -> list[Section]:
 
 
 def _control_line(block: Block, rays: Indices) -> str:
-    """Count control and check points that take part, and name the others."""
+    """Return the numbers of control and check points with observations, and names of the others."""
     import numpy as np
 
     from photogram.network.observations import Control

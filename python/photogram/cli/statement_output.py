@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark
 from photogram.cli.job import InputFile, Job, Without
 from photogram.cli.projects import Additions
 from photogram.lazy_dataclasses import dataclass, fields
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -21,60 +23,35 @@ if TYPE_CHECKING:
     from photogram.words import Phrase
 
 
-def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
-    return typer.Option(f"--{name}", metavar=metavar, help=what)
-
-
-Word = str | None
-
-
 @dataclass(frozen=True)
-class Wanted:
-    """What is asked of a statement, with the options that say it; a project may say it too."""
+class StatementOptions:
+    """Options of an accuracy statement; a project can define them, too."""
 
-    standard: Annotated[
-        Word, _text("standard", "plain, asprs-2023, nssda, vdi-2634, iso-19157.", "NAME,..")
-    ] = None
-    class_h: Annotated[Word, _text("class-h", "Horizontal accuracy class: 5cm.", "LENGTH")] = None
-    class_v: Annotated[Word, _text("class-v", "Vertical accuracy class: 10cm.", "LENGTH")] = None
-    class_3d: Annotated[Word, _text("class-3d", "Three-dimensional accuracy class.", "LENGTH")] = None
-    area: Annotated[
-        Word, _text("area", "Area of the product: 12.5km2. Default: hull of the adjusted points.", "AREA")
-    ] = None
-    without: Annotated[
-        list[str] | None,
-        _text("without", "Give figures without a check point beside, with the reason.", "POINT=REASON"),
-    ] = None
-    independent: Annotated[
-        Literal["yes", "same-base", "no"] | None,
-        typer.Option(help="Declare whether check points are independent of the block."),
-    ] = None
-    language: Annotated[Literal["en", "de"] | None, typer.Option(help="Of the page. Default: en.")] = None
-    text: Annotated[InputFile, typer.Option(metavar="FILE", help="Sentences of a firm: TOML, by key.")] = None
-    budget: Annotated[
-        list[str] | None,
-        _text("budget", "Take a quantity apart: 'point C08 z', 'distance C01 C30' ..", "QUANTITY"),
-    ] = None
-    coverage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P", min=0.01, max=0.999999, help="Probability of expanded uncertainties. Default: 0.95."
-        ),
-    ] = None
-    project: Annotated[Word, _text("project", "Project, for the head of the page.")] = None
-    client: Annotated[Word, _text("client", "Client.")] = None
-    firm: Annotated[Word, _text("firm", "Firm.")] = None
-    surveyor: Annotated[Word, _text("surveyor", "Who signs.")] = None
-    date: Annotated[Word, _text("date", "Date of the statement (2026-11-25). Default: today.")] = None
+    standard: str | None = None
+    class_h: str | None = None
+    class_v: str | None = None
+    class_3d: str | None = None
+    area: str | None = None
+    without: list[str] | None = None
+    independent: Literal["yes", "same-base", "no"] | None = None
+    language: Literal["en", "de"] | None = None
+    text: InputFile = None
+    budget: list[str] | None = None
+    coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None
+    project: str | None = None
+    client: str | None = None
+    firm: str | None = None
+    surveyor: str | None = None
+    date: str | None = None
 
     def check_alone(self) -> None:
         """Refuse these options of a command that makes no statement."""
         given = [each.name for each in fields(self) if getattr(self, each.name) is not None]
         if given:
-            raise typer.BadParameter("requires --statement", param_hint=f"--{given[0].replace('_', '-')}")
+            raise misuse(f"--{given[0].replace('_', '-')}", "requires", options="--statement")
 
     def asked(self, project: Project | None, added: Additions, unit: str) -> dict[str, Any]:
-        """Return what a statement is asked for: by these options, else by the project; checked."""
+        """Return checked settings of a statement from these options, else from the project."""
         from photogram.formats.supplements import deviations
         from photogram.results.statement.request import Asked
 
@@ -88,7 +65,7 @@ class Wanted:
         return asked
 
     def options(self, unit: str) -> dict[str, Any]:
-        """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
+        """Return the arguments of :meth:`photogram.Result.statement` for a unit of length."""
         from photogram.formats.plain.statement_settings import read_sentences
         from photogram.results.statement.request import length_of
 
@@ -111,18 +88,18 @@ class Wanted:
 
 
 OfHead = Annotated[
-    Wanted,
+    StatementOptions,
     Without(
         "standard", "class_3d", "area", "without", "independent", "language", "text", "budget", "coverage"
     ),
 ]
-"""The head of the page and the classes: what a project of another program has no place for."""
+"""Options for the head of the page and the classes, for projects of other programs."""
 
 
 def _reason(given: str) -> tuple[str, str]:
     point, equals, reason = given.partition("=")
     if not (equals and point.strip() and reason.strip()):
-        raise typer.BadParameter(f'{given!r} is not POINT="reason"', param_hint="--without")
+        raise misuse("--without", "form", form='POINT="reason"', value=given)
     return point.strip(), reason.strip()
 
 
@@ -136,7 +113,7 @@ def stated(
     strict: bool = False,
     assumed: Sequence[Phrase | str] = (),
 ) -> Statement:
-    """Return the statement of a result, with the files it was made of; dated today where no date is given."""
+    """Return the statement of a result with its input files and a date (default: today)."""
     from datetime import date
 
     from photogram import statement as made
@@ -162,7 +139,7 @@ def stated(
 
 
 def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
-    """Return all files of a statement; where what makes page or PDF is absent, that is told."""
+    """Return all files of a statement, with a remark on each missing package."""
     from photogram.results.statement.sheets import files_of_statement
 
     files = {folder / name: content for name, content in files_of_statement(found).items()}
@@ -174,5 +151,5 @@ def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, byte
         if find_spec(library):
             files[folder / name] = make()
         elif not job.quiet:
-            print_remark(f"no {name}: pip install 'photogram[{extra}]'")
+            print_remark(phrase("command.no-file", name=name, extra=extra))
     return files

@@ -9,22 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import output, print_remark, print_withheld
+from photogram.cli.console import output, print_document, print_withheld
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
-from photogram.cli.options import Quiet, Strict, Threads, out_option
+from photogram.cli.options import Quiet, Threads
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
-
-Out = Annotated[
-    OutputFolder,
-    out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),
-]
 
 
 Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
@@ -32,7 +27,7 @@ Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "ka
 
 
 class Effect(StrEnum):
-    """What places of stars have; the fields of `photogram.stellar.sky.Effects`."""
+    """Effects on star positions."""
 
     ANNUAL_ABERRATION = "annual-aberration"
     LIGHT_DEFLECTION = "light-deflection"
@@ -44,180 +39,123 @@ class Effect(StrEnum):
 def stellar_camera(
     job: Job,
     *,
-    deck: Annotated[
-        InputFile,
-        typer.Argument(metavar="DECK", help="Card deck, or a calibration in plain form (a .toml file)."),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Calibrate the packaged example instead: 75 stars in three groups."),
-    ] = False,
-    out: Out = None,
+    deck: InputFile = None,
+    example: bool = False,
+    out: OutputFolder = None,
     documents: OfPrograms,
-    as_published: Annotated[
-        bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
-    ] = False,
-    strict: Strict = False,
+    as_published: bool = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera by a plate with images of stars (NOAA Technical Report NOS 55).
 
-    Where the verdict is that the result must not be used, camera.json is withheld.
-
-    `photogram stellar-camera exposures` does so by digital exposures of the sky.
+    If the verdict forbids the use of the result, camera.json is withheld. `photogram stellar-camera
+    exposures` calibrates a digital camera by exposures of the sky.
     """
-    with job:
-        from photogram.statistics.verdict import worst
-        from photogram.stellar import calibrate
-        from photogram.stellar.cameras import camera_document
+    from photogram.statistics.verdict import worst
+    from photogram.stellar import calibrate
+    from photogram.stellar.cameras import camera_document
 
-        if deck is None:
-            deck = job.packaged("stellar") / "plate.toml"
-        problems, inputs = _read(deck)
-        job.reads(*inputs)
-        pictures = documents.plot_format if documents.plots else ""
-        target = out or Path(f"{deck.stem}-calibrated")
-        documents.place(target)  # refused before anything is computed
-        written: dict[Path, bytes] = {}
-        asked: dict[Path, bytes] = {}
-        results = []
-        for number, problem in enumerate(problems, 1):
-            if as_published:
-                problem = replace(problem, options=replace(problem.options, as_published=True))
-            result = calibrate(problem)
-            results.append(result)
-            mark = f"-{number}" if len(problems) > 1 else ""
-            written |= _files(result, target, mark, pictures)
-            written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
-            written |= documents.page(job, "stellar-camera", target, result.document, mark)
-            if documents.json is not None:
-                asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
-        job.finish(
-            written,
-            asked,
-            summary=lambda: _summarize(results),
-            code=worst((result.verdict for result in results), strict=strict),
-        )
+    if deck is None:
+        deck = job.packaged("stellar") / "plate.toml"
+    problems, inputs = _read(deck)
+    job.reads(*inputs)
+    pictures = documents.plot_format if documents.plots else ""
+    target = out or Path(f"{deck.stem}-calibrated")
+    documents.place(target)  # refused before anything is computed
+    written: dict[Path, bytes] = {}
+    asked: dict[Path, bytes] = {}
+    results = []
+    for number, problem in enumerate(problems, 1):
+        if as_published:
+            problem = replace(problem, options=replace(problem.options, as_published=True))
+        result = calibrate(problem)
+        results.append(result)
+        mark = f"-{number}" if len(problems) > 1 else ""
+        written |= _files(result, target, mark, pictures)
+        written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
+        written |= documents.page(job, "stellar-camera", target, result.document, mark)
+        if documents.json is not None:
+            asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
+    job.finish(
+        written,
+        asked,
+        summary=lambda: _summarize(results),
+        code=worst((result.verdict for result in results), strict=strict),
+    )
 
 
 @with_job
 def exposures(
     job: Job,
     *,
-    night: Annotated[
-        InputFile,
-        typer.Argument(
-            metavar="FILE",
-            help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
-        ),
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Calibrate the packaged example instead: five exposures of a night."),
-    ] = False,
-    lens: Annotated[
-        Lens | None,
-        typer.Option(help="Model of the lens; auto: the data choose. Default: what the file says."),
-    ] = None,
-    common_scale: Annotated[
-        bool | None,
-        typer.Option(
-            "--common-scale/--two-scales",
-            help="One principal distance (fx = fy), or two. Default: what the file says.",
-        ),
-    ] = None,
-    without: Annotated[
-        list[Effect] | None,
-        typer.Option(help="Leave an effect out of the places of the stars; may be said more than once."),
-    ] = None,
-    any_roll: Annotated[
-        bool, typer.Option("--any-roll", help="The rolls that are given are not to be relied on.")
-    ] = False,
-    blind: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            metavar="LEAST MOST",
-            help="Neither attitudes nor field of view are known: the smallest and largest horizontal field of"
-            " view, degrees (needs tetra3rs).",
-        ),
-    ] = None,
-    out: Out = None,
+    night: InputFile = None,
+    example: bool = False,
+    lens: Lens | None = None,
+    common_scale: Annotated[bool | None, typer.Option("--common-scale/--two-scales")] = None,
+    without: list[Effect] | None = None,
+    any_roll: bool = False,
+    blind: tuple[float, float] | None = None,
+    out: OutputFolder = None,
     documents: OfPrograms,
     threads: Threads = None,
-    strict: Strict = False,
+    strict: bool = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
-    with job:
-        from photogram.errors import InputError
-        from photogram.stellar.night_calibration import calibrate_night
-        from photogram.stellar.night_file import inputs, read_night
+    """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
+    from photogram.errors import InputError
+    from photogram.stellar.night_calibration import calibrate_night
+    from photogram.stellar.night_file import inputs, read_night
 
-        if night is None:
-            night = job.packaged("exposures") / "night.toml"
-        job.reads(*inputs(night))
-        pictures = documents.plot_format if documents.plots else ""
-        said = _said(lens, common_scale, without or [], any_roll, blind)
-        try:
-            result = calibrate_night(read_night(night, said), threads)
-        except InputError as error:
-            raise error if error.file else InputError(error.message, file=night) from None
-        target = out or Path(f"{night.stem}-calibrated")
-        written = _night_files(result, target, pictures)
-        written |= documents.page(job, "stellar-camera exposures", target, result.document)
-        job.finish(
-            written,
-            documents.as_json(result),
-            summary=lambda: _summarize([result], "parameters"),
-            code=result.verdict.exit_code(strict=strict),
-        )
+    if night is None:
+        night = job.packaged("exposures") / "night.toml"
+    job.reads(*inputs(night))
+    pictures = documents.plot_format if documents.plots else ""
+    said = _said(lens, common_scale, without or [], any_roll, blind)
+    try:
+        result = calibrate_night(read_night(night, said), threads)
+    except InputError as error:
+        raise error if error.file else InputError(error.phrase or error.message, file=night) from None
+    target = out or Path(f"{night.stem}-calibrated")
+    written = _night_files(result, target, pictures)
+    written |= documents.page(job, "stellar-camera exposures", target, result.document)
+    job.finish(
+        written,
+        documents.as_json(result),
+        summary=lambda: _summarize([result], "parameters"),
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 @with_job
 def places(
     job: Job,
-    out: Annotated[
-        Path,
-        Writes.FILE,
-        typer.Argument(metavar="OUT", help="Table of stars to write, as a plate in plain form takes it."),
-    ],
-    utc: Annotated[
-        str,
-        typer.Option(metavar="TIME", help="UTC, such as 1966-03-01T21:03:05; before 1960 universal time."),
-    ],
-    catalogue: Annotated[
-        InputFile,
-        typer.Option(
-            metavar="FILE",
-            help="Stars as exposures take them (id, ra_deg, dec_deg, pm_ra_mas ...). Default: Hipparcos.",
-        ),
-    ] = None,
-    epoch: Annotated[
-        float, typer.Option(metavar="YEAR", help="Of the places in FILE, Julian year.")
-    ] = 2000.0,
-    faintest: Annotated[float, typer.Option(metavar="MAGNITUDE", help="Stars up to this magnitude.")] = 6.0,
+    out: Annotated[Path, Writes.FILE],
+    utc: str,
+    catalogue: InputFile = None,
+    epoch: float = 2000.0,
+    faintest: float = 6.0,
     quiet: Quiet = False,
 ) -> None:
-    """Compute apparent places of stars for a plate (needs pyerfa).
+    """Compute apparent positions of stars for a plate (needs pyerfa).
 
-    Geocentric, true equator and equinox of date: proper motion, parallax, light deflection, annual
-    aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
+    Positions are geocentric, true equator and equinox of date: proper motion, parallax, light deflection,
+    annual aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
     """
-    with job:
-        from photogram.io.csv_text import csv_text
-        from photogram.stellar.catalogue import Catalogue
-        from photogram.stellar.places import apparent_places
+    from photogram.io.csv_text import csv_text
+    from photogram.stellar.catalogue import Catalogue
+    from photogram.stellar.places import apparent_places
 
-        found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
-        stars = found.brighter(faintest)
-        right, declination = apparent_places(stars, utc).T
-        columns = {
-            "star": list(stars.ids),
-            "ra_rad": right,
-            "dec_rad": declination,
-            "magnitude": stars.magnitudes,
-        }
-        job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
+    found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
+    stars = found.brighter(faintest)
+    right, declination = apparent_places(stars, utc).T
+    columns = {
+        "star": list(stars.ids),
+        "ra_rad": right,
+        "dec_rad": declination,
+        "magnitude": stars.magnitudes,
+    }
+    job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
 
 
 def _said(
@@ -227,7 +165,7 @@ def _said(
     any_roll: bool,
     blind: tuple[float, float] | None,
 ) -> dict[str, dict[str, Any]]:
-    """Return what options say, by the tables and keys of the file."""
+    """Return the settings of the options by tables and keys of the file."""
     said: dict[str, dict[str, Any]] = {
         "camera": {"lens": lens, "common_scale": common_scale},
         "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
@@ -240,13 +178,9 @@ def _said(
 
 
 def _summarize(results: Sequence[Result | CalibratedNight], *tables: str) -> None:
-    from photogram.show.forms import summary
 
     for result in results:
-        for line in summary(result.document(), *tables):
-            output.print(escape(line))
-        for message in result.messages:
-            print_remark(message)
+        print_document(result.document(), *tables, remarks=result.messages)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
@@ -258,11 +192,10 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
 
 
 def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict[Path, bytes]:
-    """Return the files of a camera, or none, and say so, where it must not be used."""
+    """Return the files of a camera; print a message if the verdict withholds them."""
     if result.verdict.usable:
         return files
-    names = ", ".join(path.name for path in files)
-    print_withheld(f"{names} withheld: the calibration must not be used as it is", files)
+    print_withheld(phrase("command.camera-withheld", names=[path.name for path in files]), files)
     return {}
 
 

@@ -71,7 +71,7 @@ class AdjustedCollection(AdjustedNetwork):
         """Return the table of one kind of thing as a data frame; pandas takes long to import."""
         import pandas as pd
 
-        from photogram.results.network_tables import TABLES
+        from photogram.results.tests import TABLES
         from photogram.show.quantity import frame
 
         return pd.DataFrame(frame(TABLES[what](self)))

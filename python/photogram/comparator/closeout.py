@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.comparator.readings import Case
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
-SUSPECT_UM = 2.0  # A mean shift beyond this: a shift of the plate is suspected; close on the second point too
-REMEASURE_UM = 4.0  # A mean shift from here on: the case must be measured again
-FEW_READINGS = 9  # A case of so few readings that is not closed is not a measurement of the plate
-ENOUGH = 3  # Pointings that a close-out needs
+SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: close on the second point too, measure the case again
+FEW_READINGS = 9  # a case with so few readings must be closed
+ENOUGH = 3  # pointings of a close-out
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,23 +50,18 @@ class Closeout:
 
 
 def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
-    """Check the returns to the first point of a case and, where it was visited again, to the second.
+    """Check the returns to the first point of a case and, if it was visited again, to the second.
 
-    Returns
-    -------
-    closeouts, messages
-        That of the first point always; the rules of the report as remarks.
+    The close-out of the first point is always returned; the remarks are the rules of the report.
     """
     first, *others = dict.fromkeys(case.points.tolist())
     closeouts = [_visits(case, first)]
     if others and len((second := _visits(case, others[0])).counts) > 1:
         closeouts.append(second)
     if len(closeouts[0].counts) < 2 and len(case.points) <= FEW_READINGS:
-        raise case.place.error(
-            f"case {case.number}: INSUFFICIENT MEASUREMENTS MADE - STOP"
-            f" ({len(case.points)} pointings, and no return to point {first})"
-        )
-    return closeouts, _remarks(case, closeouts)
+        fields = {"case": case.number, "count": len(case.points), "point": first}
+        raise case.place.error(phrase("comparators.not-closed", **fields))
+    return closeouts, [case.place.message(remark) for remark in _remarks(case.number, closeouts)]
 
 
 def _visits(case: Case, point: int) -> Closeout:
@@ -74,23 +71,16 @@ def _visits(case: Case, point: int) -> Closeout:
     return Closeout(point, tuple(len(visit) for visit in visits), means)
 
 
-def _remarks(case: Case, closeouts: list[Closeout]) -> list[Message]:
+def _remarks(case: int, closeouts: list[Closeout]) -> Iterator[Phrase]:
     first = closeouts[0]
-    head = f"case {case.number}: "
-    texts = []
     if first.verdict == "none":
-        texts.append(f"NO CLOSEOUT MEASUREMENTS ON INITIAL POINT {first.point} MADE")
-    elif first.counts[-1] < ENOUGH:
-        texts.append(
-            f"the close-out on point {first.point} has {first.counts[-1]} pointings; 3 are asked for"
-        )
+        yield phrase("comparators.no-closeout", case=case, point=first.point)
+    elif (count := first.counts[-1]) < ENOUGH:
+        fields = {"case": case, "point": first.point, "count": count}
+        yield phrase("comparators.short-closeout", least=ENOUGH, **fields)
+    suspect = "comparators.shifted" if len(closeouts) > 1 else "comparators.shifted-first"
+    codes = {"remeasure": "comparators.moved", "suspect": suspect}
     for closeout in closeouts:
-        size = np.abs(closeout.means_um - closeout.means_um[0]).max()
-        if closeout.verdict == "remeasure":
-            texts.append(f"point {closeout.point} moved by {size:.1f} um (4 or more): measure the case again")
-        elif closeout.verdict == "suspect":
-            advice = "" if len(closeouts) > 1 else "; close on the second point too"
-            texts.append(
-                f"point {closeout.point} moved by {size:.1f} um (more than 2): did the plate shift?{advice}"
-            )
-    return [case.place.message(head + text) for text in texts]
+        if closeout.verdict in codes:
+            shift = float(np.abs(closeout.means_um - closeout.means_um[0]).max())
+            yield phrase(codes[closeout.verdict], case=case, point=closeout.point, shift=shift)

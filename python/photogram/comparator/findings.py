@@ -8,12 +8,12 @@ import numpy as np
 
 from photogram.comparator.joint import JointFit
 from photogram.statistics.findings import Findings, Systematic, Tested
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-FAR = 3.0  # A grid that differs from its values by so many times their standard deviation is another grid
+FAR = 3.0  # a grid with larger differences, in standard deviations, is another grid
 
 
 def comparator_findings(calibration: Calibration) -> Findings:
@@ -26,36 +26,36 @@ def comparator_findings(calibration: Calibration) -> Findings:
         for axis in "xy"
     ]
 
-    def name(index: tuple[int, ...]) -> str:
+    def name(index: tuple[int, ...]) -> Phrase:
         case, point, axis = places[index[0]]
-        return f"{axis} of point {point} of case {case}"
+        return phrase("comparators.axis", axis=axis, point=point, case=case)
 
-    values = np.vstack(screening.ratios).ravel()
-    readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
+    values, kind = np.vstack(screening.ratios).ravel(), phrase("comparators.readings")
+    readings = Tested(kind, values, name, "t", second=max(screening.freedom - 1, 1))
     tests = calibration.pointing_tests
     rows = [(each.case, row, axis) for each in tests for row in range(len(each.ratios)) for axis in "xy"]
 
-    def pointing(index: tuple[int, ...]) -> str:
+    def pointing(index: tuple[int, ...]) -> Phrase:
         case, row, axis = rows[index[0]]
-        return f"{axis} of pointing {row + 1}, point {case.points[row]} of case {case.number}"
+        fields = {"axis": axis, "pointing": row + 1, "point": int(case.points[row]), "case": case.number}
+        return phrase("comparators.pointing", **fields)
 
     ratios = np.concatenate([each.ratios.ravel() for each in tests])
     freedom = np.repeat([each.freedom for each in tests], [each.ratios.size for each in tests])
-    pointings = Tested("pointings", ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0))
+    pointings = Tested(
+        phrase("comparators.pointings"), ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0)
+    )
     return Findings(
         status="converged",
         observations=[readings, pointings],
         degrees_of_freedom=screening.freedom,
-        untested=Phrase("untested.readings"),
-        spoiled=Phrase(
-            "harmful.comparator",
-            {"change": float(screening.change_um), "sd": float(screening.sigma_um)},
-        )
+        untested=phrase("untested.readings"),
+        spoiled=phrase("harmful.comparator", change=screening.change_um, sd=screening.sigma_um)
         if screening.harmful
         else "",
         systematic=_grids(calibration.joint) if calibration.joint else [],
-        if_usable=[Phrase("advice.correct-measurements"), Phrase("advice.keep-calibration")],
-        if_withheld=[Phrase("advice.correction-withheld")],
+        if_usable=[phrase("advice.correct-measurements"), phrase("advice.keep-calibration")],
+        if_withheld=[phrase("advice.correction-withheld")],
     )
 
 
@@ -63,16 +63,16 @@ def _grids(joint: JointFit) -> list[Systematic]:
     """Return the tests of the corrections of the plates against their standard deviations."""
     return [
         Systematic(
-            kind=Phrase("test.plate", {"plate": str(plate)}),
-            sentence=Phrase("pattern.plate", {"plate": str(plate), "factor": float(own.test.factor)}),
+            kind=phrase("test.plate", plate=str(plate)),
+            sentence=phrase("pattern.plate", plate=str(plate), factor=float(test.factor)),
             statistic="s^2",
             distribution="chi2/f",
-            dof=(own.test.degrees_of_freedom,),
-            value=own.test.variance,
-            probability=own.test.probability_above,
-            level=own.test.level / 2,
-            large=own.test.factor > FAR,
+            dof=(test.degrees_of_freedom,),
+            value=test.variance,
+            probability=test.probability_above,
+            level=test.level / 2,
+            large=test.factor > FAR,
         )
-        for plate, own in joint.plates.items()
-        if own.test is not None
+        for plate, result in joint.plates.items()
+        if (test := result.test) is not None
     ]

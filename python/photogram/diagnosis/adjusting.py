@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -14,80 +13,57 @@ from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
+from photogram.words import Phrase
 
-KEPT = 2
-"""Adjustments that are remembered."""
+KEPT = 2  # Adjustments that are stored
 
 
 class Adjuster:
-    """Adjusts blocks with the same options, and remembers the last ones."""
+    """Adjusts blocks with the same options, and stores the last results."""
 
     def __init__(self, options: dict[str, Any]) -> None:
         self.options = options
         self._known: list[tuple[Block, Result | AdjustmentError]] = []
 
     def __call__(self, block: Block) -> Result:
-        """Adjust a block; what it raises is raised again for the same block."""
-        found = next((result for known, result in self._known if _same(known, block)), None)
-        if found is None:
+        """Adjust a block; the same block raises its error again."""
+        result = next((result for known, result in self._known if known == block), None)
+        if result is None:
             try:
-                found = adjust(block, **self.options)
+                result = adjust(block, **self.options)
             except AdjustmentError as error:
-                found = error
-            self._known = [*self._known[1 - KEPT :], (block, found)]
-        if isinstance(found, AdjustmentError):
-            raise found
-        return found
+                result = error
+            self._known = [*self._known[1 - KEPT :], (block, result)]
+        if isinstance(result, AdjustmentError):
+            raise result
+        return result
 
     def tried(self, block: Block) -> Result | None:
-        """Adjust a block; None where that cannot be done."""
+        """Adjust a block; None if that fails."""
         try:
             return self(block)
         except AdjustmentError:
             return None
 
     def converged(self, block: Block) -> Result | None:
-        """Adjust a block; None where that cannot be done, or does not converge."""
-        found = self.tried(block)
-        return found if found is not None and found.converged else None
+        """Adjust a block; None if that fails or does not converge."""
+        result = self.tried(block)
+        return result if result is not None and result.converged else None
 
     def otherwise(self, **options: Any) -> Adjuster:
         """Return one with other options."""
         return Adjuster({**self.options, **options})
 
 
-def _same(one: Block, other: Block) -> bool:
-    return one is other or all(
-        _equal(getattr(one, each.name), getattr(other, each.name)) for each in fields(one)
-    )
-
-
-def _equal(one: object, other: object) -> bool:
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
-            return False
-        return one is other or np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
-    if isinstance(one, tuple) and isinstance(other, tuple):
-        return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
-    return one is other or bool(one == other)
-
-
 def put_right(
-    first: Result | None, tried: Iterable[tuple[str, Block]], adjusted: Adjuster
-) -> tuple[str, Block, Judged] | None:
-    """Adjust changed blocks; return the text and the block of the one that explains the residuals, for sure.
+    first: Result | None, tried: Iterable[tuple[Phrase, Block]], adjusted: Adjuster
+) -> tuple[Phrase, Block, Judged] | None:
+    """Adjust blocks without possible mistakes; return the mistake and the block that explain the residuals.
 
-    Parameters
-    ----------
-    first
-        What the block leaves as it is; None where it cannot be adjusted.
-    tried
-        What may have been meant, in words, and the block.
-    adjusted
-        Adjusts.
+    `first` is the adjustment of the unchanged block; None if that failed.
     """
     given = math.inf if first is None else first.sums_of_squares.total
-    results = [(text, changed, adjusted.tried(changed)) for text, changed in tried]
+    results = [(mistake, changed, adjusted.tried(changed)) for mistake, changed in tried]
     left = [
         math.inf if result is None or not result.converged else result.sums_of_squares.total
         for *_, result in results
@@ -100,5 +76,5 @@ def put_right(
     verdict = judged(min(given, most), left, freedom, known_weight=True)
     if verdict is None or not verdict.accepted:
         return None
-    text, changed, _ = results[verdict.best[0]]
-    return text, changed, verdict
+    mistake, changed, _ = results[verdict.best[0]]
+    return mistake, changed, verdict

@@ -22,13 +22,12 @@ if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
     from photogram.diagnosis.diagnosis import Diagnosis
 
-BAD = 5.0
-"""Sigma0 above which an adjustment that has converged is doubted."""
+BAD = 5.0  # Sigma0 above which an adjustment that has converged is doubted
 
 
 @contextmanager
 def errors_explained(block: Block | FirstValues) -> Iterator[None]:
-    """Let an adjustment that fails say which mistakes in the data of its block would explain it."""
+    """Append mistakes in the data that explain a failed adjustment to its error."""
     try:
         yield
     except OutOfMemoryError:
@@ -103,7 +102,11 @@ def _with_hints(result: Result) -> Result:
         said = [*weight_hints(result), *said]
     if not (found or said):
         return result
-    return replace(result, hints=tuple(map(str, found)), messages=[*found, *said, *result.messages])
+    return replace(
+        result,
+        hints=tuple(map(str, found)),
+        messages=[*found, *said, *result.messages],
+    )
 
 
 def diagnosis_of(result: Result) -> Diagnosis:
@@ -114,7 +117,8 @@ def diagnosis_of(result: Result) -> Diagnosis:
 
     found = diagnosed(result)
     section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
-    note_all(section, "convention", "grave", found.hints)
+    hints = [each for each in found.messages if str(each) in found.hints]
+    note_all(section, "convention", "grave", hints)
     note_all(section, "exchanged-points", "grave", found.exchanged)
     note_all(section, "moving", "look", remarks(found))
     if found.converged and not found.hints:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.diagnosis.findings import Finding, small_unit
+from photogram.diagnosis.findings import Finding, finding, small_unit
 from photogram.diagnosis.rivals import ODDS, rival_images
 from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from photogram.network.block import Block
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
+from photogram.words import Phrase, phrase
 
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 """Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
@@ -22,8 +23,7 @@ TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
 value still means something.
 """
-BESIDE = "beside images: "
-"""Before the names of further kinds of observations."""
+BESIDE = "beside images: "  # Before the names of further kinds of observations
 
 
 @dataclass(frozen=True)
@@ -69,22 +69,23 @@ def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
     if suspect.kind != "station":
         return _other_finding(result, suspect)
     name = result.block.photo_ids[suspect.row]
-    what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
-    text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
-    return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
+    code = f"check.station-misfit.{'coordinate' if suspect.axis < 3 else 'angle'}"
+    message = phrase(code, photo=name, axis=suspect.axis % 3 + 1, test=suspect.test)
+    return finding("look", message, [name], values={"test_value": suspect.test})
 
 
-def with_rivals(finding: Finding, result: Result, suspect: Suspect, spread: float) -> Finding:
+def with_rivals(misfit: Finding, result: Result, suspect: Suspect, spread: float) -> Finding:
     """Name the control whose error would leave nearly the same residuals: odds below 20."""
     values = tests(result)["control"].max(axis=1) / spread
     near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
     near &= values > critical(int((values > 0).sum()))
     near[suspect.row] = False
     names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
-    if not names:
-        return finding
-    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
-    return replace(finding, text=text, points=[*finding.points, *names])
+    if not names or misfit.phrase is None:
+        return misfit
+    fields = {**misfit.phrase.fields, "rivals": phrase("check.rival.control", points=names)}
+    message = Phrase(misfit.phrase.code, fields)
+    return replace(misfit, text=str(message), points=[*misfit.points, *names], phrase=message)
 
 
 def _other_finding(result: Result, suspect: Suspect) -> Finding:
@@ -95,13 +96,17 @@ def _other_finding(result: Result, suspect: Suspect) -> Finding:
     error, unit = float(kind.residuals[suspect.row, suspect.axis]) / redundancy, kind.units[suspect.axis]
     if unit == "rad":
         error, unit = error / ARCSEC, "arcsec"
-    text = (
-        f"{kind.components[suspect.axis]} of {observation.name} does not fit (test value {suspect.test:.1f},"
-        f" redundancy {redundancy:.2f}): its error is about {error:.4g} {unit}".rstrip()
-    )
     values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
-    photos, points = list(observation.photos), list(observation.points)
-    return Finding("observation-misfit", "look", text, photos, points, values)
+    message = phrase(
+        "check.observation-misfit",
+        component=kind.components[suspect.axis],
+        observation=observation.name,
+        test=suspect.test,
+        redundancy=redundancy,
+        error=error,
+        unit=unit,
+    )
+    return finding("look", message, observation.photos, observation.points, values=values)
 
 
 def control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
@@ -110,12 +115,9 @@ def control_finding(block: Block, row: int, axis: int, error: float, test: float
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
     component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
     name = block.point_ids[row]
-    text = (
-        f"{component} of control point {name} does not fit (test value {test:.1f}):"
-        f" its error is about {error:.3f} {unit}"
-    )
     values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return Finding("control-misfit", "look", text, [], [name], values)
+    fields = {"component": component, "point": name, "test": test, "error": error, "unit": unit}
+    return finding("look", phrase("check.control-misfit.component", **fields), [], [name], values=values)
 
 
 def _image_finding(result: Result, suspect: Suspect, spread: float) -> Finding:
@@ -126,25 +128,21 @@ def _image_finding(result: Result, suspect: Suspect, spread: float) -> Finding:
     others = [
         block.photo_ids[each] for each in block.image_photos[rival_images(result, row, spread)].tolist()
     ]
-    doubt = f"; it may as well be the image on photo {' or '.join(others)}" if others else ""
-    if doubt and np.count_nonzero(block.image_points == point) == 2:
-        doubt = f"; with two rays it may as well be the image on photo {others[0]}"
+    two = np.count_nonzero(block.image_points == point) == 2
+    rivals = phrase(f"check.rival.{'two-rays' if two else 'images'}", photos=others) if others else ""
     unit, factor = small_unit(block.image_unit)
-    text = (
-        f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
-        f" {error * factor:.{0 if unit == 'um' else 2}f} {unit} (test value {suspect.test:.1f},"
-        f" redundancy {redundancy:.2f}){doubt}"
+    values = {f"error_{unit}": error * factor, "test_value": suspect.test, "redundancy": redundancy}
+    message = phrase(
+        "check.blunder.image",
+        point=block.point_ids[point],
+        photo=block.photo_ids[photo],
+        axis="xy"[axis],
+        error=error * factor,
+        unit=unit,
+        test=suspect.test,
+        redundancy=redundancy,
+        rivals=rivals,
     )
-    return Finding(
-        "blunder",
-        "look",
-        text,
-        [block.photo_ids[photo], *others],
-        [block.point_ids[point]],
-        {
-            f"error_{unit}": error * factor,
-            "test_value": suspect.test,
-            "redundancy": redundancy,
-            "axis": float(axis),
-        },
-    )
+    photos = [block.photo_ids[photo], *others]
+    values["axis"] = float(axis)
+    return finding("look", message, photos, [block.point_ids[point]], values)

@@ -8,19 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.findings import Finding
-from photogram.messages import Message, listed
+from photogram.diagnosis.findings import Finding, finding
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock
 from photogram.results.result import Result
+from photogram.words import Phrase, phrase
 
-LEAPS = range(13, 19)
-"""GPS - UTC in seconds from 1999 on; 18 since 2017."""
-TAI_GPS, ET_TAI = 19.0, 32.184
-"""TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms."""
-WITHIN = 0.010
-"""Seconds: a shift of time this near to a difference is that."""
+LEAPS = range(13, 19)  # GPS - UTC in seconds from 1999 on; 18 since 2017
+TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms
+WITHIN = 0.010  # Seconds: a shift of time this near to a difference is that
 
 
 def differences() -> Iterator[tuple[str, str, float]]:
@@ -34,22 +32,18 @@ def differences() -> Iterator[tuple[str, str, float]]:
         yield "ET", "UTC", leap + TAI_GPS + ET_TAI
 
 
-def named(shift: float) -> str:
-    """Return the two scales whose difference is a shift of time in seconds; nothing where there are none.
-
-    The shift is what times of the one lack to be times of the other.
-    """
-    found = []
-    for ahead, behind, seconds in differences():
-        for sign, of, to in ((1, behind, ahead), (-1, ahead, behind)):
-            if abs(shift - sign * seconds) < WITHIN:
-                found.append(f"{to} - {of} ({sign * seconds:+g} s)")
-    return " or ".join(found)
+def scales_of(shift: float) -> list[Phrase]:
+    """Return pairs of time scales whose difference is a shift in seconds, which is added to the second."""
+    return [
+        phrase("moving.time-scales", first=to, second=of, seconds=sign * seconds)
+        for ahead, behind, seconds in differences()
+        for sign, of, to in ((1, behind, ahead), (-1, ahead, behind))
+        if abs(shift - sign * seconds) < WITHIN
+    ]
 
 
 SIGNIFICANT = 5.0
-HALVES, NEARLY = (0.5, 1.0), 0.1
-"""Lines."""
+HALVES, NEARLY = (0.5, 1.0), 0.1  # Lines
 
 
 def known_offsets(result: Result) -> list[Message]:
@@ -57,13 +51,10 @@ def known_offsets(result: Result) -> list[Message]:
     found = []
     for each in result.unknowns:
         offset = float(each.position[0])
-        if isinstance(each.given, Clock) and abs(offset) > SIGNIFICANT * each.sd[0] and named(offset):
-            found.append(
-                Message(
-                    f"{each.given.title} is {offset:.4f} s, the difference {named(offset)}: are its times and"
-                    " those of the trajectories in different scales?"
-                )
-            )
+        significant = isinstance(each.given, Clock) and abs(offset) > SIGNIFICANT * each.sd[0]
+        if significant and (scales := scales_of(offset)):
+            message = phrase("moving.clock-offset", clock=each.given.title, offset=offset, scales=scales)
+            found.append(Message(message))
     return found
 
 
@@ -94,8 +85,5 @@ def _off(result: Result, clocks: dict[float, Clock], timed: list[Timed]) -> Iter
         near = any(abs(abs(lines) - half) < NEARLY for half in HALVES)
         if near and abs(lines) > SIGNIFICANT * sd:
             names = [each.photo for each in timed if each.offset is clock]
-            text = (
-                f"lines of {listed(names)} are {lines:+.2f} lines off: is the first counted as 0, 0.5 or 1 in"
-                " its middle?"
-            )
-            yield Finding("line-count", "look", text, names, values={"lines": lines, "sd": sd})
+            message = phrase("check.line-count", photos=names, lines=lines)
+            yield finding("look", message, names, values={"lines": lines, "sd": sd})

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.diagnosis.editing import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, note
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note
 from photogram.results.result import Result
+from photogram.words import phrase
 
-MANY = 0.2
-"""Of the control: when more does not fit, it is hardly the points."""
+MANY = 0.2  # Of the control: when more does not fit, it is hardly the points
 
 
 def control(edited: Edited, words: Words) -> Section:
@@ -24,18 +24,11 @@ def control(edited: Edited, words: Words) -> Section:
     controls = int((np.isfinite(block.point_sd).any(axis=1) & result.used_points).sum())
     common = len(edited.control) > max(MANY * controls, 3)
     if common:
-        text = (
-            f"{len(edited.control)} control points do not fit: rather than all of them, something common may"
-            " be wrong (lens, film, refraction, curvature of the earth, datum, standard deviations)"
-        )
-        note(section, "control-system", "grave", text, [], list(edited.control))
-    for one, other in edited.exchanged:
-        text = (
-            f"the control points {one} and {other} are exchanged: each has the coordinates that the images"
-            " give the other; what follows holds with them exchanged back"
-        )
-        note(section, "exchanged-control", "grave", text, [], [one, other])
-    spoilt = {point for finding in edited.section.findings for point in finding.points}
+        message = phrase("check.control-system", n=len(edited.control))
+        note(section, "grave", message, [], list(edited.control))
+    for pair in edited.exchanged:
+        note(section, "grave", phrase("check.exchanged-control", points=list(pair)), [], pair)
+    spoilt = {point for blunder in edited.section.findings for point in blunder.points}
     for name, findings in edited.control.items():
         section.findings.append(_misfit(result, name, findings, name in spoilt, common, words))
     held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
@@ -49,24 +42,19 @@ def _misfit(
     result: Result, name: str, findings: list[Finding], images_too: bool, common: bool, words: Words
 ) -> Finding:
     """Put the components of one control point together, with the remedies of the guide."""
-    axes = sorted({int(finding.values["component"]) for finding in findings})
+    axes = {int(misfit.values["component"]) for misfit in findings}
     kept = np.isfinite(result.block.point_sd[result.block.point_ids.index(name)])
-    unhold = words.unhold(kept)
-    if not kept.any():
-        remedy = (
-            "nothing of it fits: misidentified, or wrong coordinates; make it a pass point or re-measure it"
-        )
-    elif axes == [2]:
-        remedy = f"the height only: {unhold}, or raise its standard deviation"
-    elif 2 not in axes:
-        remedy = f"the planimetry only: {unhold}, or look for poor point transfer"
-    else:
-        remedy = f"{unhold}, raise the standard deviations, or re-measure it"
-    if images_too:
-        remedy += "; its images do not fit either: look at the plates first"
-    text = "; ".join(finding.text for finding in findings) + ": " + remedy
-    test = max(finding.values["test_value"] for finding in findings)
-    grave = any(finding.level == "grave" for finding in findings) and not common
+    part = "plan" if 2 not in axes else "height" if axes == {2} else "both"
+    remedy = phrase(f"check.remedy.{part if kept.any() else 'point'}", change=words.remedy(kept))
+    components = [misfit.phrase for misfit in findings]
+    message = phrase(
+        "check.control-misfit.point",
+        components=components,
+        remedy=remedy,
+        images=phrase("check.remedy.images") if images_too else "",
+    )
+    test = max(misfit.values["test_value"] for misfit in findings)
+    grave = any(misfit.level == "grave" for misfit in findings) and not common
     level: Level = "grave" if grave else "look"
-    rivals = list(dict.fromkeys(point for finding in findings for point in finding.points))
-    return Finding("control-misfit", level, text, [], rivals, {"test_value": test, **words.values(kept)})
+    points = list(dict.fromkeys(point for misfit in findings for point in misfit.points))
+    return finding(level, message, [], points, values={"test_value": test, **words.values(kept)})

@@ -21,7 +21,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.blunders import tests
-from photogram.diagnosis.findings import Explained
+from photogram.diagnosis.findings import Explained, likely
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed
 from photogram.diagnosis.regression import spread
@@ -34,23 +34,18 @@ from photogram.network.rays import LocalAxes, local_axes
 from photogram.network.similarity import turn_and_scale
 from photogram.results.result import Result
 from photogram.statistics.likelihood import judged
+from photogram.words import phrase
 
-MOST = 60
-"""Control points that are compared."""
+MOST = 60  # Control points that are compared
 FEWEST = 3
-TRIPLES = 400
-"""Threes of them that are tried."""
-CLEARLY = 2 * math.log(20)
-"""What explaining it by single points must cost more: odds of 20."""
-PAIRS = 15
-"""Pairs that are exchanged on trial."""
+TRIPLES = 400  # Threes of them that are tried
+CLEARLY = 2 * math.log(20)  # What explaining it by single points must cost more: odds of 20
+PAIRS = 15  # Pairs that are exchanged on trial
 GROWTHS = 5
-NEAR = 6.0
-"""Standard deviations within which a point agrees with a similarity."""
+NEAR = 6.0  # Standard deviations within which a point agrees with a similarity
 STEPS = 30
 CONVERGED = 1e-9
-MANY = 2
-"""Control points that do not fit, for control as a whole to be doubted."""
+MANY = 2  # Control points that do not fit, for control as a whole to be doubted
 
 EXCHANGED = "X and Y exchanged"
 
@@ -61,7 +56,6 @@ Change = Callable[[Floats], Floats]
 @dataclass(frozen=True)
 class _Set:
     kind: str
-    text: str
     change: Change
 
     def meant(self, block: Block) -> Block:
@@ -77,18 +71,12 @@ def _scaled(*factors: float) -> Change:
 
 
 SETS = (
-    _Set("feet in heights", "heights of the control are in feet, all else in metres", _scaled(1, 1, FOOT)),
-    _Set(
-        "metres in heights", "heights of the control are in metres, all else in feet", _scaled(1, 1, 1 / FOOT)
-    ),
-    _Set("feet in X", "X of the control is in feet, all else in metres", _scaled(FOOT, 1, 1)),
-    _Set("feet in Y", "Y of the control is in feet, all else in metres", _scaled(1, FOOT, 1)),
-    _Set("feet in X and Y", "X and Y of the control are in feet, heights in metres", _scaled(FOOT, FOOT, 1)),
-    _Set(
-        EXCHANGED,
-        "X and Y of the control are exchanged (or it is a mirror image otherwise)",
-        lambda positions: positions[:, [1, 0, 2]],
-    ),
+    _Set("feet in heights", _scaled(1, 1, FOOT)),
+    _Set("metres in heights", _scaled(1, 1, 1 / FOOT)),
+    _Set("feet in X", _scaled(FOOT, 1, 1)),
+    _Set("feet in Y", _scaled(1, FOOT, 1)),
+    _Set("feet in X and Y", _scaled(FOOT, FOOT, 1)),
+    _Set(EXCHANGED, lambda positions: positions[:, [1, 0, 2]]),
 )
 """Hypotheses about all control; in geographic space only those on heights, and the exchange."""
 
@@ -393,7 +381,6 @@ def explain(model: FreeModel) -> Explained | None:
     if model.held.all(axis=1).sum() < FEWEST:
         # Nothing tells a mistake in all from one in some.
         verdict = replace(verdict, explained=False)
-    word = "probably" if verdict.accepted else "it cannot be told which" if len(best) > 1 else "possibly"
-    text = f"{word}{':' if len(best) > 1 else ''} {'; or '.join(each.text for each in best)}"
-    text += f": the control would miss the model of the photos by {verdict.fall:.3g} times less"
-    return Explained(best[0].kind, text, verdict, best[0].meant)
+    causes = [phrase(f"mistake.control.{each.kind}") for each in best]
+    effect = phrase("mistake.control-misfit", times=verdict.fall)
+    return Explained(best[0].kind, likely(causes, effect), verdict, best[0].meant)

@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Section, note, note_all
+from photogram.diagnosis.findings import Section, finding, note_all
 from photogram.diagnosis.hypotheses import (
     TURNS,
     Hypothesis,
@@ -41,46 +41,32 @@ from photogram.diagnosis.regression import (
 )
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.geometry import rotation_matrix
 from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
+from photogram.words import phrase
 
-SUSPICION = 0.35
-"""Misfit m above which photos are looked at more closely."""
+SUSPICION = 0.35  # Misfit m above which photos are looked at more closely
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
 """What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
 EACH = 0.5
 """What it must fall to on each photo that does not fit as it is, and in the median of images of control."""
-AS_GOOD = 1.5
-"""Another hypothesis is as good when its misfit is below so many times the least."""
-SLIGHT = float(np.radians(1.0))
-"""Attitudes that differ from resected ones by less are right."""
-CLEARLY = 5.0
-"""So many times nearer to the resected attitudes must those of a rival reading be."""
-PUT_RIGHT = 5
-"""Mistakes that are put right one upon the other, at the most."""
+AS_GOOD = 1.5  # Another hypothesis is as good when its misfit is below so many times the least
+SLIGHT = float(np.radians(1.0))  # Attitudes that differ from resected ones by less are right
+CLEARLY = 5.0  # So many times nearer to the resected attitudes must those of a rival reading be
+PUT_RIGHT = 5  # Mistakes that are put right one upon the other, at the most
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
 
 
 class Verdict:
-    """Hypotheses that pass, the best first; several where it cannot be told which.
+    """Hypotheses that pass, the best first; several if the data do not decide.
 
-    Attributes
-    ----------
-    names
-        Of the hypotheses.
-    text
-        The hint.
-    change
-        Makes of a block what the first hypothesis says was meant.
-    exact
-        Whether that is exactly what was meant.
-    photos
-        Photos that it is about; none for all.
+    `photos` are the names of the photos with the mistake; empty for all. `change` and `exact` belong to the
+    first hypothesis.
     """
 
     def __init__(
@@ -94,47 +80,33 @@ class Verdict:
         least = found[0][0]
         best = [each for misfit, each in found if misfit <= AS_GOOD * least]
         # One mistake may be right in several forms.
-        best = list({each.text: each for each in reversed(best)}.values())[::-1]
+        best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
         self.change, self.exact = best[0].change, best[0].exact
         self.photos = photos
-        where = f" (on photo{'s' if len(photos) > 1 else ''} {listed(list(photos))})" if photos else ""
-        far = f" and not by {given:.2g}" if given < UNKNOWN else "; as it is, most are nowhere near"
-        fall = f"{what} would miss their places by {least:.2g} of their spread{far}"
-        if len(best) == 1:
-            self.text = f"probably {best[0].text}{where}: {fall}"
-        else:
-            rivals = "; or ".join(each.text for each in best)
-            self.text = f"it cannot be told which of these is so{where}: {rivals}: {fall}"
+        self.message = phrase(
+            f"convention.{'likely' if len(best) == 1 else 'one-of'}",
+            causes=[each.message for each in best],
+            photos=phrase("convention.photos", n=len(photos), photos=list(photos)) if photos else "",
+            misfit=phrase(f"convention.misfit.{what}", misfit=least),
+            before=phrase("convention.before", misfit=given) if given < UNKNOWN else "",
+        )
 
 
 def hints(block: Block) -> list[Message]:
-    """Look for mistakes in the conventions of data: units, axes, signs, angles.
+    """Return mistakes in the conventions of data that would explain why images do not fit.
 
-    Parameters
-    ----------
-    block
-        A block whose photos have positions and attitudes, be they rough.
-
-    Returns
-    -------
-    Sentences that each name a mistake that would explain why images do not fit; none where they do, or where
-    no single mistake explains it. Nothing is corrected. Photos on trajectories, which are no pictures with
-    one pose, are left out.
-
-    Raises
-    ------
-    InputError
-        What is no block, or has photos without a pose.
+    The block has positions and attitudes of photos, be they rough; without them it is an InputError. Photos
+    on trajectories, which have no single pose, are left out.
     """
     rest = at_rest(block) if isinstance(block, Block) else block
     if rest is not block and not len(rest.image_xy):
         return []
     with np.errstate(all="ignore"):
         block = View.of(checked(rest)).seen
-        found = [Message(verdict.text) for verdict in verdicts(block)]
+        found = [Message(verdict.message) for verdict in verdicts(block)]
         bar = distances_in_millimetres(block)
-        bars = [] if bar is None else [Message(bar.text)]
+        bars = [] if bar is None else [Message(bar.message)]
         return [*found, *_latitudes(block), *(_readings(block) if not found else []), *bars]
 
 
@@ -158,18 +130,9 @@ def verdicts(block: Block) -> list[Verdict]:
 def passing(
     tried: Iterable[Hypothesis], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
 ) -> list[tuple[float, Hypothesis]]:
-    """Return hypotheses under which photos fit, with the misfit that is left.
+    """Return hypotheses under which photos fit, with the remaining misfit.
 
-    Parameters
-    ----------
-    tried
-        Hypotheses.
-    looked
-        The block that they change.
-    given
-        (k,) misfits of the photos as they are given.
-    misfits_of
-        Those of a changed block.
+    `given` are (k,) misfits of the photos in the block `looked`, `misfits_of` returns them for a changed one.
     """
     found: dict[str, tuple[float, Hypothesis]] = {}
     for hypothesis in tried:
@@ -212,11 +175,11 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
         fitting = []
-        for name, (_, text) in TURNS.items():
+        for name in TURNS:
             change = partial(images_turned, photos=alone, turn=turn_of(name))
             left = float(misfits(change(looked), own)[0])
             if left < PASSES * given and left < SUSPICION:
-                fitting.append((left, Hypothesis(name, text, change)))
+                fitting.append((left, Hypothesis(name, phrase(f"mistake.{name}"), change)))
         if fitting:
             names = tuple(sorted(each.name for _, each in fitting))
             by_names.setdefault(names, (fitting, given, []))[2].append(block.photo_ids[photo])
@@ -229,7 +192,7 @@ def _latitudes(block: Block) -> list[Message]:
     if block.spheroid is None:
         return []
     return [
-        Message(f"latitudes of the {what} are beyond 90 degrees: longitude and latitude are exchanged")
+        Message(phrase(f"convention.latitudes.{what}"))
         for what, positions in (("photos", block.photo_positions), ("points", block.point_positions))
         if (np.abs(positions[:, 1]) > np.pi / 2).any()
     ]
@@ -248,18 +211,14 @@ def _readings(block: Block) -> list[Message]:
     rows = np.array(list(resected))
     turned = np.array(list(resected.values()))
     own = _apart(Rays.of(block).cameras[rows], turned)
-    rivals = sorted(
-        (_apart(matrices[rows], turned), text) for text, matrices in attitude_readings(block).values()
-    )
-    (least, text), (second, _) = rivals[:2]
+    rivals = [
+        (_apart(matrices[rows], turned), cause) for cause, matrices in attitude_readings(block).values()
+    ]
+    (least, cause), (second, _) = sorted(rivals, key=lambda rival: rival[0])[:2]
     if own < SLIGHT or CLEARLY * least > min(own, second):
         return []
-    return [
-        Message(
-            f"probably {text}: attitudes would differ from resected ones by {np.degrees(least):.2g} degrees"
-            f" and not by {np.degrees(own):.2g}"
-        )
-    ]
+    angles = {"after": float(np.degrees(least)), "before": float(np.degrees(own))}
+    return [Message(phrase("convention.attitudes", cause=cause, **angles))]
 
 
 def _resected(block: Block, photo: int) -> Floats | None:
@@ -304,15 +263,12 @@ def distances_in_millimetres(block: Block) -> Hypothesis | None:
             for each in bars
         ]
     )
-    for factor, text in (
-        (BAR_FACTOR, "in millimetres, all else in metres"),
-        (1 / BAR_FACTOR, "in metres, all else in millimetres"),
-    ):
+    for factor, unit in ((BAR_FACTOR, "mm"), (1 / BAR_FACTOR, "m")):
         relative = ratios / factor
         if abs(np.median(relative) - 1) < BAR_WITHIN and (np.abs(np.log(relative)) < BAR_EACH).all():
-            names = listed([each.name for each in bars])
-            text = f"probably observed distances are {text}: {names} are {factor:g} times too long"
-            return Hypothesis("distances", text, partial(_shorter, factor=factor))
+            fields = {"distances": [each.name for each in bars], "times": factor}
+            message = phrase(f"convention.distances.{unit}", **fields)
+            return Hypothesis("distances", message, partial(_shorter, factor=factor))
     return None
 
 
@@ -344,11 +300,11 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         if not whole:
             break
         best = whole[0]
-        note(section, "convention", "grave", best.text)
+        section.findings.append(finding("grave", best.message, kind="convention"))
         view, exact = view.changed(best.change), exact and best.exact
     bars = distances_in_millimetres(view.seen)
     if bars is not None:
-        note(section, "convention", "grave", bars.text)
+        section.findings.append(finding("grave", bars.message, kind="convention"))
         view = view.changed(bars.change)
     if section.findings:
         section.remark("the sections below hold with this put right")

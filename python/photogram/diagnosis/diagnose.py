@@ -15,7 +15,7 @@ import numpy as np
 
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
-from photogram.arguments.arrays import shown
+from photogram.arguments.objects import kind_error
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import BESIDE
@@ -24,7 +24,7 @@ from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.editing import HOPELESS, Edited, blunder_section, edit
-from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, note
+from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, finding, note
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
@@ -38,7 +38,6 @@ from photogram.diagnosis.trajectories import flown_checked
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import counted, listed
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
 from photogram.network.observations import Position
@@ -46,15 +45,14 @@ from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
+from photogram.words import phrase
 
 __all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
-HARDLY = 10.0
-"""So many times the usual residual before the adjustment comes from coarse stations."""
-MOST_SETS = 5
-"""Mistakes in the control as a whole that are put right one upon the other, at the most."""
+HARDLY = 10.0  # So many times the usual residual before the adjustment comes from coarse stations
+MOST_SETS = 5  # Mistakes in the control as a whole that are put right one upon the other, at the most
 
 
 @dataclass(frozen=True)
@@ -113,12 +111,12 @@ def diagnose(
     if result is not None:
         adjusted = result.result if isinstance(result, Snooped) else result
         if not isinstance(adjusted, Result):
-            raise InputError(f"result is the result of a block, not {shown(result)}")
+            raise kind_error("result", "the result of a block", result)
         return diagnosis_of(adjusted)
     if isinstance(network, Block):
         return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
     if not hasattr(network, "_check"):
-        raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
+        raise kind_error("network", "a block, a project or a collection", network)
     found: Diagnosis = network._check(threads)
     return found
 
@@ -126,7 +124,7 @@ def diagnose(
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
     if not len(block.image_xy):
-        raise InputError("the block has no images: there is nothing to check")
+        raise InputError(phrase("check.no-images"))
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):
@@ -147,22 +145,17 @@ def _started(block: Block) -> tuple[Block | None, Section]:
         found: FirstValues = first_values(block)
         usable = found.usable()
     except (AdjustmentError, InputError) as error:
-        note(section, "no-first-values", "grave", f"nothing can be checked: {error}")
+        note(section, "grave", phrase("check.no-first-values.all", reason=str(error)))
         return None, section
     section.remark(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
     for photo, why in found.missing.items():
-        text = f"photo {photo} could not be started: {why}"
-        note(section, "no-first-values", "grave", text, [photo])
+        note(section, "grave", phrase("check.no-first-values.photo", photo=photo, reason=why), [photo])
     aside = found.set_aside
     if aside.any():
         points = sorted({block.point_ids[point] for point in block.image_points[aside]})
         photos = sorted({block.photo_ids[photo] for photo in block.image_photos[aside]})
-        text = (
-            f"{counted(int(aside.sum()), 'image observation')} of {counted(len(points), 'point')} on"
-            f" {counted(len(photos), 'photo')} do not fit the first values; the check leaves them out:"
-            f" points {listed(points)}"
-        )
-        note(section, "set-aside", "look", text, photos, points)
+        message = phrase("check.set-aside", n=int(aside.sum()), points=points, photos=photos)
+        note(section, "look", message, photos, points)
     return usable, section
 
 
@@ -206,7 +199,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
         named = {point for each in [*errors.findings, *edited.section.findings] for point in each.points}
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
     if edited.first is not None:
-        rolls = [Finding("rolling-shutter", "grave", str(each)) for each in rolling_hints(edited.first)]
+        rolls = [finding("grave", each.phrase) for each in rolling_hints(edited.first) if each.phrase]
         # What a lens, control or single images seem to have is what a shutter does to them.
         sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
@@ -248,7 +241,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
             break
         values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
         level: Level = "grave" if found.judged.explained else "look"
-        note(section, kind, level, found.text, values=values)
+        section.findings.append(finding(level, found.message, kind=kind, values=values))
         if level == "look":
             break
         view, changed = view.changed(found.change), True

@@ -63,7 +63,10 @@ def _members(section: Section) -> dict[str, object]:
         "title": section.title,
         "why": section.why,
         "lines": [line for part in section.parts for line in part_lines(part)],
-        "findings": [asdict(finding) for finding in section.findings],
+        "findings": [
+            asdict(replace(finding, phrase=None)) | {"phrase": finding.phrase and finding.phrase.document()}
+            for finding in section.findings
+        ],
     }
 
 

@@ -42,25 +42,20 @@ from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.show.page import Column, Table
 
-ROUNDS = 20
-"""Adjustments at the most."""
+ROUNDS = 20  # Adjustments at the most
 COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
 HOPELESS = 5.0
 """Spread of the test values above which photos that did not fit before the adjustment are left out.
 
 Nor is what such an adjustment says held against what was found before."""
-EXCHANGES = 5
-"""Pairs of control points that are exchanged back, at the most."""
-LOOSE = 0.01
-"""Standard deviation of control that strains no block, as a part of the flying height."""
+EXCHANGES = 5  # Pairs of control points that are exchanged back, at the most
+LOOSE = 0.01  # Standard deviation of control that strains no block, as a part of the flying height
 BLUNDER = 3.0
 TWENTIETH = 1.96
-SURE = 1e-4
-"""Chance that the largest test value of a good block is beyond what is grave."""
+SURE = 1e-4  # Chance that the largest test value of a good block is beyond what is grave
 SHOWN = 20
-RETURNS = 10
-"""Images that are tried anew when all blunders are out, at the most."""
+RETURNS = 10  # Images that are tried anew when all blunders are out, at the most
 
 
 @dataclass
@@ -87,19 +82,11 @@ class Edited:
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
-    """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
+    """Adjust a block and remove observations that do not fit, the largest error of a neighbourhood at a time.
 
-    Control points that agree with each other's predictions are exchanged back, and all is done anew.
-
-    Parameters
-    ----------
-    block
-        The block, with its orientations right way up.
-    suspects
-        Gross errors known already. Images are left out from the beginning, photos when the block does not fit
-        with them; control is left out until its prediction has judged it.
-    adjusted
-        Adjusts.
+    Suspected images are left out from the beginning, suspected photos if the block does not fit with them,
+    suspected control until its prediction has confirmed it. Control points that agree with each other's
+    predictions are exchanged, and the search starts again.
     """
     found = _edited(block, suspects, adjusted)
     if not suspects.control.any() or not found.control:

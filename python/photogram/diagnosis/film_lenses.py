@@ -22,17 +22,15 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
+from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AK]\d")
 POINT = ("xp", "yp")
-CHANCE = 1e-4
-"""Of any hint where nothing is wrong."""
-EXPLAINED = 0.8
-"""Of what the sum of squares would fall by if nothing were known of the camera."""
+CHANCE = 1e-4  # Of any hint where nothing is wrong
+EXPLAINED = 0.8  # Of what the sum of squares would fall by if nothing were known of the camera
 NEAR, WITHIN = 0.3, 3.0
 """How near images have the opposite of what is given: in parts of it, or in standard deviations."""
-TAKEN_UP = 1e-6
-"""Images say nothing of what they check by a smaller part."""
+TAKEN_UP = 1e-6  # Images say nothing of what they check by a smaller part
 
 
 @dataclass(frozen=True)
@@ -72,25 +70,19 @@ class _Fall:
 
 
 def lens_hints(result: Result) -> list[Message]:
-    """Name cameras of films whose lens, as it is known beforehand, images contradict for a reason.
-
-    Parameters
-    ----------
-    result
-        An adjustment with covariances.
-    """
+    """Name cameras of films with a given lens that images contradict in a known way."""
     of_photos = result.block.photo_cameras
     if of_photos is None or result.loss is not None:
         return []
     rows = sorted({int(of_photos[row]) for row, _ in result.films})
-    said = (_said(result, result.cameras[row], CHANCE / (2 * len(rows))) for row in rows)
-    return [Message(each) for each in said if each]
+    found = (_contradiction(result, result.cameras[row], CHANCE / (2 * len(rows))) for row in rows)
+    return [Message(each) for each in found if each is not None]
 
 
-def _said(result: Result, camera: AdjustedCamera, level: float) -> str:
+def _contradiction(result: Result, camera: AdjustedCamera, level: float) -> Phrase | None:
     weighted = camera.weighted
     if not weighted or not np.isfinite(camera.cofactors[np.ix_(weighted, weighted)]).all():
-        return ""
+        return None
     whole = _Fall.of(result, camera, weighted, np.eye(len(weighted)))
     values = camera.given.values
     radial = [k for k in weighted if RADIAL.fullmatch(camera.names[k]) and values[k]]
@@ -103,39 +95,25 @@ def _said(result: Result, camera: AdjustedCamera, level: float) -> str:
         shifted = _Fall.of(result, camera, point, np.eye(2))
         if shifted.is_sure(whole, level) and shifted.freedom == len(point):
             return _of_point(camera, values[point], shifted)
-    return ""
+    return None
 
 
-def _of_sign(camera: AdjustedCamera, times: float, sd: float) -> str:
-    """Say it where images show the radial distortion about -1 times as it is given."""
+def _of_sign(camera: AdjustedCamera, times: float, sd: float) -> Phrase | None:
+    """Return the hint if images show the radial distortion with the opposite sign."""
     if abs(times + 1.0) > max(NEAR, WITHIN * sd):
-        return ""
-    return (
-        f"images show {times:.2f} (sd {sd:.2g}) times the radial distortion that camera {camera.name} is"
-        " given: probably it has the wrong sign; a table counts it outwards, measured minus ideal: say"
-        " sign = -1 in [certificate.radial], or give the terms of the table cameras with the other sign"
-    )
+        return None
+    return phrase("film-lens.sign", camera=camera.name, times=times, sd=sd)
 
 
-def _of_point(camera: AdjustedCamera, given: Floats, fall: _Fall) -> str:
-    """Say where images have the principal point, and what was perhaps given in its place."""
+def _of_point(camera: AdjustedCamera, given: Floats, fall: _Fall) -> Phrase:
+    """Return the principal point of images, and the probable mistake in the given one."""
     found = given + fall.moved
-    x, y = found.tolist()
-    where = (
-        f"images have the principal point of camera {camera.name} at ({x:.3f}, {y:.3f}) mm (sd"
-        f" {fall.sd[0]:.2g}, {fall.sd[1]:.2g}) in the frame of the marks, and not at ({given[0]:.3f},"
-        f" {given[1]:.3f})"
-    )
     size = float(np.hypot(*given))
-    if (np.abs(found + given) < WITHIN * fall.sd).all() and size > WITHIN * float(fall.sd.max()):
-        return (
-            f"{where}: probably it is given with the wrong signs, as where the centre of the marks lies seen"
-            " from it: autocollimation and symmetry of a certificate, xp and yp are places in the frame of"
-            " the marks"
-        )
-    indicated = "the indicated one, where lines between marks cross, and not " if size < 1e-3 else ""
-    return (
-        f"{where}: is that {indicated}the calibrated one, of symmetry, about which radii of the distortion"
-        " count? Give autocollimation or symmetry of the certificate (xp, yp of the table cameras); a shift"
-        " of observed positions, as of an antenna, looks alike"
+    opposite = (np.abs(found + given) < WITHIN * fall.sd).all() and size > WITHIN * float(fall.sd.max())
+    code = "signs" if opposite else "indicated" if size < 1e-3 else "point"
+    fields = dict(
+        zip(("x", "y", "sd_x", "sd_y", "given_x", "given_y"), [*found, *fall.sd, *given], strict=True)
+    )
+    return phrase(
+        f"film-lens.{code}", camera=camera.name, **{name: float(value) for name, value in fields.items()}
     )

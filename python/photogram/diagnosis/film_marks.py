@@ -20,7 +20,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
 from photogram.network.unknowns import Unknown
@@ -28,12 +28,12 @@ from photogram.results.film_pictures import mark_residuals
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
+from photogram.words import phrase
 
 CERTIFICATE = "certificate"
 ALIKE = 0.7
 """What has at least this part of the largest test value is named beside it: less may be its consequence."""
-FEWEST_FAILING = 3
-"""Marks of a photo that all fail."""
+FEWEST_FAILING = 3  # Marks of a photo that all fail
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class _Tested:
 
 
 def mark_hints(result: Result) -> list[Message]:
-    """Say where marks fail what is to be looked at first.
+    """Return the probable mistake in fiducial marks.
 
-    A mark that fails on all photos is wrong in the certificate; all marks of a photo are named wrongly, seen
-    from the other side, or of another camera; a single reading is of the wrong place. The largest test value
-    tells: what is wrong pulls at the rest.
+    If a mark fails on all photos, its certificate is wrong. If all marks of a photo fail, their names, the
+    side of the film or the camera are wrong. A single reading may refer to the wrong place. The largest test
+    value decides.
     """
     readings, marks = list(_readings(result)), list(_marks(result))
     tested = [*readings, *marks]
@@ -60,29 +60,28 @@ def mark_hints(result: Result) -> list[Message]:
         return []
     whole = _photos(readings, limit)
     if any(each.value == largest and each.photo in whole for each in readings):
-        return [
-            Message(
-                f"nearly all fiducials of {listed(whole, 5)} fail their tests: are they named as they lie, is"
-                " the film seen from the side that is given, is the camera another?"
-            )
-        ]
+        return [Message(phrase("film-check.marks.all", photos=whole))]
     limit = max(limit, ALIKE * largest)
     order = sorted((each for each in tested if each.value >= limit), key=lambda each: -each.value)
     if order[0].photo:
-        named = [f"{each.mark} on {each.photo} (w = {each.value:.1f})" for each in order if each.photo]
-        return [Message(f"{listed(named, 5)}: measured on the wrong place, or another mark?")]
+        named = [
+            phrase("film-check.marks.reading", mark=each.mark, photo=each.photo, test=each.value)
+            for each in order
+            if each.photo
+        ]
+        return [Message(phrase("film-check.marks.readings", readings=named))]
     named = [
-        f"{each.mark} (w = {each.value:.1f}, on {counted(_shown(readings, each.mark), 'photo')})"
+        phrase(
+            "film-check.marks.mark",
+            mark=each.mark,
+            test=each.value,
+            n=sum(own.mark == each.mark for own in readings),
+        )
         for each in order
         if not each.photo
     ]
     several = len(named) >= FEWEST_FAILING and all(film.pattern is None for _, film in result.films)
-    pattern = ", or films have a pattern that was left out (`pattern` of the table films)" if several else ""
-    return [
-        Message(
-            f"{listed(named, 5)}: where it fails on all photos its place in the certificate is wrong{pattern}"
-        )
-    ]
+    return [Message(phrase(f"film-check.marks.{'pattern' if several else 'certificate'}", marks=named))]
 
 
 def _photos(readings: list[_Tested], limit: float) -> list[str]:
@@ -98,10 +97,6 @@ def _photos(readings: list[_Tested], limit: float) -> list[str]:
         if sum(each > limit for each in values) >= max(FEWEST_FAILING, len(values) / 2 + 0.5)
         and size[photo] >= worst
     ]
-
-
-def _shown(readings: list[_Tested], mark: str) -> int:
-    return sum(each.mark == mark for each in readings)
 
 
 def _readings(result: Result) -> Iterator[_Tested]:
@@ -126,14 +121,11 @@ def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
         yield from zip(kind.rows.tolist(), np.abs(np.nan_to_num(kind.standardized)), strict=True)
 
 
-FEWEST = 4
-"""Marks of a photo: three are alike along any axis."""
-CHANCE = 1e-3
-"""Of a hint where nothing is wrong."""
+FEWEST = 4  # Marks of a photo: three are alike along any axis
+CHANCE = 1e-3  # Of a hint where nothing is wrong
 EXPLAINED = 0.7
 """Of the weighted sum of squares of a photo's marks that is explained at least: half of it by one of four."""
-ALONE = 1e-6
-"""Part of the largest column that the others must leave of one."""
+ALONE = 1e-6  # Part of the largest column that the others must leave of one
 
 
 @dataclass(frozen=True)
@@ -154,15 +146,15 @@ def axis_hints(result: Result) -> list[Message]:
         return []
     found.sort(key=lambda each: -each.longer)
     most = found[0]
-    return [
-        Message(
-            f"fiducials of {listed([each.photo for each in found], 5)} are apart alike along one axis: the"
-            f" film of {most.photo} is longer by {most.longer:.2g} at {most.angle:.0f} degrees from x than"
-            f" across ({1e3 * most.far:.0f} um at its marks), which no conformal film is."
-            " --set film.model=affine gives films b1 and b2; where all scans are alike, Sx and Sy of the"
-            " scanner may be wrong"
-        )
-    ]
+    message = phrase(
+        "film-check.axis",
+        photos=[each.photo for each in found],
+        photo=most.photo,
+        longer=most.longer,
+        angle=most.angle,
+        at_marks=1e3 * most.far,
+    )
+    return [Message(message)]
 
 
 def _is_conformal(film: Film) -> bool:

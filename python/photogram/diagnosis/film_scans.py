@@ -24,13 +24,11 @@ from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
+from photogram.words import Phrase, phrase
 
-FEWEST_OF_HALVES = 12
-"""Images of a photo."""
-EXPLAINED = 0.4
-"""Of the sum of squares of a photo's residuals that a shift of one half explains at least."""
-BEYOND = 2.0
-"""Standard deviations of a reading by which halves are shifted at least."""
+FEWEST_OF_HALVES = 12  # Images of a photo
+EXPLAINED = 0.4  # Of the sum of squares of a photo's residuals that a shift of one half explains at least
+BEYOND = 2.0  # Standard deviations of a reading by which halves are shifted at least
 
 
 def seam_hints(result: Result) -> list[Message]:
@@ -51,15 +49,9 @@ def seam_hints(result: Result) -> list[Message]:
     value, step, axis, row, pitch = max(found, default=(0.0, 0.0, 0, 0, 1.0))
     if not value > critical(4 * len(result.films)):
         return []
-    halves, seam = (("left and right", "seam_column"), ("upper and lower", "seam_row"))[axis]
+    code = f"film-check.seam.{('column', 'row')[axis]}"
     unit = "mm" if pitch == 1.0 else "px"
-    return [
-        Message(
-            f"the {halves} halves of the scan of {block.photo_ids[row]} are shifted against each other,"
-            f" residuals show {step:.2g} {unit}: was the film scanned in two parts that were joined? Then"
-            f" {seam} of the table photos, the line where they meet, gives each its own film"
-        )
-    ]
+    return [Message(phrase(code, photo=block.photo_ids[row], step=step, unit=unit))]
 
 
 def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float, float]:
@@ -81,18 +73,13 @@ def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float
     return best
 
 
-FEWEST = 20
-"""Images of a photo."""
-WINDOWS = tuple(0.001 * 2.0**k for k in range(7))
-"""How far apart lines are, in parts of the scan."""
-FAR = 2
-"""So many of these on are those that are far."""
-CHANCE = 1e-3
-"""Of a hint where nothing is wrong."""
+FEWEST = 20  # Images of a photo
+WINDOWS = tuple(0.001 * 2.0**k for k in range(7))  # How far apart lines are, in parts of the scan
+FAR = 2  # So many of these on are those that are far
+CHANCE = 1e-3  # Of a hint where nothing is wrong
 OTHERWISE = 2.0
 """Times by which z is larger than that of lines across: what is alike in both is no matter of lines."""
-WORTH = 0.5
-"""Standard deviations of a reading that lines have in common at least."""
+WORTH = 0.5  # Standard deviations of a reading that lines have in common at least
 TINY = 1e-9
 
 
@@ -108,35 +95,30 @@ class _Found:
 
 
 def line_hints(result: Result) -> list[Message]:
-    """Name scanners whose lines jitter, with the standard deviations that count it.
-
-    Parameters
-    ----------
-    result
-        An adjustment with covariances.
-    """
+    """Name scanners whose lines jitter, with standard deviations that include the jitter."""
     scanners: dict[int, tuple[str, list[int]]] = {}
     for row, film in result.films:
         if film.readings.pitch != 1.0:
             scanners.setdefault(id(film.scanner), (film.scanner.name, []))[1].append(row)
     limit = critical(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
-    said = []
+    messages = []
     for name, rows in scanners.values():
-        own = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
-        if own is not None and own.z > limit:
-            said.append(Message(_said(result, name, rows, own)))
-    return said
+        jitter = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
+        if jitter is not None and jitter.z > limit:
+            messages.append(Message(_jitter_message(result, name, rows, jitter)))
+    return messages
 
 
-def _said(result: Result, scanner: str, rows: list[int], own: _Found) -> str:
+def _jitter_message(result: Result, scanner: str, rows: list[int], found: _Found) -> Phrase:
     images = np.isin(result.block.image_photos, rows)
-    sd = float(np.median(result.block.image_sd[images]))
-    lines, axis = ("columns", "rows")[own.lines], "xy"[own.axis]
-    return (
-        f"residuals in {axis} of images in nearly the same {lines} of {scanner} (within"
-        f" {own.within:.0f} px) are alike by {own.jitter:.2g} px (z = {own.z:.1f}): its lines jitter, and"
-        f" marks and images on one line err together; --set sd.images={np.hypot(sd, own.jitter):.2g} counts"
-        " it in their standard deviations, and so does sd.fiducial_images"
+    return phrase(
+        f"film-check.jitter.{('columns', 'rows')[found.lines]}",
+        scanner=scanner,
+        axis="xy"[found.axis],
+        within=found.within,
+        jitter=found.jitter,
+        z=found.z,
+        sd=float(np.hypot(np.median(result.block.image_sd[images]), found.jitter)),
     )
 
 

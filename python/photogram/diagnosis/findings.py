@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.messages import Message
 from photogram.show.page import Fact, Facts, Part, Text
 from photogram.statistics.verdict import Verdict
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.network.block import Block
@@ -20,6 +22,8 @@ __all__ = [
     "Level",
     "Section",
     "Words",
+    "finding",
+    "likely",
     "note",
     "note_all",
     "note_verdict",
@@ -30,39 +34,23 @@ Level = Literal["grave", "look"]
 
 
 def small_unit(unit: str) -> tuple[str, float]:
-    """Return the unit in which errors of images are told, and how many of it a unit of images has."""
+    """Return the unit of printed image errors, and its number in the unit of images."""
     return ("um", 1000.0) if unit == "mm" else (unit, 1.0)
 
 
 class Words:
-    """Words for any block; a program with words of its own has a class above this one.
+    """Words for any block; a program with words of its own has a subclass."""
 
-    Attributes
-    ----------
-    sense
-        What tells the sense of the angles.
-    order
-        What gives the order of the photos.
-    usual_um
-        Between which standard deviations of image coordinates are usual, micrometres; None where nothing is.
-    bandwidth
-        Whether the bandwidths of the normal equations in that order are of interest.
-    iterations
-        Whether every iteration is one of the key numbers, as in Appendix H of the guide.
-    """
+    sense: str = "`photo_to_ground`"  # Specifies the sense of the angles
+    order: str = "the photos"  # Specifies the order of the photos
+    usual_um: tuple[float, float] | None = None  # Usual standard deviations of image coordinates
+    bandwidth: bool = False  # Whether the check reports bandwidths of the normal equations
+    iterations: bool = False  # Whether each iteration is a key number, as in Appendix H of the guide
 
-    sense: str = "`photo_to_ground`"
-    order: str = "the photos"
-    usual_um: tuple[float, float] | None = None
-    bandwidth: bool = False
-    iterations: bool = False
-
-    def unhold(self, kept: Bools) -> str:
-        """Return what is done about a control point of which only some components are to be held."""
+    def remedy(self, kept: Bools) -> Phrase:
+        """Return the change of a control point, (3,) components of which remain control."""
         axes = [name for name, held in zip(("first", "second", "third"), kept.tolist(), strict=True) if held]
-        if not axes:
-            return "hold nothing of it"
-        return f"hold its {' and '.join(axes)} coordinate{'s' if len(axes) > 1 else ''} only"
+        return phrase("check.remedy.components", n=len(axes), axes=axes)
 
     def values(self, kept: Bools) -> dict[str, float]:
         """Return further figures of such a finding."""
@@ -72,12 +60,12 @@ class Words:
 
 @dataclass(frozen=True)
 class Explained:
-    """What is wrong with the control, or the observed positions, as a whole."""
+    """A mistake in all control points, or in all observed positions."""
 
-    kind: str  # In a word or two
-    text: str  # In a sentence
-    judged: Judged  # How sure it is
-    change: Callable[[Block], Block]  # Makes of the block what was meant
+    kind: str
+    message: Phrase
+    judged: Judged  # Its probability
+    change: Callable[[Block], Block]  # Corrects a block
 
 
 @dataclass(frozen=True)
@@ -96,6 +84,8 @@ class Finding:
         Identifiers of the photos and points concerned.
     values
         Its figures, the unit in the name.
+    phrase
+        The sentence as a code with fields; None if it has none.
     """
 
     kind: str
@@ -104,6 +94,7 @@ class Finding:
     photos: list[str] = field(default_factory=list)
     points: list[str] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
+    phrase: Phrase | None = None
 
 
 @dataclass
@@ -128,26 +119,54 @@ class Section:
             self.parts.append(Facts("", [fact]))
 
 
+def finding(
+    level: Level,
+    message: Phrase,
+    photos: Sequence[str] = (),
+    points: Sequence[str] = (),
+    values: dict[str, float] | None = None,
+    *,
+    kind: str = "",
+) -> Finding:
+    """Return a finding; its kind is the second part of the code of its message if none is given."""
+    kind = kind or message.code.split(".")[1]
+    return Finding(kind, level, str(message), list(photos), list(points), values or {}, message)
+
+
 def note(
     section: Section,
-    kind: str,
     level: Level,
-    text: str,
+    message: Phrase,
     photos: Sequence[str] = (),
     points: Sequence[str] = (),
     values: dict[str, float] | None = None,
 ) -> None:
-    """Add a finding to a section; see :class:`Finding`."""
-    section.findings.append(Finding(kind, level, text, list(photos), list(points), values or {}))
+    """Add a finding to a section; see :func:`finding`."""
+    section.findings.append(finding(level, message, photos, points, values=values))
 
 
-def note_all(section: Section, kind: str, level: Level, sentences: Iterable[object]) -> None:
-    """Add sentences to a section, a finding each."""
-    section.findings += [Finding(kind, level, str(each)) for each in sentences]
+def note_all(section: Section, kind: str, level: Level, messages: Sequence[Message | Phrase | str]) -> None:
+    """Add a finding for each message."""
+    for message in messages:
+        own = (
+            message.phrase
+            if isinstance(message, Message)
+            else message
+            if isinstance(message, Phrase)
+            else None
+        )
+        section.findings.append(Finding(kind, level, str(message), phrase=own))
+
+
+def likely(causes: Sequence[Phrase], effect: Phrase) -> Phrase:
+    """Return the message that one of some mistakes explains a misfit."""
+    if len(causes) == 1:
+        return phrase("mistake.likely", cause=causes[0], effect=effect)
+    return phrase("mistake.one-of", causes=list(causes), effect=effect)
 
 
 def note_verdict(section: Section, verdict: Verdict) -> None:
-    """Put what a verdict has to say on top of a section that has nothing grave."""
+    """Put the verdict on top of a section that has no grave finding."""
     if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
         level: Level = "grave" if verdict.exit else "look"
         section.findings.insert(0, Finding(verdict.code, level, verdict.headline))

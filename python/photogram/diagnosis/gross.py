@@ -10,60 +10,44 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.diagnosis.findings import Finding, Level, Section, note
+from photogram.diagnosis.findings import Finding, Level, Section, finding, note
 from photogram.diagnosis.robust import fit, mad_sd
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
 from photogram.results.result import Result
+from photogram.words import phrase
 
-BAD_PHOTO = 4.0
-"""A photo is bad when its median residual is so many times that of the median photo, ..."""
+BAD_PHOTO = 4.0  # A photo is bad when its median residual is so many times that of the median photo,
 BAD_PHOTO_SD = 4.3
 """... and stands out among all photos by so many robust standard deviations (of the logarithm)."""
-BREAK = 10.0
-"""A break in the pattern: so many robust standard deviations from what its photo suggests."""
-FLAGRANT = 24.0
-"""A break so large that it is grave though no single image explains it."""
-CHANCE = 2.0
-"""A break so many times the least one is grave with three rays too."""
+BREAK = 10.0  # A break in the pattern: so many robust standard deviations from what its photo suggests
+FLAGRANT = 24.0  # A break so large that it is grave though no single image explains it
+CHANCE = 2.0  # A break so many times the least one is grave with three rays too
 EXPLAINED = 0.35
 """Leaving out one ray, or exchanging two names, explains a point when so much is left of its residuals."""
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences that stand out by so many robust standard deviations."""
-FEWEST_CONTROL = 4
-"""Control points that a comparison needs."""
+FEWEST_CONTROL = 4  # Control points that a comparison needs
 FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
 """So many gross errors, and such a part of its images, condemn a photo as a whole."""
-CANDIDATES = 5
-"""Photos with the largest residuals that are left out on trial."""
+CANDIDATES = 5  # Photos with the largest residuals that are left out on trial
 IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
 """Findings on images, which the adjusted stations may disprove."""
 PARTED, FEWEST_OF_TWO = 0.1, 2
 """One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
-AS_WELL = 3.0
-"""And so many times less than leaving out one ray leaves."""
+AS_WELL = 3.0  # And so many times less than leaving out one ray leaves
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
-    """What the adjustment may have to do without.
+    """Observations that the adjustment may have to leave out."""
 
-    Attributes
-    ----------
-    images
-        (m,) gross errors.
-    photos
-        (P,) bad photos.
-    control
-        (n,) control points far from where their rays meet.
-    """
-
-    images: Bools
-    photos: Bools
-    control: Bools
+    images: Bools  # (m,) gross errors
+    photos: Bools  # (P,) bad photos
+    control: Bools  # (n,) control points far from the intersections of their rays
 
 
 def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
@@ -81,12 +65,8 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
         # One mistake, not one for each of its points.
         photos[photo] = True
         name, count = block.photo_ids[photo], int((rays.used & (block.image_photos == photo)).sum())
-        text = (
-            f"photo {name} does not fit the others: of its {count} points most that other photos check miss"
-            " their rays; look at its station (position, angles), the preprocessing of its plate, and whether"
-            " the points under its name are its own"
-        )
-        note(section, "bad-photo", "grave", text, [name], [], {"points": float(count)})
+        message = phrase("check.bad-photo.points", photo=name, n=count)
+        note(section, "grave", message, [name], values={"points": float(count)})
         rays = rays.without(block.image_photos == photo)
         findings, images = _broken(rays)
     section.findings += findings
@@ -95,22 +75,10 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
 
 
 def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
-    """Tell which suspected images do not break the pattern any more when seen from the adjusted stations.
+    """Return (m,) suspected images of :func:`gross` that fit the pattern from the adjusted stations.
 
-    A station far off spoils the intersections of its neighbours, so that good images look wrong beside it.
-
-    Parameters
-    ----------
-    block
-        The block as :func:`gross` had it.
-    suspects
-        What it found.
-    adjusted
-        The adjustment without the suspected images; a converged one.
-
-    Returns
-    -------
-    (m,) images of `block`; none of photos that are not in the adjustment.
+    A wrong station spoils the intersections of its neighbours, so that good images seem wrong. `adjusted` is
+    a converged adjustment without the suspected images; photos that it lacks have no image in the return.
     """
     number = {name: index for index, name in enumerate(adjusted.block.photo_ids)}
     index = np.array([number.get(name, -1) for name in block.photo_ids])
@@ -140,9 +108,9 @@ def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
     block = rays.block
     number = {name: index for index, name in enumerate(block.photo_ids)}
     shares = np.zeros(len(number))
-    for finding in findings:
-        for name in finding.photos:
-            shares[number[name]] += len(finding.points) / len(finding.photos)
+    for error in findings:
+        for name in error.photos:
+            shares[number[name]] += len(error.points) / len(error.photos)
     images = np.bincount(block.image_photos[rays.used], minlength=len(number))
     overrun = (shares >= FEWEST_ERRORS) & (shares > ERRORS_OF_PHOTO * images)
     return int(np.argmax(np.where(overrun, shares / np.maximum(images, 1), 0))) if overrun.any() else None
@@ -165,14 +133,10 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             break
         photo, usual, rays = worst
         bad[photo] = True
-        name, size = block.photo_ids[photo], float(medians[photo])
-        text = (
-            f"photo {name} does not fit the others: median residual {size:.3f} {rays.unit} against"
-            f" {usual:.3f} {rays.unit} without it; look at its station (position, angles), the preprocessing"
-            " of its plate, and whether the points under its name are its own"
-        )
-        values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
-        note(section, "bad-photo", "grave", text, [name], [], values)
+        name, size, unit = block.photo_ids[photo], float(medians[photo]), rays.unit
+        message = phrase("check.bad-photo.residuals", photo=name, residual=size, others=usual, unit=unit)
+        values = {f"median_residual_{unit}": size, "times_usual": size / usual}
+        note(section, "grave", message, [name], values=values)
     return rays, bad
 
 
@@ -224,9 +188,9 @@ def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
         if point in exchanged:
             gross[rows[np.isin(block.image_photos[rows], exchanged[point])]] = True
             continue
-        finding, wrong = _explained(solver, point, rows, float(departure[rows].max()))
-        findings.append(finding)
-        if finding.level == "grave":
+        explained, wrong = _explained(solver, point, rows, float(departure[rows].max()))
+        findings.append(explained)
+        if explained.level == "grave":
             gross[wrong] = True
     return findings, gross
 
@@ -238,36 +202,24 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
     unit = solver.rays.unit
     name, values = block.point_ids[point], {f"residual_{unit}": before, "departure_sd": departure}
+    photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
+    fields = {"point": name, "before": before, "unit": unit}
     parted = _parted(solver, point, rows, before) if len(rows) >= 2 * FEWEST_OF_TWO else None
     if parted is not None and min(left) > AS_WELL * parted[2]:
-        one, other = (
-            " and ".join(block.photo_ids[photo] for photo in block.image_photos[each].tolist())
-            for each in parted[:2]
+        first, second = (
+            [block.photo_ids[photo] for photo in block.image_photos[group].tolist()] for group in parted[:2]
         )
-        photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-        text = (
-            f"the name {name} stands for two points: its rays of the photos {one} meet, and those of"
-            f" the photos {other}, but not with each other (they miss by {before:.3f} {unit})"
-        )
-        return Finding("name-used-twice", "grave", text, photos, [name], values), rows
+        message = phrase("check.name-used-twice", **fields, first=first, second=second)
+        return finding("grave", message, photos, [name], values=values), rows
     if left and min(left) < EXPLAINED * before:
-        row = rows[[int(np.argmin(left))]]
-        photo = block.photo_ids[int(block.image_photos[row[0]])]
-        text = (
-            f"point {name} on photo {photo} is wrong: without this image its other rays meet to"
-            f" {min(left):.3f} {unit}, with it to {before:.3f} {unit}; misidentified, misnamed or"
-            " misrecorded?"
-        )
+        place = int(np.argmin(left))
+        message = phrase("check.gross-error.one", **fields, photo=photos[place], after=min(left))
         # Any two of three rays may meet by chance: a small break is no proof against the third.
         proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
-        return Finding("gross-error", proof, text, [photo], [name], values), row
-    photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-    text = (
-        f"point {name} does not fit (its rays miss by {before:.3f} {unit}), on one of the photos"
-        f" {', '.join(photos)}: misidentified, or one name for two points?"
-    )
+        return finding(proof, message, [photos[place]], [name], values=values), rows[[place]]
+    message = phrase("check.gross-error.some", **fields, photos=photos)
     level: Level = "grave" if departure > FLAGRANT else "look"
-    return Finding("gross-error", level, text, photos, [name], values), rows
+    return finding(level, message, photos, [name], values=values), rows
 
 
 def _parted(
@@ -387,13 +339,9 @@ def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Findi
                 continue
             paired |= {a, b}
             names, name = [block.point_ids[a], block.point_ids[b]], block.photo_ids[photo]
-            text = (
-                f"the points {names[0]} and {names[1]} are exchanged on photo {name}:"
-                " exchanged back, they fit"
-            )
-            unit = solver.rays.unit
+            message, unit = phrase("check.exchanged-points", points=names, photo=name), solver.rays.unit
             values = {f"before_{unit}": max(before[a], before[b]), f"after_{unit}": after}
-            findings.append(Finding("exchanged-points", "grave", text, [name], names, values))
+            findings.append(finding("grave", message, [name], names, values=values))
             found.setdefault(a, []).append(photo)
             found.setdefault(b, []).append(photo)
     return findings, found
@@ -439,10 +387,7 @@ def _control_component(
     for row, size in zip(known.tolist(), sizes.tolist(), strict=True):
         if size > CONTROL_LOOK:
             point, difference = block.point_ids[control[row]], float(differences[row])
-            text = (
-                f"control point {point}: intersected minus given {name} is {difference:.3f} {unit}, far from"
-                " those of the others: wrong coordinate, wrong point, or a bad image"
-            )
+            fields = {"point": point, "axis": name, "difference": difference, "unit": unit}
             level: Level = "grave" if size > CONTROL_GRAVE else "look"
-            values = {f"difference_{name}": difference}
-            note(section, "control-difference", level, text, [], [point], values)
+            message = phrase("check.control-difference", **fields)
+            note(section, level, message, [], [point], values={f"difference_{name}": difference})

@@ -12,49 +12,35 @@ from photogram.diagnosis.regression import Regression, given_points
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
+from photogram.words import Phrase, phrase
 
-FOOT = 0.3048
-"""Metres; the survey foot differs by two millionths."""
+FOOT = 0.3048  # Metres; the survey foot differs by two millionths
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 _HALF_TURN = np.pi / 2
-_BEYOND = 1e4
-"""Radians: no angle that was meant is larger after it was turned into degrees once more."""
+_BEYOND = 1e4  # Radians: no angle that was meant is larger after it was turned into degrees once more
 
-TURNS: dict[str, tuple[list[list[float]], str]] = {
-    "y down": ([[1, 0], [0, -1]], "y of the images has the wrong sign: it is counted down, not up"),
-    "c or kappa": (
-        [[-1, 0], [0, -1]],
-        "the principal distance has the wrong sign, or kappa is wrong by 180 degrees",
-    ),
-    "mirrored": (
-        [[-1, 0], [0, 1]],
-        "x of the images has the wrong sign: the photos are mirrored, as diapositives read from behind",
-    ),
-    "exchanged": ([[0, 1], [1, 0]], "x and y of the images are exchanged"),
-    "exchanged and turned": (
-        [[0, -1], [-1, 0]],
-        "x and y of the images are exchanged, and have the wrong signs",
-    ),
-    "kappa + 90": ([[0, -1], [1, 0]], "kappa is too large by 90 degrees, or the images were turned"),
-    "kappa - 90": ([[0, 1], [-1, 0]], "kappa is too small by 90 degrees, or the images were turned"),
+TURNS: dict[str, list[list[float]]] = {
+    "y down": [[1, 0], [0, -1]],
+    "c or kappa": [[-1, 0], [0, -1]],
+    "mirrored": [[-1, 0], [0, 1]],
+    "exchanged": [[0, 1], [1, 0]],
+    "exchanged and turned": [[0, -1], [-1, 0]],
+    "kappa + 90": [[0, -1], [1, 0]],
+    "kappa - 90": [[0, 1], [-1, 0]],
 }
-"""V, observed = V predicted, and what brings it about."""
+"""V, observed = V predicted, by the name of the mistake."""
 
-PIXELS = 8.0
-"""Images so many times too large, or more, are in another unit; less is a principal distance."""
+PIXELS = 8.0  # Images so many times too large, or more, are in another unit; less is a principal distance
 _SCALED, _SHIFTED = 0.15, 0.25
 """A scale further from 1, a shift of a larger part of half of the format are no matter of rough poses."""
 _ALIKE = 0.05
 """Scatter of the scale over photos, relative, and of the shift, in halves of the format, at the most."""
-_CORNER = 0.5
-"""The middle of all images is further from the origin than this part of half of their extent."""
+_CORNER = 0.5  # The middle of all images is further from the origin than this part of half of their extent
 _WIDEST, _FINEST = 4.0, 10.0
 """Half of the extent of images, in principal distances, beyond which they are wider than a camera's, and what
 its inverse may be at the most,"""
-_SCALES = 60
-"""with so many steps in between."""
-_EXPLAINED = 0.2
-"""e, what a regression leaves, at the most."""
+_SCALES = 60  # with so many steps in between
+_EXPLAINED = 0.2  # e, what a regression leaves, at the most
 
 
 Change = Callable[[Block], Block]
@@ -63,7 +49,7 @@ Change = Callable[[Block], Block]
 
 def turn_of(name: str) -> Floats:
     """(2, 2) V of one of the turns."""
-    return np.array(TURNS[name][0], dtype=np.float64)
+    return np.array(TURNS[name], dtype=np.float64)
 
 
 def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
@@ -74,27 +60,27 @@ def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A mistake that may have been made."""
+    """A possible mistake."""
 
-    name: str  # In a word or two
-    text: str  # In a sentence, without its full stop
-    change: Change  # Makes of a block, or of a part of its photos, what was meant
-    # Whether that is exactly what was meant: a size of pixels and an origin are only known about
-    exact: bool = True
+    name: str
+    message: Phrase
+    change: Change  # Corrects a block, or a part of its photos
+    exact: bool = True  # False if the corrected values, such as the pixel size, are approximate
 
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
-    """Propose mistakes for a block; `seen` says how its images and their predictions differ."""
+    """Propose mistakes for a block; `seen` compares its images with their predictions."""
     every = np.ones(len(block.photo_ids), dtype=bool)
-    for name, (_, text) in TURNS.items():
-        yield Hypothesis(name, text, partial(images_turned, photos=every, turn=turn_of(name)))
+    for name in TURNS:
+        change = partial(images_turned, photos=every, turn=turn_of(name))
+        yield Hypothesis(name, phrase(f"mistake.{name}"), change)
     composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed
     else:
         yield from _of_format(block)
-    for name, (text, _) in attitude_readings(block).items():
-        yield Hypothesis(name, text, partial(read_as, name=name))
+    for name, (message, _) in attitude_readings(block).items():
+        yield Hypothesis(name, message, partial(read_as, name=name))
     yield from _positions(block)
 
 
@@ -122,31 +108,20 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
     names, parts = [], []
     if scaled and max(scale, 1 / scale) >= PIXELS:
         names.append("unit")
-        parts.append(
-            f"images are {scale:.4g} times too large for the principal distance: pixels given for millimetres"
-            f" (of {1 / scale:.4g} mm)"
-            if scale > 1
-            else f"images are {1 / scale:.4g} times too small for the principal distance: another unit"
-        )
+        size = "large" if scale > 1 else "small"
+        parts.append(phrase(f"mistake.unit.{size}", times=max(scale, 1 / scale), pitch=1 / scale))
     elif scaled:
         names.append("principal distance")
-        parts.append(
-            f"the principal distance should be {scale:.4g} times the given one (another unit, or that of"
-            " another format)"
-        )
+        parts.append(phrase("mistake.principal-distance", times=scale))
     if shifted:
         names.append("origin")
-        parts.append(
-            f"images are counted from ({-shift[0]:+.4g}, {-shift[1]:+.4g}), a corner and not the middle of"
-            " the format"
-        )
-    for name, (matrix, text) in TURNS.items():
+        parts.append(phrase("mistake.origin", x=-float(shift[0]), y=-float(shift[1])))
+    for name, matrix in TURNS.items():
         if np.array_equal(turn, matrix):
             names.append(name)
-            parts.append(text)
-    return Hypothesis(
-        ", ".join(names), "; ".join(parts), partial(_of_images, shift=back, linear=linear), exact=False
-    )
+            parts.append(phrase(f"mistake.{name}"))
+    change = partial(_of_images, shift=back, linear=linear)
+    return Hypothesis(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
 
 
 def _of_format(block: Block) -> Iterator[Hypothesis]:
@@ -161,66 +136,50 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
     if pixels:
         scales = np.geomspace(half / (_WIDEST * distance), _FINEST * half / distance, _SCALES)
     shift = middle if corner else np.zeros(2)
-    for turn, sense in (([1.0, 1.0], ""), ([1.0, -1.0], ", and y is counted down, not up")):
-        names = ["unit"] * pixels + ["origin"] * corner + ["y down"] * bool(sense)
-        where = "a corner and not the middle of the format"
+    for down in (False, True):
+        names = [name for name, holds in (("unit", pixels), ("origin", corner), ("y down", down)) if holds]
         for scale in scales.tolist():
-            unit = f"images are pixels (of about {1 / scale:.2g} mm)" if pixels else "images are"
-            counted = f"{', ' if pixels else ' '}counted from {where}" if corner else ""
-            text = unit + counted + sense
-            linear = np.diag(turn) / scale
+            parts = [phrase(f"mistake.format.{name}", pitch=1 / scale) for name in names]
+            linear = np.diag([1.0, -1.0 if down else 1.0]) / scale
             change = partial(_of_images, shift=shift, linear=linear)
-            yield Hypothesis(", ".join(names), text, change, exact=False)
+            yield Hypothesis(", ".join(names), phrase("mistake.images", parts=parts), change, exact=False)
 
 
-def attitude_readings(block: Block) -> dict[str, tuple[str, Floats]]:
-    """(P, 3, 3) attitudes, photo to object, by rival readings of the same three numbers, with their texts."""
-    numbers = block.photo_attitudes
-    own: Representation = "omega_phi_kappa"
-    other: Representation = "omega_phi_kappa_photo_to_ground"
-    meant, said = "photo-to-ground", "ground-to-photo"
-    if block.photo_to_ground:
-        own, other, meant, said = other, own, said, meant
-
-    def read(representation: Representation, values: Floats) -> Floats:
-        return Attitudes.of(representation, values).matrices
-
-    flipped = numbers * [1.0, -1.0, 1.0]
-    found = {
-        "radians for degrees": (
-            "angles were given in radians and read as degrees",
-            read(own, np.degrees(numbers)),
-        ),
-        "degrees for radians": (
-            "angles were given in degrees and read as radians",
-            read(own, np.radians(numbers)),
-        ),
-        "gon": ("angles were given in gon and read as degrees", read(own, 0.9 * numbers)),
-        "sense": (f"angles are {meant}, not {said}", read(other, numbers)),
-        "phi-omega-kappa": (
-            "the angles omega, phi, kappa are those of phi-omega-kappa (phi primary)",
-            read("phi_omega_kappa", numbers[:, [1, 0, 2]]),
-        ),
-        "sign of phi": ("phi has the wrong sign", read(own, flipped)),
-        "sign of kappa": ("kappa has the wrong sign, as yaw has", read(own, numbers * [1.0, 1.0, -1.0])),
+def attitude_readings(block: Block) -> dict[str, tuple[Phrase, Floats]]:
+    """(P, 3, 3) attitudes, photo to object, by other readings of the same numbers, with the mistakes."""
+    angles = block.photo_attitudes
+    ground: Representation = "omega_phi_kappa"
+    photo: Representation = "omega_phi_kappa_photo_to_ground"
+    form, other = (photo, ground) if block.photo_to_ground else (ground, photo)
+    phi_primary: Representation = "phi_omega_kappa"
+    values: dict[str, tuple[Representation, Floats]] = {
+        "radians for degrees": (form, np.degrees(angles)),
+        "degrees for radians": (form, np.radians(angles)),
+        "gon": (form, 0.9 * angles),
+        "sense": (other, angles),
+        "phi-omega-kappa": (phi_primary, angles[:, [1, 0, 2]]),
+        "sign of phi": (form, angles * [1.0, -1.0, 1.0]),
+        "sign of kappa": (form, angles * [1.0, 1.0, -1.0]),
     }
-    matrices = read(own, numbers)
-    found |= quaternion_readings(matrices)
-    if np.abs(numbers).max() > _BEYOND:
-        del found["radians for degrees"]
-    return found
+    if np.abs(angles).max() > _BEYOND:
+        del values["radians for degrees"]
+    found = {
+        name: (phrase(f"mistake.{name}"), Attitudes.of(*representation).matrices)
+        for name, representation in values.items()
+    }
+    return found | quaternion_readings(Attitudes.of(form, angles).matrices)
 
 
-def quaternion_readings(matrices: Floats) -> dict[str, tuple[str, Floats]]:
-    """(P, 3, 3) attitudes by the numbers of their quaternions in rival orders, with their texts, by names."""
+def quaternion_readings(matrices: Floats) -> dict[str, tuple[Phrase, Floats]]:
+    """(P, 3, 3) attitudes by the numbers of their quaternions in other orders, with the mistakes."""
     found = {}
     forms: tuple[Representation, ...] = ("quaternion", "quaternion_to_vision")
     for form in forms:
         known = Attitudes(matrices).values(form)
-        for given, said, order in (("x, y, z, w", "w, x, y, z", -1), ("w, x, y, z", "x, y, z, w", 1)):
+        for order, other, step in (("x, y, z, w", "w, x, y, z", -1), ("w, x, y, z", "x, y, z, w", 1)):
             # The numbers as they were read, then as they were meant: both have length 1.
-            text = f"quaternions were given in the order {given} and read as {said}"
-            found[f"{form} {given}"] = text, Attitudes.of(form, np.roll(known, -order, axis=1)).matrices
+            message = phrase("mistake.quaternions", order=order, other=other)
+            found[f"{form} {order}"] = message, Attitudes.of(form, np.roll(known, -step, axis=1)).matrices
     return found
 
 
@@ -231,16 +190,14 @@ def read_as(block: Block, name: str) -> Block:
     return block.replace(photo_attitudes=Attitudes(matrices).values(form))
 
 
-def _scaled(block: Block, photos: Floats | None = None, points: Floats | None = None) -> Block:
-    """Return a block with the axes of its positions scaled."""
-    if points is not None:
-        return block.replace(point_positions=block.point_positions * points)
+def _scaled(block: Block, factors: Floats, *, points: bool) -> Block:
+    """Return a block with the axes of the positions of points or photos scaled."""
+    if points:
+        return block.replace(point_positions=block.point_positions * factors)
     observed = block.photo_positions_observed
-    if photos is None:
-        return block
     return block.replace(
-        photo_positions=block.photo_positions * photos,
-        photo_positions_observed=None if observed is None else observed * photos,
+        photo_positions=block.photo_positions * factors,
+        photo_positions_observed=None if observed is None else observed * factors,
     )
 
 
@@ -268,44 +225,31 @@ def _centres(block: Block, axes: Floats) -> Block:
 def _positions(block: Block) -> Iterator[Hypothesis]:
     known = bool(given_points(block).any())
     geographic = block.spheroid is not None
-    for what, own in (("photos", True), ("points", False)):
-        if not (own or known):
-            continue
-        others = "points" if own else "photos"
+    for what in ("photos", "points") if known else ("photos",):
         # Several at once, then single axes.
-        for name, axes, text in (
-            (f"feet in heights of {what}", (2,), f"heights of the {what} are in feet, all else in metres"),
-            (
-                f"feet in positions of {what}" if own else "feet in points",
-                (0, 1, 2),
-                f"positions of the {what} are in feet, those of the {others} in metres"
-                f" (in {block.linear_unit} here)",
-            ),
-            (f"feet in X of {what}", (0,), f"X of the {what} are in feet, all else in metres"),
-            (f"feet in Y of {what}", (1,), f"Y of the {what} are in feet, all else in metres"),
-        ):
+        for part, axes in (("heights", (2,)), ("positions", (0, 1, 2)), ("X", (0,)), ("Y", (1,))):
             if not geographic or axes == (2,):
-                factor: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
-                change = partial(_scaled, photos=factor) if own else partial(_scaled, points=factor)
-                yield Hypothesis(name, text, change)
+                factors: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
+                message = phrase(f"mistake.feet.{what}", part=part, unit=block.linear_unit)
+                change = partial(_scaled, factors=factors, points=what == "points")
+                yield Hypothesis(f"feet in {part} of {what}", message, change)
     if geographic:
         yield from _geographic(block)
         return
-    yield Hypothesis(
-        "X and Y of photos", "X and Y of the photos are exchanged", partial(_exchanged, points=False)
-    )
+    yield _exchange("X and Y of photos", points=False)
     # R = F A' in the axes of computer vision, A' in those of the photo
-    for said, of_axes in (("x right, y down, z forward", _TO_VISION), ("x right, y up, z back", np.eye(3))):
-        yield Hypothesis(
-            "t for C",
-            f"positions of the photos are translations t of x = R X + t ({said}), not projection centres"
-            " C = -R't",
-            partial(_centres, axes=of_axes),
-        )
+    for axes_of_t, matrix in (
+        ("x right, y down, z forward", _TO_VISION),
+        ("x right, y up, z back", np.eye(3)),
+    ):
+        message = phrase("mistake.translations", axes=axes_of_t)
+        yield Hypothesis("t for C", message, partial(_centres, axes=matrix))
     if known:
-        yield Hypothesis(
-            "X and Y of points", "X and Y of the points are exchanged", partial(_exchanged, points=True)
-        )
+        yield _exchange("X and Y of points", points=True)
+
+
+def _exchange(name: str, *, points: bool) -> Hypothesis:
+    return Hypothesis(name, phrase("mistake.exchanged-axes", axes=name), partial(_exchanged, points=points))
 
 
 def _to_photo(block: Block) -> Floats:
@@ -318,6 +262,4 @@ def _to_photo(block: Block) -> Floats:
 def _geographic(block: Block) -> Iterator[Hypothesis]:
     for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
         if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
-            text = f"longitude and latitude of the {what} are exchanged"
-            change = partial(_exchanged, points=what == "points")
-            yield Hypothesis(f"longitude and latitude of {what}", text, change)
+            yield _exchange(f"longitude and latitude of {what}", points=what == "points")

@@ -6,16 +6,15 @@ import math
 from collections.abc import Collection
 
 from photogram.diagnosis.editing import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, note, small_unit
+from photogram.diagnosis.findings import Finding, Level, Section, Words, finding, note, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
 from photogram.statistics.evidence import WITHHELD, Evidence
-from photogram.words import Phrase
+from photogram.words import phrase
 
-VARIANCE = (0.5, 2.0)
-"""Variance of unit weight between which the weights count as realistic."""
+VARIANCE = (0.5, 2.0)  # Variance of unit weight between which the weights count as realistic
 
 
 def key_numbers(edited: Edited, words: Words) -> Section:
@@ -27,7 +26,7 @@ def key_numbers(edited: Edited, words: Words) -> Section:
     first, last = edited.first, edited.last
     if first is None or last is None:
         level: Level = "grave" if edited.asked else "look"
-        note(section, "no-adjustment", level, f"no adjustment: {edited.reason}")
+        note(section, level, phrase("check.no-adjustment", reason=edited.reason))
         return section
     _statuses(first, last, section)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]
@@ -45,7 +44,6 @@ def key_numbers(edited: Edited, words: Words) -> Section:
 
 
 def _squares(last: Result, words: Words, section: Section) -> None:
-    """Say what the iterations have made of the sum of squares."""
     title = "weighted sum of squares"
     initial = last.initial_weighted_sum_of_squares
     after = [each.weighted_sum_of_squares for each in last.iterations]
@@ -60,23 +58,18 @@ def _squares(last: Result, words: Words, section: Section) -> None:
 def _statuses(first: Result, last: Result, section: Section) -> None:
     section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
     if not last.converged:
-        text = f"the adjustment has {last.status}: the data are bad or the geometry is weak"
-        note(section, "not-converged", "grave", text)
+        note(section, "grave", phrase("check.not-converged.last", status=last.status))
     elif not first.converged:
-        text = f"with the observations named above the adjustment has {first.status}"
-        note(section, "not-converged", "look", text)
+        note(section, "look", phrase("check.not-converged.first", status=first.status))
 
 
 def _variance(result: Result, section: Section) -> None:
     variance = result.variance_of_unit_weight
     if variance is None:
-        note(section, "no-redundancy", "grave", "there are no degrees of freedom")
+        note(section, "grave", phrase("check.no-redundancy"))
     elif not VARIANCE[0] < variance < VARIANCE[1] and result.unit_variance != "unity":
-        text = (
-            f"the variance of unit weight is {variance:.3f}: if no gross or systematic error is left, the"
-            f" standard deviations should be {math.sqrt(variance):.2f} times what they are"
-        )
-        note(section, "weights", "look", text, values={"variance_of_unit_weight": variance})
+        message = phrase("check.weights.variance", variance=variance, factor=math.sqrt(variance))
+        note(section, "look", message, values={"variance_of_unit_weight": variance})
 
 
 def _between(low: str, high: str, unit: str) -> str:
@@ -95,11 +88,8 @@ def _weights(result: Result, words: Words, section: Section) -> None:
     )
     usual = words.usual_um
     if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
-        text = (
-            f"standard deviations of image coordinates are usually {usual[0]:g} to {usual[1]:g} um:"
-            " are these meant?"
-        )
-        note(section, "weights", "look", text, values={"least_um": low, "largest_um": high})
+        message = phrase("check.weights.usual", low=low, high=high, least=usual[0], most=usual[1])
+        note(section, "look", message, values={"least_um": low, "largest_um": high})
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
@@ -111,11 +101,8 @@ def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
             continue
         rows = block.image_points == block.point_ids.index(point)
         photos = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-        text = (
-            f"point {point} is left out: {HARMFUL[reason]}; it is misidentified or misnamed on one of the"
-            f" photos {', '.join(photos)}"
-        )
-        found.append(Finding("point-left-out", "grave", text, photos, [point]))
+        message = phrase("check.point-left-out", point=point, reason=HARMFUL[reason], photos=photos)
+        found.append(finding("grave", message, photos, [point]))
     return found
 
 
@@ -129,11 +116,8 @@ def held_values(result: Result) -> list[Finding]:
         return []
     value, of = least.value, least.subject.fields["named"].fields
     photos, points = ([of[kind]] if kind in of else [] for kind in ("photo", "point"))
-    text = (
-        f"{least.subject}, does not fit: were it free, the sum of squares would fall by {value:.4g}, more"
-        " than by any observation; give it a standard deviation"
-    )
-    return [Finding("held-value", "grave", text, photos, points, {"statistic": value})]
+    message = phrase("check.held-value", subject=least.subject, value=value)
+    return [finding("grave", message, photos, points, values={"statistic": value})]
 
 
 def disagreeing(result: Result) -> list[Finding]:
@@ -142,6 +126,5 @@ def disagreeing(result: Result) -> list[Finding]:
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:
         if points := evidence.disagreement(limit):
-            message = Phrase("verdict.check-points", {"points": points})
-            return [Finding("check-points", level, f"{str(message)[:1].lower()}{str(message)[1:]}")]
+            return [finding(level, phrase("verdict.check-points", values={"points": points}))]
     return []

@@ -10,19 +10,18 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.diagnosis.adjusting import Adjuster, put_right
-from photogram.diagnosis.findings import Finding
+from photogram.diagnosis.findings import Finding, finding, likely
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.wider_models import calibrated, calibration_words, freed
 from photogram.results.result import Result
 from photogram.statistics.evidence import Evidence
+from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
-PITCH = (1e-3, 3e-2)
-"""Sizes of a pixel that cameras have, millimetres."""
-HALF, NEARLY = 0.5, 0.1
-"""Pixels."""
+PITCH = (1e-3, 3e-2)  # Sizes of a pixel that cameras have, millimetres
+HALF, NEARLY = 0.5, 0.1  # Pixels
 
 
 def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
@@ -41,10 +40,10 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     found = put_right(first, _hypotheses(block, adjusted), adjusted)
     if found is None:
         return block
-    text, changed, verdict = found
+    cause, changed, verdict = found
     values = {"likelihood_ratio": verdict.likelihood, "times_smaller": verdict.fall}
-    said = f"probably {text}: residuals would be {verdict.fall:.3g} times smaller"
-    findings.append(Finding("lens", "grave", said, values=values))
+    message = likely([cause], phrase("mistake.residuals", times=verdict.fall))
+    findings.append(finding("grave", message, kind="lens", values=values))
     return changed
 
 
@@ -65,8 +64,8 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
         return block
     times = first.global_test.factor / result.global_test.factor
     largest = max((each for each in found.systematic if each.large), key=lambda each: each.fall)
-    text = f"{largest.sentence}; {found.calibrate} estimates it: residuals would be {times:.3g} times smaller"
-    findings.append(Finding("lens", "grave", text, values={"times_smaller": times}))
+    fields = {"pattern": largest.sentence, "calibrate": found.calibrate, "times": times}
+    findings.append(finding("grave", phrase("check.lens", **fields), values={"times_smaller": times}))
     return block.replace(cameras=[each.restarted() for each in result.cameras])
 
 
@@ -80,30 +79,19 @@ def _given_terms(camera: Camera) -> dict[str, int]:
     }
 
 
-def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[str, Block]]:
-    """Return what may be wrong with the radial terms of all cameras, and the block that was meant."""
-    yield "the radial terms of the lens have the wrong sign", _scaled(block, [-1.0] * len(block.cameras), 0)
+def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[Phrase, Block]]:
+    """Yield possible mistakes in the radial terms of all cameras, and the block without them."""
     scales = [camera.scale for camera in block.cameras]
-    yield (
-        "the radial terms of the lens are those of coordinates divided by the principal distance",
-        _scaled(block, [1 / each for each in scales], 2),
-    )
-    yield (
-        f"the radial terms of the lens are those of coordinates in {block.image_unit}, and are taken for"
-        " those of coordinates divided by the principal distance",
-        _scaled(block, scales, 2),
-    )
+    yield phrase("mistake.lens.sign"), _scaled(block, [-1.0] * len(scales), 0)
+    yield phrase("mistake.lens.divided"), _scaled(block, [1 / scale for scale in scales], 2)
+    yield phrase("mistake.lens.measured", unit=block.image_unit), _scaled(block, scales, 2)
     ratio = _free_ratio(block, adjusted)
     if ratio > 0:
         factor = math.sqrt(ratio)
         pitch = factor if block.image_unit == "px" else 1 / factor
         if PITCH[0] < pitch < PITCH[1]:
-            what = "millimetres" if block.image_unit == "px" else "pixels"
-            yield (
-                f"the radial terms of the lens are those of coordinates in {what} (a pixel of about"
-                f" {pitch:.3g} mm)",
-                _scaled(block, [factor] * len(block.cameras), 2),
-            )
+            code = "mistake.lens.mm" if block.image_unit == "px" else "mistake.lens.px"
+            yield phrase(code, pitch=pitch), _scaled(block, [factor] * len(scales), 2)
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:
@@ -158,10 +146,7 @@ def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
         if (np.abs(np.abs(changes) - HALF) < NEARLY).all() and (
             np.abs(changes) > SIGNIFICANT * deviations
         ).all():
-            text = (
-                f"the principal point of {block.camera_names[row]} is half a pixel off ({changes[0]:+.2f},"
-                f" {changes[1]:+.2f} px): are pixels counted from their middle or from their edge?"
-            )
-            values = {"cx_px": float(changes[0]), "cy_px": float(changes[1])}
-            findings.append(Finding("half-pixel", "look", text, values=values))
+            x, y = changes.tolist()
+            message = phrase("check.half-pixel", camera=block.camera_names[row], x=x, y=y)
+            findings.append(finding("look", message, values={"cx_px": x, "cy_px": y}))
     return findings

@@ -22,15 +22,12 @@ from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
 
-CENTRES = 3
-"""Photos around which names are looked at."""
-AROUND, SHARED = 24, 3
-"""Photos around one, at the most; they share so many points with it, at the least."""
+CENTRES = 3  # Photos around which names are looked at
+AROUND, SHARED = 24, 3  # Photos around one, at the most; they share so many points with it, at the least
 MOST_IMAGES, EACH = 4000, 40
 """Images of these photos up to which all take part; of more, those of so many points of each photo with the
 worst images, and of as many with the most images: to orient them by all takes longer than the adjustment."""
-MEDIAN_OF_LARGER = 1.05
-"""Of the larger of two absolute normal variables."""
+MEDIAN_OF_LARGER = 1.05  # Of the larger of two absolute normal variables
 
 
 def with_exchanges(result: Result) -> Result:

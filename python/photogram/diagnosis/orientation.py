@@ -5,34 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.findings import Finding, Section, Words
+from photogram.diagnosis.findings import Finding, Section, Words, finding
 from photogram.diagnosis.hypotheses import images_turned, turn_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
+from photogram.words import Phrase, phrase
 
 SUSPICIOUS = 0.25
 """Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
-BETTER = 0.5
-"""An explanation must lower the cost to this part of what it was."""
+BETTER = 0.5  # An explanation must lower the cost to this part of what it was
 UPRIGHT = 0.8
 """Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
-AS_GOOD = 1.5
-"""Another explanation is as good when its cost is below so many times the least."""
-MOST = 20
-"""Photos that are turned one by one, at most."""
-TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
-MIRRORS = {
-    "x has the wrong sign": turn_of("mirrored"),
-    "y has the wrong sign": turn_of("y down"),
-    "x and y are exchanged": turn_of("exchanged"),
-    "x and y are exchanged, with wrong signs": turn_of("exchanged and turned"),
-}
-"""The four reflections that keep a frame in place, by what brings them about."""
+AS_GOOD = 1.5  # Another explanation is as good when its cost is below so many times the least
+MOST = 20  # Photos that are turned one by one, at most
+TURNS = (180, 90, -90)  # Degrees of kappa
+MIRRORS = {name: turn_of(name) for name in ("mirrored", "y down", "exchanged", "exchanged and turned")}
+"""The four reflections that keep a frame in place, by their cause."""
 
 
 def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, Block]:
@@ -61,12 +55,9 @@ def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, 
     met_after = met if block is rays.block else after.intersect()
     cost = _mean(_costs(after, met_after))
     if cost > SUSPICIOUS:
-        text = (
-            "the rays miss each other, and neither the sign of the principal distance, nor kappa, nor the"
-            f" sense of the angles ({words.sense}), nor mirrored plates explain it: look at positions,"
-            " angles, names of photos and points"
+        explanations.append(
+            finding("grave", phrase("check.rays-do-not-meet", sense=words.sense), values={"cost": cost})
         )
-        explanations.append(Finding("rays-do-not-meet", "grave", text, values={"cost": cost}))
     section.findings += _unexplained(above, explanations, whole, block) + explanations
     known = np.isfinite(met.sizes)
     behind = int((known & ~met.in_front).sum())
@@ -102,12 +93,9 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
     for point, row in zip(points.tolist(), rows[first].tolist(), strict=True):
         name, photo = block.point_ids[point], block.photo_ids[block.image_photos[row]]
         above = float(heights[row] - stations[row])
-        text = (
-            f"control point {name} is computed {above:.0f} {block.linear_unit} above the camera of photo"
-            f" {photo}: sign of the principal distance? (positive plane: negative; negative plane: positive)"
-            " else kappa?"
-        )
-        findings.append(Finding("control-above-camera", "grave", text, [photo], [name], {"above": above}))
+        fields = {"point": name, "photo": photo, "above": above, "unit": block.linear_unit}
+        message = phrase("check.control-above-camera", **fields)
+        findings.append(finding("grave", message, [photo], [name], values={"above": above}))
     return findings
 
 
@@ -178,9 +166,10 @@ def _photo_costs(block: Block, costs: Floats) -> Floats:
     return np.where(images > 0, sums / np.maximum(images, 1), np.nan)
 
 
-def _turned(block: Block, photos: Bools, angle: float) -> Block:
+def _turned(block: Block, photos: Bools, turn: int) -> Block:
+    """Return a block with kappa of some photos increased by degrees."""
     attitudes = block.photo_attitudes.copy()
-    attitudes[photos, 2] += angle
+    attitudes[photos, 2] += math.radians(turn)
     return block.replace(photo_attitudes=attitudes)
 
 
@@ -198,15 +187,13 @@ def _whole_block(block: Block, before: float, words: Words, explanations: list[F
     best = trials[int(np.argmin(costs))]
     if min(costs) > BETTER * before:
         return block
-    values = {"cost_before": before, "cost_after": min(costs)}
-    others = [
-        other.kind.replace("-", " ")
-        for other, cost in zip(trials, costs, strict=True)
-        if other is not best and cost < AS_GOOD * min(costs)
-    ]
-    others = [other for other in dict.fromkeys(others) if other != best.kind.replace("-", " ")]
-    text = best.text + (f" Nearly as good: {', '.join(others)}" if others else "")
-    explanations.append(Finding(best.kind, "grave", text, best.photos, [], values))
+    good = (other.kind for other, cost in zip(trials, costs, strict=True) if cost < AS_GOOD * min(costs))
+    rivals = [phrase(f"mistake.kind.{kind}") for kind in dict.fromkeys(good) if kind != best.kind]
+    also = phrase("check.rivals", rivals=rivals) if rivals else ""
+    message = Phrase(best.message.code, {**best.message.fields, "rivals": also})
+    explanations.append(
+        finding("grave", message, best.photos, values={"cost_before": before, "cost_after": min(costs)}),
+    )
     return best.block
 
 
@@ -214,36 +201,36 @@ def _whole_block(block: Block, before: float, words: Words, explanations: list[F
 class _Trial:
     """One explanation for many photos."""
 
-    kind: str
-    text: str
+    message: Phrase
     photos: list[str]
     block: Block
+
+    @property
+    def kind(self) -> str:
+        return self.message.code.split(".")[1]
 
 
 def _trials(block: Block, words: Words) -> list[_Trial]:
     """Explanations to try; of equally good ones the first counts, and the sign is the most probable."""
-    groups = {"all photos": np.ones(len(block.photo_ids), dtype=bool)}
+    groups = {phrase("group.all-photos"): np.ones(len(block.photo_ids), dtype=bool)}
     of_photos = block.known_distances("checks")
     distances = np.unique(of_photos).tolist()
     for value in distances if len(distances) > 1 else []:
-        groups[f"the photos of principal distance {value:g} mm"] = of_photos == value
+        groups[phrase("group.distance", distance=value)] = of_photos == value
     trials = []
-    for name, photos in groups.items():
+    for group, photos in groups.items():
         names = [photo for photo, of in zip(block.photo_ids, photos.tolist(), strict=True) if of]
-        text = (
-            f"the sign of the principal distance of {name} is wrong: with the other sign the rays meet in"
-            " front of the cameras. (Kappa turned by 180 degrees on every one of them would do the same.)"
-        )
-        trials.append(_Trial("sign-of-principal-distance", text, names, _sign_changed(block, photos)))
-        for turn in ("by 90 degrees", "by -90 degrees"):
-            text = f"the kappa of {name} is wrong: turned {turn}, the rays meet."
-            trials.append(_Trial("kappa", text, names, _turned(block, photos, TURNS[turn])))
-        for what, mirror in MIRRORS.items():
-            text = f"the plates of {name} are mirrored: {what}; put right, the rays meet."
-            trials.append(_Trial("mirrored", text, names, images_turned(block, photos, mirror)))
-    text = f"the angles are of the other sense ({words.sense}): taken so, the rays meet."
+        sign = phrase("check.sign-of-principal-distance", group=group)
+        trials.append(_Trial(sign, names, _sign_changed(block, photos)))
+        for turn in TURNS[1:]:
+            message = phrase("check.kappa.group", group=group, turn=turn)
+            trials.append(_Trial(message, names, _turned(block, photos, turn)))
+        for name, mirror in MIRRORS.items():
+            message = phrase("check.mirrored.group", group=group, cause=phrase(f"mirror.{name}"))
+            trials.append(_Trial(message, names, images_turned(block, photos, mirror)))
     other = block.replace(photo_to_ground=not block.photo_to_ground)
-    return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
+    sense = phrase("check.sense-of-rotation", sense=words.sense)
+    return [*trials, _Trial(sense, list(block.photo_ids), other)]
 
 
 def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
@@ -263,8 +250,9 @@ def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
     if gain[which, photo] > BETTER:
         return None
     trial, name = trials[which], block.photo_ids[photo]
+    message = phrase(trial.code, **trial.fields, photo=name)
     values = {"cost_before": float(before[photo]), "cost_after": float(after[which, photo])}
-    explanations.append(Finding(trial.kind, "grave", trial.text.format(name), [name], [], values))
+    explanations.append(finding("grave", message, [name], values=values))
     only = np.zeros(len(block.photo_ids), dtype=bool)
     only[photo] = True
     return trial.change(only)
@@ -272,26 +260,21 @@ def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
 
 @dataclass(frozen=True)
 class _PhotoTrial:
-    """One explanation for a single photo: its text, with a place for the name, and what it does to photos."""
+    """One explanation for a single photo: code and fields of its message, and the changed block."""
 
-    kind: str
-    text: str
+    code: str
+    fields: dict[str, Any]
     change: Callable[[Bools], Block]
 
 
 def _photo_trials(block: Block) -> list[_PhotoTrial]:
     trials = []
-    for turn, angle in TURNS.items():
-        sign = "; another sign of its principal distance would do the same" if angle == math.pi else ""
-        text = (
-            f"the kappa of photo {{}} is wrong: turned {turn}, its rays meet those of the other photos{sign}"
-        )
-        trials.append(_PhotoTrial("kappa", text, partial(_turned, block, angle=angle)))
-    for what, mirror in MIRRORS.items():
-        text = (
-            f"the plate of photo {{}} is mirrored: {what}; put right, its rays meet those of the other photos"
-        )
-        trials.append(_PhotoTrial("mirrored", text, partial(images_turned, block, turn=mirror)))
+    for turn in TURNS:
+        code = "check.kappa.half-turn" if turn == TURNS[0] else "check.kappa.photo"
+        trials.append(_PhotoTrial(code, {"turn": turn}, partial(_turned, block, turn=turn)))
+    for name, mirror in MIRRORS.items():
+        fields = {"cause": phrase(f"mirror.{name}")}
+        trials.append(_PhotoTrial("check.mirrored.photo", fields, partial(images_turned, block, turn=mirror)))
     return trials
 
 

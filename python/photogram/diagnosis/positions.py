@@ -20,7 +20,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.findings import Explained
+from photogram.diagnosis.findings import Explained, likely
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -30,22 +30,19 @@ from photogram.network.strips import strips_of
 from photogram.network.unknowns import LeverArm, Shift, Unknown
 from photogram.results.result import Result
 from photogram.statistics.likelihood import RIVAL, TESTED, judged, likelihood
+from photogram.words import Phrase, phrase
 
-FEWEST = 5
-"""Observed positions that can be judged as a whole."""
-EQUAL = 0.15
-"""Relative difference within which a lever arm is the given one with other signs or axes."""
-WORST = 1e6
-"""What cannot be adjusted as it is leaves so many times what the worst hypothesis does."""
-WHAT = "observed positions of the photos"
+FEWEST = 5  # Observed positions that can be judged as a whole
+EQUAL = 0.15  # Relative difference within which a lever arm is the given one with other signs or axes
+WORST = 1e6  # What cannot be adjusted as it is leaves so many times what the worst hypothesis does
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A hypothesis: its words, the adjustment with it, its parameters, and the positions that were meant."""
+    """A hypothesis: its message, the adjustment with it, its parameters, and the correct positions."""
 
     kind: str
-    text: str
+    message: Phrase
     result: Result | None
     parameters: int
     meant: list[Position]
@@ -83,11 +80,9 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
     if verdict is None:
         return None
     best = [found[row] for row in verdict.best]
-    word = "probably" if len(best) == 1 else "it cannot be told which:"
-    text = f"{word} {'; or '.join(each.text for each in best)}"
-    text += f": residuals of the block would be {verdict.fall:.3g} times smaller"
+    message = likely([each.message for each in best], phrase("mistake.residuals", times=verdict.fall))
     meant = best[0].meant
-    return Explained(best[0].kind, text, verdict, lambda own: _with(own, meant))
+    return Explained(best[0].kind, message, verdict, lambda block: _with(block, meant))
 
 
 def _positions(block: Block) -> list[Position]:
@@ -134,17 +129,15 @@ def _changed(
 
 def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
     """Try other units and axes."""
-    hypotheses = [("feet in heights", f"heights of the {WHAT} are in feet, all else in metres", [0, 1, 2], 2)]
+    hypotheses = [("feet in heights", [0, 1, 2], 2)]
     if block.spheroid is None:
-        hypotheses += [
-            ("feet", f"the {WHAT} are in feet, all else in metres", [0, 1, 2], 0),
-            ("X and Y exchanged", f"X and Y of the {WHAT} are exchanged", [1, 0, 2], 3),
-        ]
+        hypotheses += [("feet", [0, 1, 2], 0), ("X and Y exchanged", [1, 0, 2], 3)]
     trials = []
-    for kind, text, order, first in hypotheses:
+    for kind, order, first in hypotheses:
         factors = np.where(np.arange(3) >= first, FOOT, 1.0)
         meant = [_changed(each, np.asarray(each.position)[order] * factors) for each in given]
-        trials.append(_Trial(kind, text, adjusted.converged(_with(block, meant)), 0, meant))
+        result = adjusted.converged(_with(block, meant))
+        trials.append(_Trial(kind, phrase(f"mistake.positions.{kind}"), result, 0, meant))
     return trials
 
 
@@ -169,22 +162,15 @@ def _unknown(block: Block, given: list[Position], adjusted: Adjuster) -> list[_T
         (found,) = [each for each in result.unknowns if each.given is unknown]
         value = np.asarray(found.position)
         sd = np.sqrt(np.maximum(np.diagonal(found.cofactors), 0))
-        shown = f"({', '.join(f'{v:.3f} +- {s:.3f}' for v, s in zip(value, sd, strict=True))}) {unit}"
-        if kind == "geoid":
-            text = (
-                f"heights of the {WHAT} are {value[2]:.3f} {unit} above those of the control: ellipsoidal and"
-                " orthometric heights are mixed"
-            )
-        elif kind == "shift":
-            text = f"the {WHAT} are in another datum, shifted by {shown}"
-        else:
-            text = _said_of_arm(np.median(arms, axis=0), value, shown)
+        parts = [f"{v:.3f} +- {s:.3f}" for v, s in zip(value, sd, strict=True)]
+        code = kind if kind != "lever arm" else _code_of_arm(np.median(arms, axis=0), value)
+        message = phrase(f"mistake.positions.{code}", vector=parts, height=float(value[2]), unit=unit)
         if isinstance(unknown, Shift):
             fixed = Shift(unknown.name, value, sd=0.0)
             meant = [_changed(each, shift=fixed) for each in given]
         else:
             meant = [_changed(each, arm=value) for each in given]
-        trials.append(_Trial(kind, text, result, 1 if kind == "geoid" else 3, meant))
+        trials.append(_Trial(kind, message, result, 1 if kind == "geoid" else 3, meant))
     return trials
 
 
@@ -193,16 +179,15 @@ def _arm(position: Position) -> Floats:
     return np.asarray(position.observed[3:6]) if not isinstance(arm, LeverArm) else arm.position
 
 
-def _said_of_arm(given: Floats, meant: Floats, shown: str) -> str:
-    """Say what is wrong with a lever arm."""
+def _code_of_arm(given: Floats, meant: Floats) -> str:
+    """Return the kind of mistake in a lever arm."""
     size = float(np.linalg.norm(given))
     if not size:
-        return f"the antenna has a lever arm of {shown}"
+        return "arm.none"
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         if np.linalg.norm(given[list(order)] * signs - meant) < EQUAL * size:
-            wrong = "the wrong sign" if order == (0, 1, 2) else "other axes"
-            return f"the lever arm has {wrong}: it should be about {shown}"
-    return f"the lever arm is wrong: it should be about {shown}"
+            return "arm.sign" if order == (0, 1, 2) else "arm.axes"
+    return "arm.wrong"
 
 
 def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
@@ -237,7 +222,6 @@ def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Tri
     if not (math.isfinite(bend) and bend > 0):
         return []
     tau = step * (before - after) / (2 * bend)
-    per = "s" if timed else "steps from photo to photo"
-    text = f"the {WHAT} are those of another time, {abs(tau):.4g} {per} {'later' if tau > 0 else 'earlier'}"
+    message = phrase(f"mistake.positions.{'seconds' if timed else 'steps'}", offset=tau)
     meant = earlier(tau)
-    return [_Trial("time offset", text, adjusted.converged(_with(block, meant)), 1, meant)]
+    return [_Trial("time offset", message, adjusted.converged(_with(block, meant)), 1, meant)]

@@ -18,8 +18,7 @@ from photogram.results.result import Result
 from photogram.statistics.exchanges import are_exchanged
 from photogram.statistics.likelihood import judged
 
-FEWEST = 3
-"""Control points that tell which two of them are exchanged."""
+FEWEST = 3  # Control points that tell which two of them are exchanged
 
 
 def freed(block: Block, points: Indices) -> Block:
@@ -39,24 +38,10 @@ def exchange(block: Block, one: int, other: int) -> Block:
 def tests_of_predictions(
     result: Result, given: Block, points: Indices, spread: float
 ) -> tuple[Floats, Floats]:
-    """Compare what is given of some points with their predictions.
+    """Return (k, 3) given minus predicted coordinates of points, and these by their standard deviations.
 
-    Parameters
-    ----------
-    result
-        An adjustment in which nothing of the points is held.
-    given
-        The block with their coordinates and standard deviations.
-    points
-        (k,) the points.
-    spread
-        Robust standard deviation of the test values of the adjustment.
-
-    Returns
-    -------
-    errors, tests
-        (k, 3) given minus predicted, and this by its standard deviation; NaN where nothing is held or
-        predicted.
+    `result` is an adjustment in which the points are free, `given` the block with their coordinates, `spread`
+    the robust standard deviation of its test values. NaN if a component is free or has no prediction.
     """
     held = np.isfinite(given.point_sd[points])
     errors = np.where(held, given.point_positions[points] - result.point_positions[points], np.nan)

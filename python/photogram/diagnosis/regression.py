@@ -13,14 +13,10 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 
-LEAST = 6
-"""Known or intersected points of a photo that is looked at."""
-MOST = 12
-"""Photos that are looked at closely,"""
-SCANNED = 200
-"""and those of a larger block among which one that does not fit is looked for."""
-UNKNOWN = 1e6
-"""The misfit of a photo of which nothing can be predicted."""
+LEAST = 6  # Known or intersected points of a photo that is looked at
+MOST = 12  # Photos that are looked at closely,
+SCANNED = 200  # and those of a larger block among which one that does not fit is looked for
+UNKNOWN = 1e6  # The misfit of a photo of which nothing can be predicted
 
 
 @dataclass(frozen=True, eq=False)

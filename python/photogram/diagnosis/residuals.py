@@ -15,9 +15,9 @@ from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 from photogram.show.page import Column, Table
+from photogram.words import phrase
 
-FEWEST = 20
-"""Images of a photo that a test of its pattern needs."""
+FEWEST = 20  # Images of a photo that a test of its pattern needs
 WORTH = 0.3
 """A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
 ROUNDING = 0.01
@@ -26,15 +26,7 @@ SHOWN = 5
 
 
 def residuals(result: Result, spread: float) -> Section:
-    """Describe the residuals of an adjustment and test them for systematic patterns.
-
-    Parameters
-    ----------
-    result
-        An adjustment with covariances.
-    spread
-        Robust standard deviation of its test values.
-    """
+    """Describe residuals and test them for patterns; `spread` is the robust sd of the test values."""
     section = Section(
         "Patterns of the residuals",
         "Residuals should have no pattern. They grow with the number of rays: two rays leave all parallax"
@@ -100,11 +92,10 @@ def _sums(result: Result, section: Section) -> None:
     for point in np.argsort(-sizes.max(axis=1), kind="stable")[:SHOWN].tolist():
         if sizes[point].max() > limit:
             x, y = factor * sums[point]
-            text = (
-                f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} {unit}"
-                f" in x and {y:.1f} {unit} in y; is its control, or one of its images, wrong?"
+            name = block.point_ids[point]
+            note(
+                section, "look", phrase("check.unbalanced-point", point=name, x=x, y=y, unit=unit), [], [name]
             )
-            note(section, "unbalanced-point", "look", text, [], [block.point_ids[point]])
 
 
 def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
@@ -145,12 +136,10 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
             f" ({significance:.1f} standard deviations)",
         )
         if significance > limit and abs(amplitude) > WORTH * usual:
-            text = (
-                f"all photos share a pattern: {name}, {factor * amplitude:.1f} {unit} at {size:.0f}"
-                f" {block.image_unit} from the centre; is the lens, the film or the refraction corrected?"
-            )
+            fields = {"pattern": name, "amplitude": factor * amplitude, "unit": unit}
+            fields |= {"radius": size, "image_unit": block.image_unit}
             values = {f"amplitude_{unit}": factor * amplitude, "significance_sd": significance}
-            note(section, "systematic-pattern", "look", text, values=values)
+            note(section, "look", phrase("check.systematic-pattern", **fields), values=values)
 
 
 def _photo_patterns(result: Result, plain: Block, spread: float, section: Section) -> None:
@@ -169,18 +158,10 @@ def _photo_patterns(result: Result, plain: Block, spread: float, section: Sectio
         tested += 1
         significance = _own_pattern(result, plain, own, size, spread)
         if significance > limit:
-            name, mean = block.photo_ids[photo], factor * result.residuals[own].mean(axis=0)
-            text = (
-                f"the residuals of photo {name} have a pattern (mean {mean[0]:.1f} {unit} in x,"
-                f" {mean[1]:.1f} {unit} in y; {significance:.1f} standard deviations): look at its"
-                " preprocessing"
-            )
-            values = {
-                f"mean_x_{unit}": float(mean[0]),
-                f"mean_y_{unit}": float(mean[1]),
-                "significance_sd": significance,
-            }
-            note(section, "photo-pattern", "look", text, [name], [], values)
+            name, (x, y) = block.photo_ids[photo], (factor * result.residuals[own].mean(axis=0)).tolist()
+            fields = {"photo": name, "x": x, "y": y, "unit": unit, "significance": significance}
+            values = {f"mean_x_{unit}": x, f"mean_y_{unit}": y, "significance_sd": significance}
+            note(section, "look", phrase("check.photo-pattern", **fields), [name], values=values)
     section.figure("photos tested for a pattern of their own", f"{tested} of {len(block.photo_ids)}")
 
 

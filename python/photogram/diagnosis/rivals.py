@@ -18,25 +18,15 @@ from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 
-ODDS = 20.0
-"""An image that is less likely by this factor is no rival."""
-ALIKE = 0.98
-"""Nor can tests be told apart that differ by less: photos are not known quite."""
-INVISIBLE = 1e-6
-"""Eigenvalue of a block of R along which an error leaves no residual."""
+ODDS = 20.0  # An image that is less likely by this factor is no rival
+ALIKE = 0.98  # Nor can tests be told apart that differ by less: photos are not known quite
+INVISIBLE = 1e-6  # Eigenvalue of a block of R along which an error leaves no residual
 
 
 def rival_images(result: Result, row: int, spread: float) -> Indices:
-    """Return the other images of a point that may as well be wrong, by their rows.
+    """Return the rows of other images of a point that may be wrong instead of the image in a row.
 
-    Parameters
-    ----------
-    result
-        An adjustment with that image.
-    row
-        The image.
-    spread
-        Robust standard deviation of the test values.
+    `spread` is the robust standard deviation of the test values.
     """
     block = result.block
     point = int(block.image_points[row])

@@ -10,10 +10,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
-ROUNDING = 1e-9
-"""Of the largest residual: a median below it is rounding."""
-TUKEY = 4.685
-"""Tuning constant of Tukey's biweight: 95 % efficiency for normal errors."""
+ROUNDING = 1e-9  # Of the largest residual: a median below it is rounding
+TUKEY = 4.685  # Tuning constant of Tukey's biweight: 95 % efficiency for normal errors
 
 
 def mad_sd(values: Floats) -> float:
@@ -34,14 +32,9 @@ def normal_of_chi_square(value: float, freedom: int) -> float:
 
 
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
-    """Fit by Tukey's biweight from a start by least absolute deviations; returns (k, ...) coefficients.
+    """Return (k, d) coefficients by Tukey's biweight after a start by least absolute deviations.
 
-    Parameters
-    ----------
-    design
-        (n, k) with n > k.
-    values
-        (n, d); each row is an outlier or not as a whole. NaN comes back when their squares overflow.
+    `design` is (n, k), n > k; the rows of `values`, (n, d), are outliers as a whole. NaN if squares overflow.
     """
     weights = np.ones(len(values))
     coefficients: Floats = np.zeros((design.shape[1], values.shape[1]))

@@ -22,6 +22,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.adjusting import Adjuster, put_right
+from photogram.diagnosis.findings import likely
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_photos
@@ -34,27 +35,16 @@ from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized
+from photogram.words import Phrase, phrase
 
-SIGNIFICANT = 5.0
-"""Standard deviations: of a readout time below zero, and of what a shutter explains."""
-LONGEST = 1.0
-"""Seconds: no shutter reads for longer; such a number is one of milliseconds."""
+SIGNIFICANT = 5.0  # Standard deviations: of a readout time below zero, and of what a shutter explains
+LONGEST = 1.0  # Seconds: no shutter reads for longer; such a number is one of milliseconds
 MILLISECOND = 1e-3
 OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
 
 
 def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> list[Message]:
-    """Try other readouts of rolling shutters where the adjustment has failed, or residuals are too large.
-
-    Parameters
-    ----------
-    block
-        The block.
-    first
-        Its adjustment; None where that has failed.
-    adjusted
-        Adjusts what is tried.
-    """
+    """Try other readouts of rolling shutters if the first adjustment failed or residuals are too large."""
     if not any(each.shutter is not None for each in block.timed):
         return []
     if first is not None and first.converged and (first.loss or not is_suspected(first)):
@@ -62,8 +52,8 @@ def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> lis
     found = put_right(first, _tried(block), adjusted)
     if found is None:
         return []
-    text, _, verdict = found
-    return [Message(f"probably {text}: residuals would be {verdict.fall:.3g} times smaller")]
+    cause, _, verdict = found
+    return [Message(likely([cause], phrase("mistake.residuals", times=verdict.fall)))]
 
 
 def backward_readouts(result: Result) -> list[Message]:
@@ -71,16 +61,20 @@ def backward_readouts(result: Result) -> list[Message]:
     own = {id(each.shutter.readout) for each in result.block.timed if each.shutter is not None}
     return [
         Message(
-            f"{each.given.title} is {each.position[0]:.4g} s (sd {each.sd[0]:.2g}): the shutter reads against"
-            " the direction that is given, from the other edge"
+            phrase(
+                "moving.backward-readout",
+                readout=each.given.title,
+                value=float(each.position[0]),
+                sd=float(each.sd[0]),
+            )
         )
         for each in result.unknowns
         if id(each.given) in own and each.position[0] < -SIGNIFICANT * each.sd[0]
     ]
 
 
-def _tried(block: Block) -> Iterator[tuple[str, Block]]:
-    """Return what may have been meant by the shutters of a block."""
+def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
+    """Yield possible mistakes in the shutters of a block, and the block without them."""
     ends = {True: _ends(block, 0), False: _ends(block, 1)}
 
     def opposite(own: Shutter) -> Shutter:
@@ -93,13 +87,13 @@ def _tried(block: Block) -> Iterator[tuple[str, Block]]:
     def across_back(own: Shutter) -> Shutter:
         return opposite(across(own))
 
-    yield "shutters read in the other direction, from the other edge", _changed(block, opposite)
+    yield phrase("mistake.shutter.opposite"), _changed(block, opposite)
     rows = any(own.shutter.direction in ("down", "up") for own in block.timed if own.shutter is not None)
-    other = "columns, not rows" if rows else "rows, not columns"
-    yield f"shutters read {other}, from the beginning", _changed(block, across)
+    code = f"mistake.shutter.{'columns' if rows else 'rows'}"
+    yield phrase(f"{code}.first"), _changed(block, across)
     if not all(_is_free(each) for each in block.timed if each.shutter is not None):
         # A free readout time has the sign that fits.
-        yield f"shutters read {other}, from the end", _changed(block, across_back)
+        yield phrase(f"{code}.last"), _changed(block, across_back)
     if any(_seconds(each) > LONGEST for each in block.timed):
         known: dict[int, Readout] = {}
 
@@ -112,7 +106,7 @@ def _tried(block: Block) -> Iterator[tuple[str, Block]]:
             )
             return replace(own, readout=known.setdefault(id(readout), meant))
 
-        yield "readout times are milliseconds, not seconds", _changed(block, thousandth)
+        yield phrase("mistake.shutter.milliseconds"), _changed(block, thousandth)
 
 
 def _is_free(own: Timed) -> bool:
@@ -146,29 +140,17 @@ def _ends(block: Block, axis: int) -> tuple[float, float]:
 EXPLAINED = 0.8
 """Of what readout, lens and affinity explain together the readout explains this part alone, at least; and
 beside these it is significant."""
-FEWEST = 4
-"""Photos of a camera that move."""
-MOST = 3
-"""Cameras that are looked at, those with the most photos."""
-READ = {
-    (1, True): "rows, from the upper edge to the lower",
-    (1, False): "rows, from the lower edge to the upper",
-    (0, True): "columns, from the left edge to the right",
-    (0, False): "columns, from the right edge to the left",
-}
-"""How a shutter reads: which coordinate counts, and whether from its beginning."""
+FEWEST = 4  # Photos of a camera that move
+MOST = 3  # Cameras that are looked at, those with the most photos
+READ = {(1, True): "down", (1, False): "up", (0, True): "right", (0, False): "left"}
+"""Direction of the readout, by the axis of the coordinate and the sign of the readout time."""
 
 
 def rolling_hints(result: Result) -> list[Message]:
-    """Say which cameras have the residuals of a rolling shutter, where residuals are too large.
+    """Name cameras with the residuals of a rolling shutter, if the global test rejects the residuals.
 
-    Photos are taken to be in the order of their exposures: along strips the way from one to the next is the
+    Photos must be in the order of their exposures: along strips the distance between two photos is the
     velocity. Photos on trajectories are left out.
-
-    Parameters
-    ----------
-    result
-        An adjustment with covariances; nothing is found where its global test does not reject.
     """
     block = result.block
     if result.loss or not result.WHOLE or block.mounts or not is_suspected(result):
@@ -183,7 +165,7 @@ def rolling_hints(result: Result) -> list[Message]:
     # Those of residuals, observed minus computed.
     partials = -np.einsum("kmi,mk->mi", station_partials(result)[:3], ways[block.image_photos])
     found = (_of_camera(result, each, partials, moved & (cameras == each)) for each in chosen)
-    return [Message(text) for text in found if text]
+    return [Message(message) for message in found if message is not None]
 
 
 def _ways(result: Result) -> Floats:
@@ -198,15 +180,15 @@ def _ways(result: Result) -> Floats:
     return ways
 
 
-def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> str:
-    """Return what the residuals of a camera say; nothing where a readout does not explain them.
+def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Phrase | None:
+    """Return the readout that explains the residuals of a camera.
 
     `motion` are (m, 2) ways of images from one exposure to the next.
     """
     block = result.block
     own = result.used_images & photos[block.image_photos] & np.isfinite(motion).all(axis=1)
     if not own.any():
-        return ""
+        return None
     residuals = np.where(result.used_images[:, np.newaxis], result.residuals / block.image_sd, 0.0)
     factor, down = factored(result), _down(block, camera)
     columns = {axis: _column(block, motion, own, axis, down) for axis in (1, 0)}
@@ -215,19 +197,19 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> st
     readout, sd = tried[axis].estimate(block.image_photos)
     significant = _significance(result, tried[axis].fall()) > SIGNIFICANT
     if not (significant and abs(readout) > SIGNIFICANT * sd):
-        return ""
+        return None
     rivals = np.concatenate([lens_partials(result, own), _affinities(block, own)])
     together = Scores.of(factor, np.concatenate([columns[axis][np.newaxis], rivals]), residuals)
     alone, beside = tried[axis].fall(), together.fall() - together.fall(1)
     if not (alone > EXPLAINED * together.fall() and _significance(result, beside) > SIGNIFICANT):
-        return ""
-    name = block.camera_names[camera] if block.cameras else "the camera"
+        return None
     omega = result.sums_of_squares.total
-    return (
-        f"probably the shutter of {name} rolls: a readout of its {READ[axis, readout > 0]}, in"
-        f" {100 * abs(readout):.2g} % (sd {100 * sd:.1g}) of the time between two exposures, explains"
-        f" residuals that grow with {('column', 'row')[axis]} times velocity; they would be"
-        f" {math.sqrt(omega / (omega - alone)):.3g} times smaller"
+    return phrase(
+        f"check.rolling-shutter.{READ[axis, readout > 0]}",
+        camera=block.camera_names[camera] if block.cameras else "1",
+        percent=100 * abs(readout),
+        sd=100 * sd,
+        times=math.sqrt(omega / (omega - alone)),
     )
 
 

@@ -15,23 +15,17 @@ from photogram.network.block import Block
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.results.result import Result
+from photogram.words import phrase
 
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
-FEW = 4
-"""So many free departures double what is allowed."""
-MOVED = 10.0
-"""The same for the change from the initial to the adjusted station."""
-TINY = 1e-9
-"""A spread below this is rounding: radians, or the linear unit."""
-UPRIGHT = 0.8
-"""Vertical component of the z axis of a photo that looks down, at least."""
-FEWEST = 5
-"""Photos of a strip whose path can be judged."""
-CURVED = 15
-"""Photos of a strip whose path may be curved."""
-SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3
-"""Departures that are never remarked on: of the base, and radians."""
+FEW = 4  # So many free departures double what is allowed
+MOVED = 10.0  # The same for the change from the initial to the adjusted station
+TINY = 1e-9  # A spread below this is rounding: radians, or the linear unit
+UPRIGHT = 0.8  # Vertical component of the z axis of a photo that looks down, at least
+FEWEST = 5  # Photos of a strip whose path can be judged
+CURVED = 15  # Photos of a strip whose path may be curved
+SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3  # Departures that are never remarked on: of the base, and radians
 QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 """The angles are those between the photo and its strip, ground-to-photo."""
 
@@ -39,15 +33,8 @@ QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
     """Compare every station with the smooth path of its strip, and with its initial values.
 
-    Parameters
-    ----------
-    block
-        The block with its initial stations.
-    result
-        Its adjustment, if there is one.
-    misleading
-        Photos on whose points good images looked wrong from the initial stations: if one of them has moved,
-        its initial values are wrong beyond doubt.
+    `misleading` are photos on whose points good images seemed wrong from the initial stations: if one of them
+    has moved, its initial values are wrong.
     """
     section = Section(
         "Stations",
@@ -137,13 +124,18 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
         for row, k in np.argwhere(np.abs(path.departures) > LOOK * doubt * scale).tolist():
             size = abs(path.departures[row, k]) / scale[k] / doubt
             departure, photo = float(path.departures[row, k] * factors[k]), block.photo_ids[strip[row]]
-            text = (
-                f"station {photo} is off the {which} path of its strip: {QUANTITIES[k]} by {departure:.3f}"
-                f" {units[k]}, {size:.0f} times the usual"
+            message = phrase(
+                f"check.outlying-station.{which}",
+                photo=photo,
+                quantity=QUANTITIES[k],
+                departure=departure,
+                unit=units[k],
+                times=float(size),
             )
             level: Level = "grave" if size > GRAVE else "look"
-            values = {"departure": departure, "times_usual": float(size)}
-            note(section, "outlying-station", level, text, [photo], [], values)
+            note(
+                section, level, message, [photo], values={"departure": departure, "times_usual": float(size)}
+            )
 
 
 def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
@@ -171,16 +163,21 @@ def _moved(result: Result, misleading: Collection[str], section: Section) -> Non
             k = int(sizes[photo].argmax())
             name = block.photo_ids[photo]
             wrong = name in misleading
-            text = (
-                f"station {name}: the adjustment changed its {what} by"
-                f" {changes[photo, k] * factor:.3f} {shown}, {sizes[photo, k]:.0f} times the usual: "
-            ) + (
-                "its initial values are wrong, and made good images look wrong"
-                if wrong
-                else "are its initial values right?"
+            change, times = float(changes[photo, k] * factor), float(sizes[photo, k])
+            message = phrase(
+                f"check.moved-station.{'wrong' if wrong else what}",
+                photo=name,
+                change=change,
+                unit=shown,
+                times=times,
             )
-            values = {"change": float(changes[photo, k] * factor), "times_usual": float(sizes[photo, k])}
-            note(section, "moved-station", "grave" if wrong else "look", text, [name], [], values)
+            note(
+                section,
+                "grave" if wrong else "look",
+                message,
+                [name],
+                values={"change": change, "times_usual": times},
+            )
 
 
 def _base(block: Block) -> float:
@@ -190,12 +187,9 @@ def _base(block: Block) -> float:
     return float(np.median(steps)) if steps.size else 0.0
 
 
-NEIGHBOURS = 8
-"""Points that a local plane rests on."""
-DEPARTURE = 6.0
-"""Departures from the plane in robust standard deviations of all."""
-PER_CELL = 4
-"""Points of a cell of the search grid, on average."""
+NEIGHBOURS = 8  # Points that a local plane rests on
+DEPARTURE = 6.0  # Departures from the plane in robust standard deviations of all
+PER_CELL = 4  # Points of a cell of the search grid, on average
 
 
 def two_ray_heights(result: Result) -> Section:
@@ -227,13 +221,9 @@ def two_ray_heights(result: Result) -> Section:
     for row in np.flatnonzero(np.abs(departures) > DEPARTURE * scale).tolist():
         name = block.point_ids[known[two[row]]]
         photos = [block.photo_ids[p] for p in block.image_photos[block.image_points == known[two[row]]]]
-        text = (
-            f"point {name} stands {departures[row]:.2f} {unit} off the plane of its neighbours (usual"
-            f" {scale[row]:.2f} {unit}): look at its coordinates along the flight line on photos"
-            f" {' and '.join(photos)}, unless the ground is like that"
-        )
         values = {"departure": float(departures[row]), "usual": float(scale[row])}
-        note(section, "two-ray-height", "look", text, photos, [name], values)
+        message = phrase("check.two-ray-height", point=name, unit=unit, photos=photos, **values)
+        note(section, "look", message, photos, [name], values=values)
     return section
 
 
@@ -269,17 +259,8 @@ def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]
 def neighbours(plan: Floats, rows: Indices, count: int) -> Indices:
     """(k, count) the points nearest to each of some points in plan, themselves excepted.
 
-    Points are sorted into square cells; the rings of cells around a point are searched until the nearest are
-    certain, so that the work is in proportion to the points where they are spread evenly.
-
-    Parameters
-    ----------
-    plan
-        (n, 2) with n > count.
-    rows
-        (k,) the points whose neighbours are sought.
-    count
-        How many neighbours.
+    Points are sorted into square cells. The search visits rings of cells around a point, so that its work is
+    proportional to the number of evenly distributed points.
     """
     low, extent = plan.min(axis=0), np.ptp(plan, axis=0).max()
     cell = max(float(extent) * np.sqrt(PER_CELL / len(plan)), 1e-300)

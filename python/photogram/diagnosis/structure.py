@@ -6,26 +6,16 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.diagnosis.findings import Section, Words, note
-from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure
 from photogram.network.ties import FEWEST_TIES, ties
 from photogram.results.document import bandwidths
 from photogram.results.result import Result
+from photogram.words import phrase
 
 
 def structure_section(block: Block, result: Result | None, words: Words) -> Section:
-    """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point.
-
-    Parameters
-    ----------
-    block
-        The block as it was read.
-    result
-        Its adjustment, for the order that the program chose.
-    words
-        What things are called.
-    """
+    """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point."""
     section = Section(
         "Structure",
         "Points tie photos together"
@@ -46,9 +36,9 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
         _bandwidths(block, result, section)
     tied = ties(block)
     for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
-        name = block.photo_ids[photo]
-        text = f"photo {name} has only {tied[photo]} points that other photos or control tie"
-        note(section, "few-ties", "grave", text, [name], [], {"ties": float(tied[photo])})
+        name, count = block.photo_ids[photo], int(tied[photo])
+        message = phrase("check.few-ties", photo=name, n=count, least=FEWEST_TIES)
+        note(section, "grave", message, [name], values={"ties": float(count)})
     _parts(block, section)
     return section
 
@@ -84,8 +74,7 @@ def _parts(block: Block, section: Section) -> None:
     largest = numbers[sizes.argmax()]
     for number in numbers[numbers != largest].tolist():
         names = [block.photo_ids[photo] for photo in np.flatnonzero(parts == number).tolist()]
-        text = f"no point ties the photos {listed(names)} to the others: are names of points spelt alike?"
-        note(section, "separate-part", "grave", text, names)
+        note(section, "grave", phrase("check.separate-part", photos=names), names)
 
 
 def parts_of(block: Block) -> Indices:

@@ -14,7 +14,7 @@ from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Finding, Section, note, note_all, note_verdict
+from photogram.diagnosis.findings import Finding, Section, finding, note, note_all, note_verdict
 from photogram.diagnosis.shutters import shutter_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectory_hints import flown_hints
@@ -25,6 +25,7 @@ from photogram.network.block import Block, flown_by
 from photogram.network.motion import timed_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
@@ -32,17 +33,7 @@ if TYPE_CHECKING:
 
 
 def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:
-    """Check a block with photos or records on trajectories.
-
-    Parameters
-    ----------
-    block
-        The block.
-    words
-        What things are called.
-    adjusted
-        Adjusts.
-    """
+    """Check a block with photos or records on trajectories."""
     structure = structure_section(block, None, words)
     timed = timed_photos(block)
     at_rest = {name for name, moves in zip(block.photo_ids, timed.tolist(), strict=True) if not moves}
@@ -56,7 +47,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
-        note(section, "no-adjustment", "grave", f"it cannot be adjusted: {error}")
+        note(section, "grave", phrase("check.no-adjustment", reason=str(error)))
         note_all(section, "convention", "grave", flown_hints(block) or shutter_hints(block, None, adjusted))
         return [structure, section], None
     note_all(section, "convention", "grave", explained(result))
@@ -87,6 +78,6 @@ def _finding(entry: Removal) -> Finding:
         )
         if np.isfinite(error) and abs(error) > sd
     ]
-    about = f", error about {', '.join(sizes)}" if sizes else ""
-    text = f"{entry.sentence} does not fit the others (T {entry.statistic:.4g}{about})"
-    return Finding("blunder", "grave", text, values={"statistic": entry.statistic})
+    error = phrase("check.error", sizes=sizes) if sizes else ""
+    message = phrase("check.blunder.group", subject=entry.sentence, statistic=entry.statistic, error=error)
+    return finding("grave", message, values={"statistic": entry.statistic})

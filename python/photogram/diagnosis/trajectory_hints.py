@@ -36,18 +36,13 @@ from photogram.network.rays import meet
 from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
 from photogram.network.unknowns import LeverArm
+from photogram.words import Phrase, phrase
 
 
 def flown_hints(block: Block) -> list[Message]:
-    """Look for mistakes in tables and times of trajectories, and in how the lines of scanners are counted.
-
-    Returns
-    -------
-    Sentences that each name a mistake that would explain why images, or observed positions, do not fit their
-    trajectories; none where they do. Nothing is corrected.
-    """
+    """Return mistakes in tables and times of trajectories, and in the numbers of scanner lines."""
     with np.errstate(all="ignore"):
-        return [Message(each.text) for each in (*_of_images(block), *_of_records(block))]
+        return [Message(each.message) for each in (*_of_images(block), *_of_records(block))]
 
 
 def _of_images(block: Block) -> list[Verdict]:
@@ -67,11 +62,11 @@ def _of_records(block: Block) -> list[Verdict]:
     if not given[0] > SUSPICION:
         return []
     tried = (
-        Hypothesis(f"records {seconds:+g} s", text, partial(shifted_records, seconds=seconds))
-        for text, seconds in shifts("observed positions")
+        Hypothesis(f"records {seconds:+g} s", message, partial(shifted_records, seconds=seconds))
+        for message, seconds in shifts("records")
     )
     found = passing(tried, block, given, _records_misfit)
-    return [Verdict(found, float(given[0]), what="observed positions")] if found else []
+    return [Verdict(found, float(given[0]), what="records")] if found else []
 
 
 def _records_misfit(block: Block) -> Floats:
@@ -112,48 +107,38 @@ def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
     """Propose mistakes for a block without observations; `photos` on trajectories are looked at."""
     if any(each.trajectory is not None for each in block.timed):
         yield from _of_tables()
-        for text, seconds in shifts("images"):
-            yield Hypothesis(f"images {seconds:+g} s", text, partial(_shifted_images, seconds=seconds))
+        for message, seconds in shifts("images"):
+            yield Hypothesis(f"images {seconds:+g} s", message, partial(_shifted_images, seconds=seconds))
     if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
-        yield Hypothesis("sign of c", "the principal distance has the wrong sign", _looking_back)
+        yield Hypothesis("sign of c", phrase("mistake.sign of c"), _looking_back)
     if any(each.lines is not None for each in block.timed):
         yield from _of_scanners(block, photos)
 
 
-def shifts(of: str) -> Iterator[tuple[str, float]]:
-    """Return in which scale times of something may be, and what they lack in seconds."""
+def shifts(of: str) -> Iterator[tuple[Phrase, float]]:
+    """Yield possible time scales of `images` or `records`, and their shift in seconds."""
     for ahead, behind, seconds in differences():
         for sign, own, table in ((1, behind, ahead), (-1, ahead, behind)):
-            yield (
-                f"times of the {of} are {own}, those of the trajectories' tables {table}: they lack"
-                f" {sign * seconds:+g} s",
-                sign * seconds,
-            )
+            fields = {"scale": own, "table": table, "seconds": sign * seconds}
+            yield phrase(f"mistake.times.{of}", **fields), sign * seconds
 
 
 def _of_tables() -> Iterator[Hypothesis]:
-    def changed(name: str, text: str, change: Callable[[Table], Table]) -> Hypothesis:
-        return Hypothesis(name, text, partial(_with_tables, change=change))
+    def changed(name: str, message: Phrase, change: Callable[[Table], Table]) -> Hypothesis:
+        return Hypothesis(name, message, partial(_with_tables, change=change))
 
-    inverse = "attitudes of the trajectories are matrices from object to photo, not from photo to object"
-    yield changed("inverse", inverse, lambda table: _turned(table, np.swapaxes(table.attitudes, 1, 2)))
-    for name in quaternion_readings(np.eye(3)[np.newaxis]):
+    def transposed(table: Table) -> Table:
+        return replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2))
+
+    yield changed("inverse", phrase("mistake.table.inverse"), transposed)
+    for name, (cause, _) in quaternion_readings(np.eye(3)[np.newaxis]).items():
 
         def read(table: Table, name: str = name) -> Table:
-            return _turned(table, quaternion_readings(table.attitudes)[name][1])
+            return replace(table, attitudes=quaternion_readings(table.attitudes)[name][1])
 
-        text, _ = quaternion_readings(np.eye(3)[np.newaxis])[name]
-        yield changed(name, f"{text} (attitudes of the trajectories)", read)
-    for name, factor, text in (
-        ("kilometres", KILOMETRE, "in kilometres, all else in metres"),
-        ("metres", 1 / KILOMETRE, "in metres, all else in kilometres"),
-    ):
-        said = f"positions of the trajectories are {text}"
-        yield changed(name, said, partial(_scaled, factor=factor))
-
-
-def _turned(table: Table, attitudes: Floats) -> Table:
-    return replace(table, attitudes=attitudes)
+        yield changed(name, phrase("mistake.table.quaternions", cause=cause), read)
+    for name, factor in (("kilometres", KILOMETRE), ("metres", 1 / KILOMETRE)):
+        yield changed(name, phrase(f"mistake.table.{name}"), partial(_scaled, factor=factor))
 
 
 def _scaled(table: Table, factor: float) -> Table:
@@ -219,13 +204,9 @@ def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
     With l the observed and p the predicted lines, l = s - p where they are; s is the middle one of l + p.
     """
     predicted = flown_predictions(block, photos)
-    for name, axes, text in (
-        ("reversed", (1,), "lines of the scanners are counted against the scan, from the last one"),
-        ("turned", (0, 1), "images of the scanners are turned by 180 degrees"),
-        ("mirrored samples", (0,), "samples of the scanners are counted from the other end"),
-    ):
+    for name, axes in (("reversed", (1,)), ("turned", (0, 1)), ("mirrored samples", (0,))):
         change: Change = partial(_counted_back, predicted=predicted, axes=axes)
-        yield Hypothesis(name, text, change, exact=False)
+        yield Hypothesis(name, phrase(f"mistake.scanner.{name}"), change, exact=False)
 
 
 def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Block:
@@ -242,14 +223,10 @@ def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Blo
     return block.replace(image_xy=xy)
 
 
-LEAST = 4
-"""Points with a place that a photo which is looked at has."""
-MOST = 12
-"""Photos that are looked at."""
-POINTS = 300
-"""Points of each of them."""
-SEEN = 0.8
-"""Of the points of a photo its trajectory must pass more than this part."""
+LEAST = 4  # Points with a place that a photo which is looked at has
+MOST = 12  # Photos that are looked at
+POINTS = 300  # Points of each of them
+SEEN = 0.8  # Of the points of a photo its trajectory must pass more than this part
 
 
 def flown_view(block: Block) -> tuple[Block, Indices]:

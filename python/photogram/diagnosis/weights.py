@@ -13,16 +13,15 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.statistics import global_test
+from photogram.words import Phrase, phrase
 
-LEAST_REDUNDANCY = 10.0
-"""Of a kind whose standard deviations are judged."""
-NOTABLE = 1.5
-"""Standard deviations that are wrong by this factor, in the mean and in the median."""
+LEAST_REDUNDANCY = 10.0  # Of a kind whose standard deviations are judged
+NOTABLE = 1.5  # Standard deviations that are wrong by this factor, in the mean and in the median
 
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    name: str
+    name: Phrase
     sum_of_squares: float
     redundancy: float
     standardized: Floats
@@ -32,8 +31,7 @@ def weight_hints(result: Result) -> list[Message]:
     """Name kinds of observations whose standard deviations are too small or too large.
 
     With v'Pv the sum of squares of a kind and r the sum of its redundancy numbers, the factor is the root of
-    v'Pv / r. It is told where v'Pv is beyond its limits, and where the median of the standardized residuals
-    says the same.
+    v'Pv / r. A kind is named if v'Pv and the median of the standardized residuals exceed their limits.
     """
     found = []
     for kind in _kinds(result):
@@ -44,30 +42,26 @@ def weight_hints(result: Result) -> list[Message]:
             continue
         factor = math.sqrt(kind.sum_of_squares / kind.redundancy)
         middle = mad_sd(kind.standardized)
+        fields = {"kind": kind.name, "sum": kind.sum_of_squares, "redundancy": kind.redundancy}
         if test.rejected_high and min(factor, middle) > NOTABLE:
-            found.append(_hint(kind, middle, "small"))
+            found.append(Message(phrase("weighting.small", factor=middle, **fields)))
         elif test.rejected_low and max(factor, middle) < 1 / NOTABLE:
-            found.append(_hint(kind, 1 / middle, "large"))
+            found.append(Message(phrase("weighting.large", factor=1 / middle, **fields)))
     return found
-
-
-def _hint(kind: _Kind, factor: float, which: str) -> Message:
-    return Message(
-        f"standard deviations of {kind.name} are about {factor:.2g} times too {which}: the sum of squares is"
-        f" {kind.sum_of_squares:.4g} for a redundancy of {kind.redundancy:.4g}"
-    )
 
 
 def _kinds(result: Result) -> Iterator[_Kind]:
     redundancy = float(np.nansum(result.redundancy))
-    yield _Kind("image coordinates", result.sums_of_squares.plates, redundancy, result.standardized)
-    for name, observed in (("control", result.control), ("positions and attitudes", result.stations)):
+    images = phrase("weighting.images")
+    yield _Kind(images, result.sums_of_squares.plates, redundancy, result.standardized)
+    for name, observed in (("control", result.control), ("stations", result.stations)):
         weighted = (observed.sd > 0) & np.isfinite(observed.sd)
         square = float(((observed.residuals[weighted] / observed.sd[weighted]) ** 2).sum())
-        yield _Kind(name, square, float(np.nansum(observed.redundancy)), observed.standardized)
+        own = phrase(f"weighting.{name}")
+        yield _Kind(own, square, float(np.nansum(observed.redundancy)), observed.standardized)
     for kind in result.kinds.values():
         yield _Kind(
-            f"observations of the kind {kind.kind}",
+            phrase("weighting.kind", kind=kind.kind),
             kind.sum_of_squares,
             float(np.nansum(kind.redundancy)),
             kind.standardized,

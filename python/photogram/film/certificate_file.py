@@ -29,8 +29,7 @@ from photogram.film.lens_table import (
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
-from photogram.io.toml import TomlFile, day_of
-from photogram.io.toml_tables import Table, read_document
+from photogram.io.toml import Table, TomlFile, day_of, read_document
 from photogram.messages import listed, quoted
 from photogram.show.page import significant
 
@@ -147,7 +146,7 @@ class _Frame:
         for number, row in enumerate(table.items("lines", []), 1):
             if not isinstance(row, dict):
                 raise table.error("lines", "is no list of tables")
-            own = Table(row, f"certificate.lines {number}", table.file)
+            own = Table(row, f"certificate.lines {number}", table.source)
             own.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
             names = [self.mark(each) for each in own.words("marks")]
             if len(names) != 4 or len(set(names)) < 4:

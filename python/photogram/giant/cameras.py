@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.words import phrase
 
 
 @dataclass
@@ -36,10 +37,10 @@ def parse_cameras(source: Source) -> list[Camera]:
         name = record.identification(spellings)
         first = spellings[name]
         if first is not record:
-            raise record.error(f"the camera {name!r} is already defined in record {first.number}")
+            raise record.error(phrase("giant.camera-repeated", camera=name, record=first.number))
         principal_distance = record.real(11, 20)
         if principal_distance == 0:
-            raise record.error(f"columns 11-20: the camera {name!r} has no principal distance")
+            raise record.error(phrase("giant.principal-distance", camera=name))
         cameras.append(Camera(name, principal_distance, record))
     return cameras
 

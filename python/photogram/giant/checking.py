@@ -11,6 +11,7 @@ from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project
+from photogram.words import Phrase, phrase
 
 """As the 1987 program printed them."""
 CODES = np.array([1, 2, 4])
@@ -23,8 +24,8 @@ class _GuideWords(Words):
     bandwidth = True
     iterations = True
 
-    def unhold(self, kept: Bools) -> str:
-        return f"lower the type (column 80: {_type_code(kept)})"
+    def remedy(self, kept: Bools) -> Phrase:
+        return phrase("check.remedy.type", type=_type_code(kept))
 
     def values(self, kept: Bools) -> dict[str, float]:
         return {"type_code": float(_type_code(kept))}
@@ -59,9 +60,8 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     options = {"unit_variance": common.unbiased_variance, "threads": threads}
     sections, result = check_block(block, Manner(options, _GuideWords(), why))
     files = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
-    files.remark(
-        f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} images"
-    )
+    counts = {"photos": len(block.photo_ids), "points": len(block.point_ids), "images": len(block.image_xy)}
+    files.remark(str(phrase("giant.counts", **counts)))
     files.findings += [Finding("remark", "look", str(message)) for message in project.messages]
     for warning in error_warnings(project, block, limits):
         files.figure(warning.heading.capitalize(), ", ".join(warning.names))

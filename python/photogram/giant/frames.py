@@ -11,6 +11,7 @@ from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
+from photogram.words import phrase
 
 ATTITUDE_SD = 90 * 3600 * ARCSEC  # Default standard deviation of omega, phi and kappa: 90 degrees, in radians
 
@@ -57,13 +58,13 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
     for position, attitude, (plain_position, plain_attitude) in pairs:
         name = position.identification(spellings)
         if not name:
-            raise position.error("columns 1-8: the frame has no name")
+            raise position.error(phrase("giant.no-name", subject="frame"))
         first = spellings[name]
         if first is not position:
-            raise position.error(f"the frame {name!r} is already listed in record {first.number}")
+            raise position.error(phrase("giant.frame-repeated", frame=name, record=first.number))
         if attitude is None or attitude.identification(spellings) != name:
             where = position if attitude is None else attitude
-            raise where.error(f"the second record (attitude) of the frame {name!r} was expected")
+            raise where.error(phrase("giant.attitude-record", frame=name))
         station, station_sd = plain_position or (
             position.position(geographic),
             position.deviations(geographic, geographic, False),

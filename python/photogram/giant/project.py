@@ -20,6 +20,7 @@ from photogram.giant.limits import Limits
 from photogram.giant.records import Source
 from photogram.io.writing import write_whole
 from photogram.network.block import Block
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis import Diagnosis
@@ -116,11 +117,11 @@ def project_files(project: Project, directory: Path, *, overwrite: bool = False)
     targets = {name: directory / name for name in NAMES}
     if directory.exists():
         for name, present in present_files(directory).items():
-            listed = ", ".join(path.name for path in present)
+            names = [path.name for path in present]
             if present and not overwrite:
-                raise InputError(f"{listed} would be overwritten", file=directory)
+                raise InputError(phrase("giant.overwrite", names=names), file=directory)
             if len(present) > 1:
-                raise InputError(f"more than one file could be {name}: {listed}", file=directory)
+                raise InputError(phrase("giant.several", name=name, names=names), file=directory)
             targets[name] = next(iter(present), targets[name])
     return {targets[name]: to_bytes(records) for name, records in texts.items()}
 

@@ -16,9 +16,11 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -134,12 +136,11 @@ class Attitudes:
             return cls(matrices, None if covariances is None else numbers("covariances", covariances))
         boresight = _boresight(mounting)
         rows = numbers("values", values)
-        if not np.isfinite(rows).all():
-            raise InputError("values has numbers that are not finite")
+        require(np.isfinite(rows).all(), "values", "finite", value="NaN or inf")
         if representation.startswith("quaternion") and rows.ndim == 2:
             short = np.flatnonzero(np.hypot.reduce(rows, axis=1) < _LEAST_LENGTH)
             if short.size:
-                raise InputError(f"the quaternion of row {short[0]} has no length")
+                raise InputError(phrase("attitude.quaternion", row=int(short[0])))
         # The partials are of the rotation step by the numbers.
         matrices, partials = _photocore.attitudes_from_numbers(representation, rows, boresight)
         if covariances is None:
@@ -178,7 +179,7 @@ class Attitudes:
         one_of("representation", representation, get_args(Representation))
         own = self.step_covariances
         if own is None:
-            raise InputError("these attitudes have no covariances")
+            raise InputError(phrase("attitude.no-covariances"))
         if representation.startswith("matrix"):
             return own
         partials = _photocore.numbers_of_attitudes(representation, self.matrices, _boresight(mounting))[1]
@@ -215,13 +216,10 @@ def _check_orthonormal(matrices: Floats) -> None:
         excess = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
     bad = np.flatnonzero(~(excess <= _ORTHONORMAL))
     if bad.size:
-        raise InputError(f"the matrix of row {bad[0]} is not orthonormal: A A' is not the identity")
+        raise InputError(phrase("attitude.orthonormal", row=int(bad[0])))
     mirrored = np.flatnonzero(np.linalg.det(matrices) < 0)
     if mirrored.size:
-        raise InputError(
-            f"the matrix of row {mirrored[0]} is mirrored (its determinant is -1): it belongs to axes that "
-            "are left-handed, such as x right, y up, z forward"
-        )
+        raise InputError(phrase("attitude.mirrored", row=int(mirrored[0])))
 
 
 def _boresight(mounting: Mounting | ArrayLike) -> Floats:

@@ -10,56 +10,41 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import (
-    frozen,
-    indices,
-    length,
-    repeated_pairs,
-    shaped,
-    shown,
-    text,
-    truth_value,
-)
 from photogram.arguments.equality import Valued
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
-from photogram.messages import listed
+from photogram.network.block_checks import check_block, known_poses, unsupported
 from photogram.network.cameras import Camera, CameraRow, camera_rows
-from photogram.network.films import check_scans, reads_pixels
+from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.knots import Knots
-from photogram.network.moving_photos import Poses, Timed, checked_timed, own_trajectories
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import (
     Observation,
-    Rate,
-    Velocity,
     all_trajectories,
     moments,
     observation_rows,
     of_records,
 )
 from photogram.network.observations.observation import Group
-from photogram.network.observations.unknowns import with_knots, with_smoothness
-from photogram.network.passages import Figure, Passage, checked_passages
-from photogram.network.refraction import Refraction, metres_per_unit
-from photogram.network.rigs import Mount, checked_mounts
+from photogram.network.passages import Passage
+from photogram.network.refraction import Refraction
+from photogram.network.rigs import Mount
 from photogram.network.tables import (
     GEOGRAPHIC_COLUMNS,
     RECTANGULAR_COLUMNS,
     Table,
-    checked_cameras,
-    different,
-    numbered,
-    photo_indices,
     table_arguments,
 )
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.summary import Brief, Rows, few
+from photogram.words import Phrase, phrase
 
 _NUMBERS: Any = None  # Names that are not given
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
@@ -214,260 +199,23 @@ class Block(Valued, Brief):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name, of in (("photo_ids", "photo_positions"), ("point_ids", "point_positions")):
-            given = getattr(self, name)
-            given = numbered(length(of, getattr(self, of))) if given is None else given
-            self._set(name, different(name, given))
-        photos, points = len(self.photo_ids), len(self.point_ids)
-        images = length("image_photos", self.image_photos)
-        shapes: dict[str, tuple[int, ...]] = {
-            "photo_positions": (photos, 3),
-            "photo_attitudes": (photos, 3),
-            "principal_distances": (photos,),
-            "point_positions": (points, 3),
-            "image_xy": (images, 2),
-            "image_sd": (images, 2),
-            "photo_position_sd": (photos, 3),
-            "photo_attitude_sd": (photos, 3),
-            "point_sd": (points, 3),
-        }
-        self._set("cameras", checked_cameras(self.cameras))
-        if not self.cameras and self.photo_cameras is not None:
-            raise InputError("photo_cameras is given, but no cameras")
-        if self.cameras:
-            if self.principal_distances is not None:
-                raise InputError("principal_distances and cameras are both given: the cameras have them")
-            self._set("photo_cameras", frozen(photo_indices(self.photo_cameras, self.cameras, photos)))
-        for name, shape in shapes.items():
-            if name == "principal_distances" and self.cameras:
-                continue
-            missing = name in ("point_positions", "photo_positions", "photo_attitudes")
-            self._set(name, shaped(name, getattr(self, name), shape, missing=missing))
-        for name in ("photo_positions_observed", "photo_attitudes_observed"):
-            if getattr(self, name) is not None:
-                self._set(name, shaped(name, getattr(self, name), (photos, 3), missing=True))
-        if self.point_check_sd is not None:
-            self._set(
-                "point_check_sd", shaped("point_check_sd", self.point_check_sd, (points, 3), missing=True)
-            )
-        for name, count in (("image_photos", photos), ("image_points", points)):
-            self._set(name, indices(name, getattr(self, name), images, count))
-        self._check_values()
-        self._check_observed()
-        self._check_twice()
-        self._check_conventions()
-        self._check_observations()
+        check_block(self)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
-
-    def _check_values(self) -> None:
-        owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
-        for name in ("photo_positions", "photo_attitudes"):
-            self._refuse(name, np.isinf(getattr(self, name)), "is not a finite number", self.photo_ids)
-        given = ("principal_distances",) if self.principal_distances is not None else ()
-        for name in (*given, "image_xy"):
-            bad = ~np.isfinite(getattr(self, name))
-            self._refuse(name, bad, "is not a finite number", owners.get(name[:5]))
-        beyond = np.abs(self.photo_attitudes) > _ANGLES
-        self._refuse("photo_attitudes", beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
-        if self.principal_distances is not None:
-            self._refuse("principal_distances", self.principal_distances == 0, "is zero", self.photo_ids)
-        self._refuse("point_positions", np.isinf(self.point_positions), "is infinite", self.point_ids)
-        for name in ("photo_position_sd", "photo_attitude_sd", "point_sd"):
-            self._refuse(name, ~(getattr(self, name) >= 0), "is not a standard deviation", owners[name[:5]])
-        if self.point_check_sd is not None:
-            bad = ~(np.isnan(self.point_check_sd) | (self.point_check_sd >= 0)) | np.isinf(
-                self.point_check_sd
-            )
-            self._refuse("point_check_sd", bad, "is not a finite standard deviation", self.point_ids)
-        bad = ~((self.image_sd > 0) & np.isfinite(self.image_sd))
-        self._refuse("image_sd", bad, "is not a positive, finite standard deviation", None)
-        held_unknown = np.isfinite(self.point_sd) & np.isnan(self.point_positions)
-        self._refuse(
-            "point_positions", held_unknown, "is unknown but held (its point_sd is finite)", self.point_ids
-        )
-
-    def _check_observed(self) -> None:
-        for name, initial, sd in (
-            ("photo_positions_observed", self.photo_positions, self.photo_position_sd),
-            ("photo_attitudes_observed", self.photo_attitudes, self.photo_attitude_sd),
-        ):
-            observed = getattr(self, name)
-            if observed is None:
-                unknown = np.isnan(initial) & np.isfinite(sd)
-                why = "is unknown but weighted or fixed (its sd is finite)"
-                self._refuse(name.removesuffix("_observed"), unknown, why, self.photo_ids)
-                continue
-            self._refuse(name, np.isinf(observed), "is infinite", self.photo_ids)
-            if initial is self.photo_attitudes:
-                beyond = np.abs(observed) > _ANGLES
-                self._refuse(name, beyond, f"is beyond {_ANGLES:g} radians", self.photo_ids)
-            unknown = np.isnan(observed) & np.isfinite(sd)
-            self._refuse(name, unknown, "is unknown but weighted (its sd is finite)", self.photo_ids)
-            moved = (sd == 0) & (observed != initial)
-            self._refuse(name, moved, "is fixed (its sd is 0), but not at the initial value", self.photo_ids)
-
-    def _check_twice(self) -> None:
-        """Refuse a second image of a point on a photo: it would count as an independent observation."""
-        again = repeated_pairs(self.image_photos, self.image_points, len(self.point_ids))
-        if again.size:
-            second = again[0]
-            photo, point = self.image_photos[second], self.image_points[second]
-            first = np.flatnonzero((self.image_photos == photo) & (self.image_points == point))[0]
-            point, photo = self.point_ids[point], self.photo_ids[photo]
-            raise InputError(
-                f"the point {point} has two images on the photo {photo} (rows {first} and {second}):"
-                " average repeated pointings"
-            )
-
-    def _check_conventions(self) -> None:
-        text("title", self.title)
-        text("linear_unit", self.linear_unit)
-        self._set("photo_to_ground", truth_value("photo_to_ground", self.photo_to_ground))
-        if self.spheroid is not None and not isinstance(self.spheroid, Spheroid):
-            raise InputError(f"spheroid is a Spheroid or None, not {shown(self.spheroid)}")
-        if not isinstance(self.frame, Frame):
-            raise InputError(f"frame is a Frame, not {shown(self.frame)}")
-        if self.refraction is not None:
-            if not isinstance(self.refraction, Refraction):
-                raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
-            metres_per_unit(self.linear_unit)
-
-    def _check_timed(self) -> None:
-        self._set("timed", checked_timed(self.timed, self.photo_ids))
-        self._check_own_poses()
-        poses = Poses(
-            self.photo_ids,
-            self.photo_positions,
-            self.photo_attitudes,
-            self.photo_position_sd,
-            self.photo_attitude_sd,
-            self.photo_positions_observed,
-            self.photo_to_ground,
-            self.geographic,
-        )
-        self._set("_trajectories", own_trajectories(self.timed, poses))
-        on_frames = {each.photo for each in self.mounts} | {each.frame for each in self.mounts}
-        both = [each.photo for each in self.timed if each.photo in on_frames]
-        if both:
-            raise InputError(f"the photo {both[0]} is on a trajectory and on a frame: say so by its sensor")
-        shared = [each.photo for each in self.timed if each.trajectory is not None]
-        if shared:
-            on_shared = np.isin(self.photo_ids, shared)[:, np.newaxis]
-            why = "is weighted or fixed, but the photo is on a trajectory, whose coefficients may be"
-            for name in ("photo_position_sd", "photo_attitude_sd"):
-                self._refuse(name, on_shared & np.isfinite(getattr(self, name)), why, self.photo_ids)
-        scanned = [each.photo for each in self.timed if each.lines is not None]
-        if scanned and self.image_unit != "mm":
-            raise InputError(
-                f"the photo {scanned[0]} is a scanner's: its camera is in mm, not {self.image_unit}"
-            )
-        of_scanners = np.isin(self.photo_ids, scanned)
-        own = [] if self.photo_cameras is None else np.unique(self.photo_cameras[of_scanners]).tolist()
-        if measured := [self.cameras[row].title for row in own if self.cameras[row].weights == "measured"]:
-            raise InputError(
-                f"the camera {measured[0]} is a scanner's: standard deviations of its images are of the"
-                " corrected place in the focal plane, not of what was measured (docs/moving.md#images)"
-            )
-        named = Counter(each.name for each in self.all_trajectories)
-        twice = [name for name, count in named.items() if count > 1]
-        if twice:
-            raise InputError(
-                f"two trajectories are called {twice[0]}: photos and records that are on one take one object"
-            )
-
-    def _check_own_poses(self) -> None:
-        """Refuse photos with a trajectory of their own, which goes from their pose, without that."""
-        if not (own := [each.photo for each in self.timed if each.trajectory is None]):
-            return
-        unknown = np.isnan(self.photo_positions).any(axis=1) | np.isnan(self.photo_attitudes).any(axis=1)
-        for row in np.flatnonzero(unknown & np.isin(self.photo_ids, own)).tolist():
-            raise InputError(
-                f"the pose of the photo {self.photo_ids[row]}, from which it moves, is not known:"
-                " photogram.first_values finds it of the block without what is timed"
-            )
-
-    def _check_motions(self) -> None:
-        """Refuse motions of photos that have none of their own, and poses of scanners at no time."""
-        sensors = {each.photo: each.sensor for each in self.timed}
-        # The middle of their images is another where one of these is left out.
-        strips = {each.photo for each in self.timed if each.lines is not None and each.time is None}
-        for each in self.observations:
-            if each.moment is None and not strips.isdisjoint(each.photos):
-                name = next(photo for photo in each.photos if photo in strips)
-                raise InputError(
-                    f"the {each.KIND} of the photo {name}: a scanner has no one pose; give it a time, or take"
-                    " the trajectory at one"
-                )
-            if not isinstance(each, Rate | Velocity) or each.moment is not None:
-                continue
-            photo = each.photos[0]
-            if photo not in sensors and photo in self.photo_ids:
-                raise InputError(f"the {each.KIND} of the photo {photo}: it is on no trajectory")
-            if sensors.get(photo) is not None:
-                raise InputError(
-                    f"the {each.KIND} of the photo {photo}: it is a sensor on a trajectory; take the"
-                    " trajectory at its time"
-                )
-
-    def _check_observations(self) -> None:
-        if not isinstance(self.observations, Sequence):
-            raise InputError(f"observations is no list: {shown(self.observations)}")
-        self._set("observations", tuple(self.observations))
-        for row, each in enumerate(self.observations):
-            if not isinstance(each, Observation) or not each.KIND:
-                raise InputError(f"observations[{row}] is no observation: {shown(each)}")
-        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
-        if self.mounts:
-            mounted = np.isin(self.photo_ids, [mount.photo for mount in self.mounts])[:, np.newaxis]
-            why = "is weighted or fixed, but the photo is on a frame, whose pose and sensor it has"
-            for name in ("photo_position_sd", "photo_attitude_sd"):
-                self._refuse(name, mounted & np.isfinite(getattr(self, name)), why, self.photo_ids)
-        self._check_timed()
-        self._check_motions()
-        self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
-        self._set("observations", with_smoothness(self.observations, self.trajectories))
-        self._set("observations", with_knots(self.observations, self.cameras))
-        _ = self.observation_groups  # refuses what observations name and the block has not
-        figures = {
-            name: figure.title
-            for figure in self.passages
-            if isinstance(figure, Figure)
-            for name in figure.points
-        }
-        touched = {name for row in self.observations for name in row.points} if figures else set()
-        for row, name in enumerate(self.point_ids if figures else ()):
-            if name in figures and (self.point_sd[row].any() or name in touched):
-                raise InputError(
-                    f"the point {name} of the {figures[name]} is free, weighted or observed beside images:"
-                    " its coordinates are given, and point_sd is 0"
-                )
-        of_photos = self.photo_cameras if self.cameras else None
-        check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
-
-    def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
-        if bad.any():
-            row = int(np.argwhere(bad)[0][0])
-            if owners is not None:
-                of = owners[row]
-            else:
-                point, photo = self.image_points[row], self.image_photos[row]
-                of = f"{self.point_ids[point]} on photo {self.photo_ids[photo]}"
-            raise InputError(f"{name} of {of} {why}: {getattr(self, name)[row].tolist()}")
 
     def brief(self) -> tuple[str, Rows]:
         """Return what the block is in a few lines, as its `repr` and notebooks show it."""
         held, known = np.isfinite(self.point_sd).any(axis=1), np.isfinite(self.point_positions).any(axis=1)
         counts = {"control": held.sum(), "with known coordinates": (known & ~held).sum()}
-        told = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+        kinds_of_points = ", ".join(f"{count:,} {name}" for name, count in counts.items())
         distances = self.principal_distances
         spheroid = self.spheroid
         kinds = Counter(each.label for each in self.observations)
         rows = [
             ("photos", few(self.photo_ids)),
             ("points", few(self.point_ids)),
-            ("", told),
+            ("", kinds_of_points),
             ("images", f"{len(self.image_xy):,}, {self.image_unit}, sd {_span(self.image_sd)}"),
             ("cameras", few(self.camera_names) if distances is None else f"c {_span(distances)} mm"),
             ("space", f"geographic, a = {spheroid.a:g}" if spheroid else "rectangular"),
@@ -563,10 +311,7 @@ class Block(Valued, Brief):
             return self.principal_distances
         for name, each in zip(self.camera_names, self.cameras, strict=True):
             if each.model != "perspective" or not each.is_held or each.unit != "mm":
-                raise InputError(
-                    f"{what}: {name} has the model {each.model} or unknown parameters; only cameras that are"
-                    " known and free of distortion, in mm, are taken there"
-                )
+                raise unsupported(what, "camera", camera=name, model=each.model)
         distances = np.array([each.values[0] for each in self.cameras])
         return np.asarray(distances[self.photo_cameras])
 
@@ -636,8 +381,8 @@ class Block(Valued, Brief):
             A name that is no field, or whatever the class refuses.
         """
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        if unknown := changes.keys() - values.keys():
-            raise InputError(f"a block has no {', '.join(sorted(unknown))}")
+        if unknown := sorted(changes.keys() - values.keys()):
+            raise InputError(phrase("error.unknown", kind="field", name=unknown[0], names=list(values)))
         points = changes.get("point_ids")
         if points is not None and len(points) != len(self.point_ids):
             values["point_check_sd"] = None
@@ -653,7 +398,7 @@ class Block(Valued, Brief):
         InputError
             Photos or observations on trajectories.
         """
-        refuse_trajectories(self, "fixed photos", "whose pose is not its own")
+        refuse_trajectories(self, "fixed photos")
         return self.replace(
             photo_position_sd=0.0,
             photo_attitude_sd=0.0,
@@ -681,49 +426,50 @@ def _span(values: Floats) -> str:
     return f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
 
 
-def flown_by(block: Block) -> str:
-    """Return what of a block is on a trajectory, by name; nothing where nothing is."""
+def flown_by(block: Block) -> Phrase | None:
+    """Return the message on the first photo or observation that is on a trajectory."""
     if block.timed:
-        return f"the photo {block.timed[0].photo} is on a trajectory"
+        return phrase("block.moving.photo", photo=block.timed[0].photo)
     records = moments(block.observations)
-    return f"observations are of the trajectory {records[0].trajectory.name}" if records else ""
+    return phrase("block.moving.record", trajectory=records[0].trajectory.name) if records else None
 
 
 def of_images_alone(block: Block, what: str) -> Block:
-    """Return a block that has nothing but images; refuse others for what would leave the rest out."""
+    """Return a block with images only; refuse others for a function that does not support them."""
     refuse_trajectories(block, what)
     refuse_passages(block, what)
     if block.observations:
-        raise InputError(f"{what}: the block has observations beside images, which are not taken there")
+        raise unsupported(what, "observations")
     if block.mounts:
-        raise InputError(f"{what}: the block has photos on frames, which are not taken there")
+        raise unsupported(what, "mounts")
     return block
 
 
-def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
-    """Refuse a block with photos or observations on trajectories for what does not take them."""
-    if flown := flown_by(block):
-        raise InputError(f"{what}: {flown}, {why}")
+def refuse_trajectories(block: Block, what: str) -> None:
+    """Refuse a block with photos or observations on trajectories."""
+    if moving := flown_by(block):
+        raise unsupported(what, "trajectories", reason=moving)
 
 
 def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] = ()) -> None:
-    """Refuse a block whose images pass something beside pose, point and camera, `but` what is of a kind."""
-    if passed := [each for each in block.all_passages if not isinstance(each, but)]:
-        raise InputError(f"{what}: images of the block pass a {passed[0].KIND}, which is not taken there")
+    """Refuse a block whose images depend on more than pose, point and camera, `but` on objects of a kind."""
+    if passages := [each for each in block.all_passages if not isinstance(each, but)]:
+        raise unsupported(what, "passage", kind=passages[0].KIND)
 
 
 def checked(block: Block) -> Block:
     """Return a block whose photos have positions and attitudes; refuse all else, by name."""
-    if not isinstance(block, Block):
-        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
-    unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)
-    if unknown.any():
-        photos = listed([block.photo_ids[row] for row in np.flatnonzero(unknown)])
-        raise InputError(
-            f"positions or attitudes of the photos {photos} are not known: photogram.first_values finds"
-            " initial values"
-        )
+    require_block(block)
+    if (unknown := ~known_poses(block)).any():
+        photos = [block.photo_ids[row] for row in np.flatnonzero(unknown)]
+        raise InputError(phrase("block.poses-unknown", photos=photos))
     return block
+
+
+def require_block(block: object) -> None:
+    """Refuse an argument that is not a block."""
+    if not isinstance(block, Block):
+        raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:

@@ -11,13 +11,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import LARGEST_SD, is_covariance, number, one_of, shaped, shown, text
+from photogram.arguments.arrays import (
+    LARGEST_SD,
+    argument_error,
+    is_covariance,
+    number,
+    one_of,
+    shaped,
+    text,
+)
 from photogram.arguments.equality import Valued
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.summary import Brief, Rows
+from photogram.words import phrase
 
 Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
@@ -115,17 +125,14 @@ class Camera(Valued, Brief):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, str) or self.model not in _names():
-            raise InputError(f"a camera is one of {', '.join(_names())}, not {shown(self.model)}")
+        one_of("model", self.model, _names())
         text("name", self.name)
         if self.unit is None:
             self._set("unit", "mm" if "c" in self.names else "px")
         one_of("unit", self.unit, get_args(ImageUnit))
         one_of("weights", self.weights, get_args(Weights))
-        if self.weights == "measured" and self.direction == "forward":
-            raise InputError(
-                f"the camera {self.title}: residuals of {self.model} lie in the measured image anyway"
-            )
+        forward = self.weights == "measured" and self.direction == "forward"
+        require(not forward, f"camera {self.title}", "not-applicable", name="weights", other=self.model)
         self._set("parameters", self._checked_parameters())
         self._set("covariance", self._checked_covariance())
         self._set("sd", self._checked_sd())
@@ -233,74 +240,62 @@ class Camera(Valued, Brief):
         return replace(self, **changes)
 
     def _named(self, what: str, given: object) -> dict[str, float]:
+        where = f"{what} of camera {self.title}"
         if not isinstance(given, Mapping):
-            raise InputError(
-                f"{what} of the camera {self.title} is no mapping of names to numbers: {shown(given)}"
-            )
-        unknown = [str(name) for name in given if name not in self.names]
-        if unknown:
-            raise InputError(
-                f"{what} of the camera {self.title}: {self.model} has no {', '.join(unknown)}, but"
-                f" {', '.join(self.names)}"
-            )
-        return {name: number(f"{name} of the camera {self.title}", value) for name, value in given.items()}
+            raise argument_error(where, "table", value=given)
+        for name in given:
+            known = name in self.names
+            require(known, where, "unknown", kind="parameter", name=str(name), names=list(self.names))
+        return {name: number(f"{name} of camera {self.title}", value) for name, value in given.items()}
 
     def _checked_parameters(self) -> dict[str, float]:
         given = self._named("parameters", self.parameters)
         needed = _GIVEN - ({"cx", "cy"} if "w" in self.names else set())
         missing = [name for name in self.names if name in needed and name not in given]
-        if missing:
-            raise InputError(f"parameters of the camera {self.title}: {', '.join(missing)} must be given")
+        require(not missing, f"parameters of camera {self.title}", "missing", name=", ".join(missing))
         for name, value in given.items():
-            if not math.isfinite(value):
-                raise InputError(f"{name} of the camera {self.title} is not a finite number: {value}")
+            require(math.isfinite(value), f"{name} of camera {self.title}", "finite", value=value)
             if value == 0 and name in _GIVEN - {"cx", "cy"}:
-                raise InputError(f"{name} of the camera {self.title} is zero")
+                raise InputError(phrase("block.not-zero", name=f"{name} of camera {self.title}", value=value))
         return {name: given.get(name, 0.0) for name in self.names}
 
     def _checked_sd(self) -> dict[str, float]:
         if isinstance(self.sd, Mapping):
             given = self._named("sd", self.sd)
         else:
-            own = number(f"sd of the camera {self.title}", self.sd)
+            own = number(f"sd of camera {self.title}", self.sd)
             given = {name: own for name in self.names if name not in self.constants}
         if self.covariance is not None:
             names, matrix = self.covariance
             deviations = dict(zip(names, np.sqrt(np.diag(np.asarray(matrix))).tolist(), strict=True))
             for name in given.keys() & deviations.keys() if isinstance(self.sd, Mapping) else ():
                 if not math.isclose(given[name], deviations[name], rel_tol=1e-9):
-                    raise InputError(
-                        f"sd of {name} of the camera {self.title} is not that of its covariance matrix"
-                    )
+                    raise InputError(phrase("camera.sd-of-covariance", parameter=name, camera=self.title))
             given |= deviations
         for name, value in given.items():
-            if not value >= 0:
-                raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
+            where = f"sd of {name} of camera {self.title}"
+            require(value >= 0, where, "not-negative", value=value)
             if LARGEST_SD < value < math.inf:
-                raise InputError(
-                    f"sd of {name} of the camera {self.title} is too large for a variance: {value};"
-                    " infinity leaves the parameter free"
-                )
+                raise InputError(phrase("camera.large-sd", parameter=name, camera=self.title, value=value))
             if value > 0 and name in self.constants:
-                raise InputError(f"{name} of the camera {self.title} is a constant: its sd is 0")
+                raise InputError(phrase("camera.constant", parameter=name, camera=self.title))
         return {name: given.get(name, 0.0) for name in self.names}
 
     def _checked_covariance(self) -> tuple[tuple[str, ...], Floats] | None:
         if self.covariance is None:
             return None
-        what = f"covariance of the camera {self.title}"
+        where = f"covariance of camera {self.title}"
         try:
             of, matrix = self.covariance
-            listed = tuple(of)
+            names = tuple(of)
         except (TypeError, ValueError):
-            raise InputError(f"{what} is no pair of names and a matrix: {shown(self.covariance)}") from None
-        self._named("covariance", dict.fromkeys(listed, 0.0))
-        if not listed or len(set(listed)) < len(listed):
-            raise InputError(f"{what}: names are missing, or stand there more than once")
-        found = shaped(what, matrix, (len(listed), len(listed)))
-        if not is_covariance(found):
-            raise InputError(f"{what} is not symmetric and positive definite: {found.tolist()}")
-        return listed, found
+            raise kind_error(where, "a pair of names and a matrix", self.covariance) from None
+        self._named("covariance", dict.fromkeys(names, 0.0))
+        different = names and len(set(names)) == len(names)
+        require(different, where, "kind", kind="a pair of different names and a matrix", value=names)
+        checked = shaped(where, matrix, (len(names), len(names)))
+        require(is_covariance(checked), where, "covariance")
+        return names, checked
 
     @property
     def prior_covariance(self) -> Floats | None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from photogram.arguments.arrays import names, number, shown, text, truth_value
+from photogram.arguments.arrays import argument_error, names, number, text, truth_value
+from photogram.arguments.objects import kind_error, require
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
+from photogram.words import phrase
 
 __all__ = [
     "DatumRow",
@@ -63,8 +65,8 @@ class InnerConstraints:
             if value is not None:
                 object.__setattr__(self, name, tuple(names(name, value)))
         truth_value("scale", self.scale)
-        if self.radius is not None and not 0 < number("radius", self.radius) < math.inf:
-            raise InputError(f"radius is a positive length, not {self.radius}")
+        if self.radius is not None:
+            require(0 < number("radius", self.radius) < math.inf, "radius", "positive", value=self.radius)
 
 
 @dataclass(frozen=True)
@@ -93,18 +95,17 @@ class MinimumConstraints:
         if self.photo is not None:
             text("photo", self.photo)
         if self.coordinate is not None:
-            if self.photo is None:
-                raise InputError("a coordinate is held beside the pose of a photo: name this, too")
+            require(self.photo is not None, "datum", "requires", name="coordinate", other="photo")
             pair = names("coordinate", self.coordinate)
             if len(pair) != 2:
-                raise InputError(f"coordinate is no photo with an axis: {shown(self.coordinate)}")
+                raise kind_error("coordinate", "a photo and an axis", self.coordinate)
             object.__setattr__(self, "coordinate", (pair[0], pair[1]))
 
 
 def check_datum(datum: object) -> None:
-    """Refuse what is no datum to choose."""
+    """Refuse an argument that is not a datum."""
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
-        raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
+        raise kind_error("datum", "InnerConstraints, MinimumConstraints or None", datum)
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
@@ -113,9 +114,7 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
     attitudes = _indices(block, "photo", datum.attitudes)
     flown = {each.photo for each in block.timed}
     if on := [block.photo_ids[row] for row in (*photos, *attitudes) if block.photo_ids[row] in flown]:
-        raise InputError(
-            f"the photo {on[0]} is on a trajectory: its pose has no unknowns that could carry a datum"
-        )
+        raise InputError(phrase("block.datum.moving", photo=on[0]))
     return "inner", points, photos, datum.scale, attitudes, datum.radius
 
 
@@ -131,13 +130,11 @@ def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int
         return photo, None
     other, axis = datum.coordinate
     axes = [name.removesuffix("_deg") for name in position_columns(block)]
-    if axis not in axes:
-        raise InputError(f"{axis!r} is no coordinate: they are {', '.join(axes)}")
+    require(axis in axes, "datum", "unknown", kind="coordinate", name=axis, names=axes)
     for each, trajectory in zip(block.timed, block.trajectories, strict=True):
         if each.photo == other and (trajectory.position_axes != "table" or trajectory.body is not None):
-            raise InputError(
-                f"{axis} of {other} is not held: the trajectory {trajectory.name} has other axes"
-            )
+            fields = {"axis": axis, "photo": other, "trajectory": trajectory.name}
+            raise InputError(phrase("block.datum.axes", **fields))
     return photo, (_indices(block, "photo", [other])[0], axes.index(axis))
 
 
@@ -148,5 +145,5 @@ def _indices(block: Block, kind: str, wanted: Sequence[str] | None) -> list[int]
         return list(range(len(ids)))
     index = {name: i for i, name in enumerate(ids)}
     if missing := [name for name in wanted if name not in index]:
-        raise InputError(f"the datum names the {kind} {missing[0]!r}, which is not in the block")
+        raise argument_error("datum", "absent", kind=kind, name=missing[0])
     return [index[name] for name in wanted]

@@ -10,6 +10,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
 from photogram.network.motion import focal_images, scanners
 from photogram.network.subset import image_rows, kept_images
+from photogram.words import phrase
 
 _SIDE = -0.02  # u3 of unit directions that are seen well in front of the camera
 _SMALL = 1e-6  # Radians off the axis, where no lens distorts
@@ -58,10 +59,7 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
             middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
             linear = np.column_stack([right - middle, up - middle]) / _SMALL
             if not abs(np.linalg.det(linear)) > 0:
-                raise InputError(
-                    f"the camera {camera.name} shows all that is near its axis in one point: its f or c is"
-                    " wrong"
-                )
+                raise InputError(phrase("camera.no-scale", camera=camera.name))
             of_camera = image_cameras == row
             tangents[of_camera] = np.linalg.solve(linear, (block.image_xy[of_camera] - middle).T).T
     else:

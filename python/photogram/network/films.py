@@ -13,13 +13,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.arrays import argument_error, names, one_of, shaped
+from photogram.arguments.objects import instances, kind_error, require, require_kind
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
+from photogram.words import phrase
 
 PATTERNS = ("none", "w1 w2", "ebner", "grid")  # By the number under which the core knows each
 MOST_SHIFTS = 200  # Unknowns of the reseau of a photo
@@ -104,8 +106,8 @@ class Readings:
     def __post_init__(self) -> None:
         for name, shape in (("pitch", ()), ("origin", (2,)), ("half_range", (2,))):
             value = shaped(f"{name} of readings", getattr(self, name), shape)
-            if not np.isfinite(value).all() or (name != "origin" and not (value > 0).all()):
-                raise InputError(f"{name} of readings cannot be {value.tolist()}")
+            good = np.isfinite(value).all() and (name == "origin" or (value > 0).all())
+            require(good, f"{name} of readings", "finite" if name == "origin" else "positive", value=value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +131,17 @@ class Pattern:
     weights: Sequence[Weights]
 
     def __post_init__(self) -> None:
-        if self.kind not in PATTERNS[1:]:
-            raise InputError(f"there is no pattern {shown(self.kind)}, but {', '.join(PATTERNS[1:])}")
+        one_of("kind of a pattern", self.kind, PATTERNS[1:])
         count = 6 if self.kind == "grid" else 1
         own = shaped(f"numbers of the pattern {self.kind}", self.numbers, (count,))
         positive = own[2:] if self.kind == "grid" else own
-        if not (np.isfinite(own).all() and (positive > 0).all() and (own[4:] >= 2).all()):
-            raise InputError(f"numbers of the pattern {self.kind} cannot be {own.tolist()}")
+        good = np.isfinite(own).all() and (positive > 0).all() and (own[4:] >= 2).all()
+        require(good, f"numbers of the pattern {self.kind}", "positive", value=own.tolist())
         object.__setattr__(self, "numbers", own)
         needed = {"w1 w2": 1, "ebner": 5}.get(self.kind, int(np.prod(own[4:])))
-        if len(self.weights) != needed or not all(isinstance(each, Weights) for each in self.weights):
-            raise InputError(f"the pattern {self.kind} has {needed} Weights of two")
+        weights = instances(f"weights of the pattern {self.kind}", self.weights, Weights)
+        actual = len(weights)
+        require(actual == needed, f"weights of the pattern {self.kind}", "count", count=needed, actual=actual)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -180,14 +182,11 @@ class Reseau(Pattern):
     ) -> None:
         own = shaped("numbers of the reseau", numbers, (6,))
         nodes = int(np.prod(own[4:]))
-        if 2 * nodes > MOST_SHIFTS:
-            raise InputError(
-                f"the reseau of the photo {photo} has {nodes} nodes, {2 * nodes} unknowns: {MOST_SHIFTS} are"
-                " the most"
-            )
+        where = f"unknowns of the reseau of photo {photo}"
+        require(2 * nodes <= MOST_SHIFTS, where, "most", high=MOST_SHIFTS, value=2 * nodes)
         deviations = shaped("sd of the reseau", sd, (2,))
-        if not ((deviations > 0).all() and np.isfinite(deviations).all() and smooth > 0):
-            raise InputError(f"deviations of the reseau cannot be {deviations.tolist()} and {smooth}")
+        good = (deviations > 0).all() and np.isfinite(deviations).all() and smooth > 0
+        require(good, "sd and smooth of the reseau", "positive", value=f"{deviations.tolist()}, {smooth}")
         object.__setattr__(self, "photo", photo)
         object.__setattr__(self, "sd", deviations)
         object.__setattr__(self, "smooth", float(smooth))
@@ -260,12 +259,9 @@ class Film:
             ("readings", Readings),
         )
         for name, kind in parts:
-            if not isinstance(getattr(self, name), kind):
-                raise InputError(f"the {name} of a film is no {kind.__name__}: {shown(getattr(self, name))}")
+            require_kind(f"{name} of a film", getattr(self, name), kind)
         if len(self.curves) not in (0, 6):
-            raise InputError(
-                f"a scanner has six curves of three coefficients, or none, not {len(self.curves)}"
-            )
+            raise kind_error("curves of a scanner", "6 or 0 objects", len(self.curves))
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -306,8 +302,7 @@ class Scan(Passage):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "photo", names("scan", [self.photo])[0])
-        if not isinstance(self.film, Film):
-            raise InputError(f"the film of the photo {self.photo} is no Film: {shown(self.film)}")
+        require_kind(f"film of photo {self.photo}", self.film, Film)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -317,7 +312,7 @@ class Scan(Passage):
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
         """Return the row of its photo."""
         if self.photo not in photos:
-            raise InputError(f"the block has no photo {self.photo}, which a scan names")
+            raise argument_error("scan", "absent", kind="photo", name=self.photo)
         return [photos[self.photo]]
 
     def numbers(self) -> Floats:
@@ -342,27 +337,19 @@ def check_scans(
     rows = {name: row for row, name in enumerate(photos)} if scans else {}
     seen: set[str] = set()
     for each in scans:
-        if each.photo in seen:
-            raise InputError(f"the photo {each.photo} is scanned twice")
+        require(each.photo not in seen, "scans", "repeated", kind="photo", name=each.photo)
         seen.add(each.photo)
         if photo_cameras is None:
             continue
         camera = cameras[int(photo_cameras[rows[each.photo]])]
-        if camera.unit != "mm" or (camera.image_y == "down" and camera.model != "plate"):
-            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up, or plate")
-        if camera.model.startswith("on_comparator"):
-            raise InputError(
-                f"the photo {each.photo} is a scanned film, and its camera is on_comparator, which has a"
-                " scanner of its own: brown, with the comparator as a scanner"
-            )
-        if camera.direction == "backward" and camera.weights == "corrected":
-            raise InputError(
-                f"the photo {each.photo} is a scanned film: residuals are those of readings, and its camera"
-                " has weights corrected: measured is needed"
-            )
+        cases = {
+            "unit": camera.unit != "mm" or (camera.image_y == "down" and camera.model != "plate"),
+            "comparator": camera.model.startswith("on_comparator"),
+            "weights": camera.direction == "backward" and camera.weights == "corrected",
+        }
+        for code, wrong in cases.items():
+            if wrong:
+                raise InputError(phrase(f"block.scan.{code}", photo=each.photo, camera=camera.title))
     read = {rows[each.photo] for each in scans if each.film.readings.pitch != 1.0}
     if read and (others := set(np.unique(image_photos).tolist()) - read):
-        raise InputError(
-            f"the photo {photos[min(read)]} is read in pixels, and {photos[min(others)]} is not: images of a"
-            " block have one unit"
-        )
+        raise InputError(phrase("block.scan.units", photo=photos[min(read)], other=photos[min(others)]))

@@ -18,6 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
+from photogram.words import phrase
 
 __all__ = [
     "Spheroid",
@@ -53,9 +54,7 @@ class Spheroid:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.a) and 0 < self.b <= self.a):
-            raise InputError(
-                f"a spheroid needs finite semi-axes with 0 < b <= a, not a = {self.a}, b = {self.b}"
-            )
+            raise InputError(phrase("block.spheroid", a=self.a, b=self.b))
 
     @classmethod
     def clarke_1866(cls) -> Spheroid:

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, numbers, shaped
+from photogram.arguments.objects import require
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
+from photogram.words import phrase
 
 KNOTTED = "splined_stereographic"  # The model that has knots
 MOST = 10_000  # Knots along columns or rows, at the most
@@ -87,54 +89,37 @@ def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple
 def checked_knots(
     title: str, model: str, parameters: Mapping[str, float], knots: ArrayLike | None
 ) -> Floats | None:
-    """Return (ny, nx, 2) knots; None of a model without them.
-
-    InputError: constants that are none of a spline, knots of a model without them, another shape, values that
-    are not finite.
-    """
+    """Return (ny, nx, 2) knots; None for a model without them."""
+    where = f"knots of camera {title}"
     if model != KNOTTED:
-        if knots is not None:
-            raise InputError(f"the camera {title}: {model} has no knots; {KNOTTED} has")
+        require(knots is None, where, "not-applicable", name="knots", other=model)
         return None
     order, fov = parameters["order"], parameters["fov_x_deg"]
-    if order not in (2.0, 3.0):
-        raise InputError(f"order of the camera {title} is 2 or 3, not {order:g}")
+    require(order in (2.0, 3.0), f"order of camera {title}", "whole-range", low=2, high=3, value=order)
     for name in ("nx", "ny"):
-        count = parameters[name]
-        if not (count.is_integer() and order < count <= MOST):
-            raise InputError(
-                f"{name} of the camera {title}: splines of order {order:g} have {order + 1:g} to {MOST} knots"
-                f" along an axis, not {count:g}"
-            )
-    if not 0 < fov < 360:
-        raise InputError(f"fov_x_deg of the camera {title} is between 0 and 360 degrees, not {fov:g}")
+        count, least = parameters[name], int(order) + 1
+        good = count.is_integer() and least <= count <= MOST
+        require(good, f"{name} of camera {title}", "whole-range", low=least, high=MOST, value=count)
+    require(0 < fov < 360, f"fov_x_deg of camera {title}", "range", low=0, high=360, value=fov)
     shape = (int(parameters["ny"]), int(parameters["nx"]), 2)
-    found = shaped(f"knots of the camera {title}", 0.0 if knots is None else knots, shape)
-    if not np.isfinite(found).all():
-        raise InputError(f"knots of the camera {title} are not all finite")
-    return found
+    checked = shaped(where, 0.0 if knots is None else knots, shape)
+    require(np.isfinite(checked).all(), where, "finite", value="NaN or inf")
+    return checked
 
 
 def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Floats | None:
-    """Return (ny, nx, 2) sd of knots, radial and tangential; None of a model without them.
-
-    InputError: standard deviations of what is not there, of another shape, or negative.
-    """
-    what = f"knot_sd of the camera {title}"
-    found = numbers(what, given)
+    """Return (ny, nx, 2) sd of knots, radial and tangential; None for a model without them."""
+    where = f"knot_sd of camera {title}"
+    sd = numbers(where, given)
     if knots is None:
-        if found.any():
-            raise InputError(f"{what}: it has no knots")
+        require(not sd.any(), where, "requires", name="knot_sd", other="knots")
         return None
-    if found.shape == (2,):
-        found = np.broadcast_to(found, knots.shape)
-    found = shaped(what, found, knots.shape)
-    if not (found >= 0).all():
-        raise InputError(f"{what} holds what is no standard deviation: {float(found[~(found >= 0)][0])}")
-    kinds = np.sign(found) + np.isinf(found)
+    sd = shaped(where, np.broadcast_to(sd, knots.shape) if sd.shape == (2,) else sd, knots.shape)
+    require((sd >= 0).all(), where, "not-negative", value=float(sd.min()))
+    kinds = np.sign(sd) + np.isinf(sd)
     if (kinds[..., 0] != kinds[..., 1]).any():
-        raise InputError(f"{what}: a knot is held, weighted or free in both directions")
-    return frozen(found)
+        raise InputError(phrase("block.knot-sd", camera=title))
+    return frozen(sd)
 
 
 def knot_names(knots: Floats | None) -> tuple[str, ...]:

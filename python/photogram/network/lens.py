@@ -7,9 +7,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from photogram.arguments.arrays import number, numbers, one_of, shown
+from photogram.arguments.arrays import number, numbers, one_of
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 
 LensModel = Literal["radial", "transverse", "lrolrocnac", "kaguyalism", "cahvor", "radtan"]
@@ -55,13 +55,14 @@ class Lens:
         one_of("model of a lens", self.model, get_args(LensModel))
         own = np.atleast_1d(numbers(f"coefficients of the lens {self.model}", self.coefficients))
         count = _FORMULAS[self.model].count
-        if own.shape != (count,) or not np.isfinite(own).all():
-            raise InputError(
-                f"the lens {self.model} has {count} coefficients, finite ones: {shown(self.coefficients)}"
-            )
+        good, where = (
+            own.shape == (count,) and np.isfinite(own).all(),
+            f"coefficients of the lens {self.model}",
+        )
+        require(good, where, "numbers", count=count, value=self.coefficients)
         object.__setattr__(self, "coefficients", tuple(own.tolist()))
-        if not (np.isfinite(number("focal_length", self.focal_length)) and self.focal_length):
-            raise InputError(f"the focal length of the lens {self.model} is {self.focal_length}")
+        usable = np.isfinite(number("focal_length", self.focal_length)) and self.focal_length != 0
+        require(usable, f"focal_length of the lens {self.model}", "positive", value=self.focal_length)
 
     def corrected(self, places: Floats) -> Floats:
         """Return where a perfect lens has them, (n, 2), of (n, 2) measured places; millimetres, y up."""

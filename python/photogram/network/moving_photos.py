@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown
+from photogram.arguments.arrays import argument_error, names, number, numbers, one_of, shaped
 from photogram.arguments.equality import Valued
+from photogram.arguments.objects import instances, kind_error, require, require_kind
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -18,8 +19,12 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
+from photogram.words import phrase
 
-__all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checked_timed", "own_trajectories"]
+if TYPE_CHECKING:
+    from photogram.network.block import Block
+
+__all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
 Direction = Literal["down", "up", "right", "left"]
 
@@ -57,7 +62,7 @@ class Shutter:
         one_of("direction", self.direction, get_args(Direction))
         first, last = shaped("edges of a shutter", self.edges, (2,)).tolist()
         if not np.isfinite([first, last]).all() or first == last:
-            raise InputError(f"the edges of a shutter are two coordinates: {shown(self.edges)}")
+            raise kind_error("edges of a shutter", "two different coordinates", self.edges)
         object.__setattr__(self, "edges", (first, last))
         if not isinstance(self.readout, Readout):
             object.__setattr__(self, "readout", _known(number("readout", self.readout)))
@@ -86,7 +91,7 @@ class Lines:
         rows = np.atleast_2d(numbers("lines", self.table))
         sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
         if not sound or not (np.diff(rows[:, 0]) > 0).all() or not (rows[:, 2] != 0).all():
-            raise InputError(f"lines are first line, time, seconds per line, ascending: {shown(self.table)}")
+            raise kind_error("lines", "rows of first line, time, seconds per line, ascending", self.table)
         object.__setattr__(self, "table", rows)
 
     def times(self, lines: ArrayLike, start: float = 0.0) -> Floats:
@@ -139,17 +144,14 @@ class LineSensor(Valued):
     def __post_init__(self) -> None:
         pitch = shaped("pitch of a line of sensors", self.pitch, (2,))
         if not (np.isfinite(pitch).all() and pitch.any()):
-            raise InputError(f"the pitch of a line of sensors is {shown(self.pitch)}")
+            raise kind_error("pitch of a line of sensors", "finite and not 0", self.pitch)
         object.__setattr__(self, "pitch", tuple(pitch.tolist()))
-        if self.lens is not None and not isinstance(self.lens, Lens):
-            raise InputError(f"the lens of a line of sensors is no Lens: {shown(self.lens)}")
+        require_kind("lens of a line of sensors", self.lens, Lens, optional=True)
         if self.bends is not None:
             rows = numbers("bends of a line of sensors", self.bends)
             sound = rows.ndim == 2 and rows.shape[1] == 3 and len(rows) and np.isfinite(rows).all()
             if not sound or not (np.diff(rows[:, 0]) > 0).all():
-                raise InputError(
-                    f"bends of a line of sensors are sample, x, y, ascending: {shown(self.bends)}"
-                )
+                raise kind_error("bends of a line of sensors", "rows of sample, x, y, ascending", self.bends)
             object.__setattr__(self, "bends", rows)
 
     @classmethod
@@ -163,10 +165,10 @@ class LineSensor(Valued):
         """
         rows = numbers("table of a line of sensors", table)
         if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 2:
-            raise InputError(f"a table of a line of sensors has rows of sample, x, y: {shown(table)}")
+            raise kind_error("table of a line of sensors", "rows of sample, x, y", table)
         (s0, x0, y0), across = rows[0], rows[-1] - rows[0]
         if not across[0] > 0:
-            raise InputError(f"samples of a line of sensors do not ascend: {shown(table)}")
+            raise kind_error("samples of a line of sensors", "ascending", table)
         pitch = across[1:] / across[0]
         bends = np.column_stack([rows[:, 0], rows[:, 1:] - [x0, y0] - (rows[:, [0]] - s0) * pitch])
         return cls((float(pitch[0]), float(pitch[1])), float(s0), float(x0), float(y0), lens, bends)
@@ -275,23 +277,22 @@ class Timed:
     def __post_init__(self) -> None:
         object.__setattr__(self, "photo", names("photo of a trajectory", [self.photo])[0])
         for name, kind in _KINDS.items():
-            value = getattr(self, name)
-            if value is not None and not isinstance(value, kind):
-                raise InputError(f"{name} of the photo {self.photo} is no {kind.__name__}: {shown(value)}")
-        if self.time is not None and not np.isfinite(number(f"time of the photo {self.photo}", self.time)):
-            raise InputError(f"time of the photo {self.photo} is not finite: {self.time}")
+            require_kind(f"{name} of photo {self.photo}", getattr(self, name), kind, optional=True)
+        if self.time is not None and not np.isfinite(number(f"time of photo {self.photo}", self.time)):
+            raise argument_error(f"time of photo {self.photo}", "finite", value=self.time)
         for name in ("velocity", "rotation_rate", "sd_velocity", "sd_rate"):
-            object.__setattr__(
-                self, name, shaped(f"{name} of the photo {self.photo}", getattr(self, name), (3,))
-            )
-        if (self.lines is None) != (self.line_sensor is None):
-            raise InputError(f"the scanner {self.photo} needs both lines and line_sensor")
-        if self.shutter is not None and (self.lines is not None or self.rate is not None):
-            raise InputError(f"the photo {self.photo} has a shutter or lines, not both")
-        if self.rate is not None and self.lines is None:
-            raise InputError(f"the photo {self.photo} has a factor of line rates, but no lines")
-        if self.lines is not None and self.trajectory is None and self.time is None:
-            raise InputError(f"the scanner {self.photo} needs a trajectory, or the time of its own pose")
+            array = shaped(f"{name} of photo {self.photo}", getattr(self, name), (3,))
+            object.__setattr__(self, name, array)
+        scanner = self.lines is not None
+        where = f"photo {self.photo}"
+        require(
+            scanner == (self.line_sensor is not None), where, "together", name="lines", other="line_sensor"
+        )
+        conflict = self.shutter is not None and (scanner or self.rate is not None)
+        require(not conflict, where, "exclusive", first="shutter", second="lines and rate")
+        require(scanner or self.rate is None, where, "requires", name="rate", other="lines")
+        placed = self.trajectory is not None or self.time is not None
+        require(placed or not scanner, where, "requires", name="lines", other="trajectory or time")
 
     @property
     def readout(self) -> Readout | None:
@@ -328,61 +329,45 @@ class Timed:
 
 
 def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
-    """Return what says which photos are on trajectories; InputError of a photo that is not there or twice."""
-    if not isinstance(timed, Sequence):
-        raise InputError(f"timed is no list: {shown(timed)}")
-    known, seen = set(photos), set()
-    for row, each in enumerate(timed):
-        if not isinstance(each, Timed):
-            raise InputError(f"timed[{row}] is no Timed: {shown(each)}")
-        if each.photo not in known:
-            raise InputError(f"the block has no photo {each.photo}, which timed[{row}] names")
-        if each.photo in seen:
-            raise InputError(f"the photo {each.photo} is on two trajectories")
-        seen.add(each.photo)
-    return tuple(timed)
+    """Return objects of different photos of a block."""
+    checked = instances("timed", timed, Timed)
+    require_photos("timed", [each.photo for each in checked], photos)
+    return checked
 
 
-@dataclass(frozen=True)
-class Poses:
-    """The poses of the photos of a block, as it has them."""
-
-    photo_ids: Sequence[str]
-    positions: Floats
-    attitudes: Floats
-    position_sd: Floats
-    attitude_sd: Floats
-    observed: Floats | None
-    photo_to_ground: bool
-    geographic: bool
+def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None:
+    """Refuse photos that a block lacks, or that occur twice."""
+    known, seen = set(photos), set[str]()
+    for photo in own:
+        if photo not in known or photo in seen:
+            code = "repeated" if photo in seen else "absent"
+            raise argument_error(name, code, kind="photo", name=photo)
+        seen.add(photo)
 
 
-def own_trajectories(timed: Sequence[Timed], poses: Poses) -> list[Trajectory]:
-    """Return the trajectory of each timed photo: that which it is given, or uniform motion from its pose."""
-    places = {name: row for row, name in enumerate(poses.photo_ids)} if timed else {}
+def own_trajectories(block: Block) -> list[Trajectory]:
+    """Return the trajectory of each timed photo: the given one, or uniform motion from its pose."""
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     return [
-        _uniform(poses, each, places[each.photo]) if each.trajectory is None else each.trajectory
-        for each in timed
+        _uniform(block, each, rows[each.photo]) if each.trajectory is None else each.trajectory
+        for each in block.timed
     ]
 
 
-def _uniform(poses: Poses, own: Timed, row: int) -> Trajectory:
+def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
     """Return c_0 + (t - t_e) v and r_0 + (t - t_e) w about the pose of a photo."""
-    if poses.geographic:
-        raise InputError(f"the photo {own.photo} needs a trajectory: its space is geographic")
-    sd_position, sd_attitude = poses.position_sd[row], poses.attitude_sd[row]
+    if block.geographic:
+        raise InputError(phrase("block.timed.geographic", photo=own.photo))
+    sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]
     if np.isfinite(sd_attitude).any() and not (sd_attitude == 0).all():
-        raise InputError(
-            f"the attitude of the photo {own.photo}, which moves, is weighted: give it as an Attitude"
-        )
-    observed = poses.observed
-    weighted = np.isfinite(sd_position)
-    place = poses.positions[row]
+        raise InputError(phrase("block.timed.attitude-sd", photo=own.photo))
+    observed = block.photo_positions_observed
+    place = block.photo_positions[row]
     if observed is not None:
-        place = np.where(weighted, observed[row], place)
+        place = np.where(np.isfinite(sd_position), observed[row], place)
     time = own.time or 0.0
-    told: Representation = "omega_phi_kappa_photo_to_ground" if poses.photo_to_ground else "omega_phi_kappa"
-    attitude = Attitudes.of(told, poses.attitudes[[row]]).matrices
+    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    attitude = Attitudes.of(form, block.photo_attitudes[[row]]).matrices
     table = Table(np.array([time]), place[np.newaxis], np.array([time]), attitude)
     shape = (3,)
     values = [np.zeros(3), shaped("velocity", own.velocity, shape)]

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.arrays import argument_error, names, shaped
+from photogram.arguments.objects import instances, kind_error, require, require_kind
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
@@ -73,12 +73,12 @@ class Figure(Passage):
     shifts: ArrayLike
 
     def __post_init__(self) -> None:
-        if not isinstance(self.bend, Bend):
-            raise InputError(f"the bend of a figure is no Bend: {shown(self.bend)}")
+        require_kind("bend of a figure", self.bend, Bend)
         object.__setattr__(self, "points", tuple(names("points of a figure", self.points)))
         shifts = shaped(f"shifts of the figure {self.bend.name}", self.shifts, (len(self.points), 2, 3))
-        if not np.isfinite(shifts).all():
-            raise InputError(f"a shift of the figure {self.bend.name} is not finite")
+        require(
+            np.isfinite(shifts).all(), f"shifts of the figure {self.bend.name}", "finite", value="NaN or inf"
+        )
         object.__setattr__(self, "shifts", shifts)
 
     @property
@@ -94,7 +94,7 @@ class Figure(Passage):
     def of(self, points: Mapping[str, int], photos: Mapping[str, int]) -> list[int]:
         """Return the rows of its points."""
         if missing := [name for name in self.points if name not in points]:
-            raise InputError(f"the block has no point {missing[0]}, which the figure {self.bend.name} names")
+            raise argument_error(f"figure {self.bend.name}", "absent", kind="point", name=missing[0])
         return [points[name] for name in self.points]
 
     def numbers(self) -> Floats:
@@ -103,14 +103,13 @@ class Figure(Passage):
 
 
 def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
-    """Return what images of a block pass; InputError of what is none, or of points that are not there."""
-    if not isinstance(passages, Sequence):
-        raise InputError(f"passages is no list: {shown(passages)}")
-    for row, each in enumerate(passages):
-        if not isinstance(each, Passage) or not each.KIND:
-            raise InputError(f"passages[{row}] is no passage: {shown(each)}")
-    _places(passages, points, photos)
-    return tuple(passages)
+    """Return passages whose points and photos are in a block."""
+    checked = instances("passages", passages, Passage)
+    for row, each in enumerate(checked):
+        if not each.KIND:
+            raise kind_error(f"passages[{row}]", "a Figure or a Scan", each)
+    _places(checked, points, photos)
+    return checked
 
 
 def passage_rows(

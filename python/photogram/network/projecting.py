@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
@@ -17,6 +18,7 @@ from photogram.network.motion import timed_images
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
+from photogram.words import phrase
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]
 
@@ -53,10 +55,9 @@ def projected(
 
     offset = 0.0 if own.offset is None else float(values(own.offset)[0][0])
     rate = 1.0 if own.readout is None else float(values(own.readout)[0][0])
-    if own.rate is not None and own.time is None:
-        raise InputError(
-            f"the scanner {own.photo} has a factor of line rates, which needs a time to count from"
-        )
+    require(
+        own.rate is None or own.time is not None, f"photo {own.photo}", "requires", name="rate", other="time"
+    )
     if own.lines is not None:
         times, samples = _crossed(own, trajectory.reach, seen, len(places))
         # By the clock and the rates of the scanner itself.
@@ -106,7 +107,7 @@ def projected_images(block: Block) -> Floats:
     InputError: refraction, by which images on trajectories are not projected; as :func:`projected`.
     """
     if block.refraction is not None:
-        raise InputError("images of photos on trajectories are computed without refraction, which is given")
+        raise InputError(phrase("block.timed.refraction"))
     points = block.point_positions
     if block.spheroid is not None:
         points = geographic_to_geocentric(points, block.spheroid)
@@ -131,7 +132,7 @@ def _crossed(
     """Return the times at which images of points cross the line of sensors, and their samples there."""
     sensor, lines = own.line_sensor, own.lines
     if sensor is None or lines is None or not np.isfinite(ends).all():
-        raise InputError(f"the scanner {own.photo} needs a trajectory with more than one record")
+        raise InputError(phrase("block.timed.one-record", photo=own.photo))
 
     def past(times: Floats, rows: Indices) -> tuple[Floats, Floats]:
         """Return how far the image of each point is from the line of sensors, and its sample."""

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Literal, get_args
 
 from photogram.arguments.annotations import check_arguments
-from photogram.errors import InputError
+from photogram.arguments.objects import require
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase
 
@@ -53,12 +53,11 @@ class Refraction:
     def __post_init__(self) -> None:
         for name, choices in (("air", get_args(Air)), ("water", get_args(Water))):
             value = getattr(self, name)
-            if value is not None and value not in choices:
-                raise InputError(f"{name} is one of {', '.join(choices)} or None, not {value!r}")
-        if not math.isfinite(self.water_level):
-            raise InputError(f"water_level must be finite, not {self.water_level}")
-        if not 1 <= self.refractive_index < math.inf:
-            raise InputError(f"refractive_index must be finite and at least 1, not {self.refractive_index}")
+            good = value is None or value in choices
+            require(good, name, "choice", names=[*choices, "None"], value=value)
+        require(math.isfinite(self.water_level), "water_level", "finite", value=self.water_level)
+        good = 1 <= self.refractive_index < math.inf
+        require(good, "refractive_index", "least", low=1, value=self.refractive_index)
 
     def phrase(self, linear_unit: str) -> Phrase:
         """Return the models of refraction as a message."""
@@ -86,9 +85,8 @@ class Refraction:
 
 def metres_per_unit(linear_unit: str) -> float:
     """Return the length of a linear unit in metres: the models of the air know metres only."""
-    if linear_unit not in METRES_PER_UNIT:
-        units = " or ".join(METRES_PER_UNIT)
-        raise InputError(f"refraction needs a linear unit of known length, {units}, not {linear_unit!r}")
+    known = linear_unit in METRES_PER_UNIT
+    require(known, "linear_unit with refraction", "choice", names=list(METRES_PER_UNIT), value=linear_unit)
     return METRES_PER_UNIT[linear_unit]
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.arguments.arrays import names, shown
+from photogram.arguments.arrays import names
+from photogram.arguments.objects import instances, require_kind
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.moving_photos import Timed
+from photogram.network.moving_photos import Timed, require_photos
 from photogram.network.unknowns import Sensor, Unknown
+from photogram.words import phrase
 
 __all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]
 
@@ -37,30 +39,20 @@ class Mount:
     sensor: Sensor
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sensor, Sensor):
-            raise InputError(f"the sensor of the photo {self.photo} is no Sensor: {shown(self.sensor)}")
+        require_kind(f"sensor of photo {self.photo}", self.sensor, Sensor)
         for name, value in zip(("photo", "frame"), names("mount", (self.photo, self.frame)), strict=True):
             object.__setattr__(self, name, value)
 
 
 def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
-    """Return mounts that agree with each other and with the photos of a block; InputError of others."""
-    if not isinstance(mounts, Sequence):
-        raise InputError(f"mounts is no list: {shown(mounts)}")
-    known, frames, seen = set(photos), set(), set()
-    for row, each in enumerate(mounts):
-        if not isinstance(each, Mount):
-            raise InputError(f"mounts[{row}] is no Mount: {shown(each)}")
-        for name in (each.photo, each.frame):
-            if name not in known:
-                raise InputError(f"the block has no photo {name}, which a mount names")
-        if each.photo in seen:
-            raise InputError(f"the photo {each.photo} is mounted twice")
-        seen.add(each.photo)
-        frames.add(each.frame)
-    if both := sorted(seen & frames):
-        raise InputError(f"the photo {both[0]} is mounted on a frame and stands for one")
-    return tuple(mounts)
+    """Return mounts that agree with each other and with the photos of a block."""
+    checked = instances("mounts", mounts, Mount)
+    frames = {each.frame for each in checked}
+    require_photos("mounts", [each.photo for each in checked], photos)
+    require_photos("mounts", sorted(frames), photos)
+    if both := sorted(frames & {each.photo for each in checked}):
+        raise InputError(phrase("block.mounted-frame", photo=both[0]))
+    return checked
 
 
 def mount_rows(

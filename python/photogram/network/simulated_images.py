@@ -18,6 +18,7 @@ from photogram.network.refraction import Refraction
 from photogram.network.simulated_layout import Layout, candidates, photo_ids
 from photogram.network.simulated_motion import RollingShutter
 from photogram.network.tables import checked_cameras
+from photogram.words import phrase
 
 
 @dataclass(frozen=True)
@@ -87,15 +88,12 @@ def seen_side(
     height: float,
     half_angle: float,
 ) -> float:
-    """Return the side of the part of the frame whose images stay in it while photos are read.
-
-    InputError: that is less than half of it.
-    """
+    """Return the side of the part of the frame whose images remain in it during the readout."""
     if motion is None:
         return frame_size
     side = frame_size - 2 * abs(principal_distance) * motion.margin(height, half_angle)
     if not side > frame_size / 2:
-        raise InputError("readout: the photos move too far while they are read")
+        raise InputError(phrase("simulation.readout"))
     return side
 
 
@@ -112,7 +110,7 @@ def photographed(
     """
     start = cameras if start_cameras is None else checked_cameras(start_cameras)
     if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
-        raise InputError("start_cameras are as many as cameras, and in their unit")
+        raise InputError(phrase("simulation.start-cameras", n=len(cameras), unit=cameras[0].unit))
     distance = truth.known_distances("the simulation")[0]
     photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
     of_images = photo_cameras[truth.image_photos]
@@ -121,7 +119,7 @@ def photographed(
     images = images_of(cameras, of_images, -np.sign(distance) * directions)
     if not np.isfinite(images).all():
         name = cameras[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
-        raise InputError(f"the camera {name} has no image of some points: they are beyond its lens terms")
+        raise InputError(phrase("simulation.beyond-lens", camera=name))
     larger = np.array([each.scale for each in cameras])[of_images, np.newaxis] / abs(distance)
     changes = {
         "principal_distances": None,

@@ -20,6 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid
+from photogram.words import phrase
 
 _FAR_MORE = 10.0  # Times as many points as were asked for are too many
 _AT_ONCE = 2**22  # Pairs of photo and point that may see each other, that are looked at together
@@ -80,14 +81,11 @@ def laid_out(
     dx, dy = plan.cell
     fewest = footprint**2 / (dx * dy)
     if fewest > _FAR_MORE * points_per_photo:
-        raise InputError(
-            "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
-            f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
-        )
+        raise InputError(phrase("simulation.many-points", points=fewest, wanted=points_per_photo))
     needed, available = _CANDIDATE_BYTES * _AT_ONCE + _IMAGE_BYTES * photos * fewest, available_memory()
     if available is not None and needed > available:
-        gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
-        raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
+        sizes = {"needed": needed / 2**30, "available": available / 2**30}
+        raise InputError(phrase("simulation.memory", **sizes))
     return plan
 
 

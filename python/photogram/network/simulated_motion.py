@@ -13,9 +13,9 @@ from typing import get_args
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
+from photogram.arguments.arrays import argument_error, number, one_of, truth_value, whole_number
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.network import geometry
 from photogram.network.attitudes import Attitudes
@@ -113,17 +113,18 @@ class LineScanner:
     scenes: bool = False
 
     def __post_init__(self) -> None:
-        if whole_number("lines", self.lines) not in (1, 2, 3):
-            raise InputError(f"lines of a scanner are 1, 2 or 3, not {self.lines}")
+        lines = whole_number("lines", self.lines)
+        require(lines in (1, 2, 3), "lines", "whole-range", low=1, high=3, value=lines)
         truth_value("scenes", self.scenes)
         within = {"view_angle": (0, 1.2), "pitch": (1e-6, 10), "speed": (1e-3, 1e5), "every": (1e-6, 1e6)}
         _check_numbers(self, within, ())
         for name in ("position", "rotation"):
             basis = getattr(self, name)
             if not isinstance(basis, Polynomial | Spline):
-                raise InputError(f"{name} of a scanner is a Polynomial or a Spline, not {shown(basis)}")
+                raise kind_error(f"{name} of a scanner", "a Polynomial or a Spline", basis)
             if isinstance(basis, Spline) and (basis.smooth or basis.correlation):
-                raise InputError(f"{name} of a scanner: coefficients are drawn one by one, not smooth")
+                where, other = f"{name} of a scanner", "a simulation, which draws independent coefficients"
+                raise argument_error(where, "not-applicable", name="smooth or correlation", other=other)
 
     @property
     def views(self) -> dict[str, float]:
@@ -143,10 +144,9 @@ def _check_numbers(
         value = getattr(given, name)
         if name in within:
             low, high = within[name]
-            if not low <= number(name, value) <= high:
-                raise InputError(f"{name} must be between {low:g} and {high:g}")
-        elif name in deviations and not number(name, value) >= 0:
-            raise InputError(f"{name} must not be negative")
+            require(low <= number(name, value) <= high, name, "range", low=low, high=high, value=value)
+        elif name in deviations:
+            require(number(name, value) >= 0, name, "not-negative", value=value)
 
 
 def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import number, shaped, whole_number
+from photogram.arguments.arrays import argument_error, number, shaped, whole_number
+from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
@@ -25,6 +26,7 @@ from photogram.network.rigs import Mount
 from photogram.network.simulated_motion import photo_angles, rotations_of
 from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
+from photogram.words import phrase
 
 __all__ = ["with_distances", "with_gnss", "with_inertial", "with_rig"]
 
@@ -67,10 +69,9 @@ def with_gnss(
     """
     _positive(sd=sd, seconds=seconds)
     for name, deviation in (("shift_sd", shift_sd), ("drift_sd", drift_sd)):
-        if not 0 <= number(name, deviation) < math.inf:
-            raise InputError(f"{name} must be finite and not negative, not {deviation}")
+        require(0 <= number(name, deviation) < math.inf, name, "not-negative", value=deviation)
     if simulation.block.mounts:
-        raise InputError("positions are of the photos that fly: add the rig afterwards")
+        raise InputError(phrase("simulation.rig-first"))
     random, truth = np.random.default_rng(seed), simulation.truth
     arm = shaped("lever_arm", lever_arm, (3,))
     given = arm + (lever_arm_sd if math.isfinite(lever_arm_sd) else 1.0) * random.standard_normal(3)
@@ -189,10 +190,10 @@ def with_distances(
     """
     _positive(sd=sd, scale=scale)
     truth = simulation.truth
-    if not 0 <= 2 * whole_number("count", count) <= len(truth.point_ids):
-        raise InputError(f"count must be at most half of the {len(truth.point_ids)} points: {count}")
-    if not unknown and (scale != 1 or constant != 0):
-        raise InputError("scale and constant are 1 and 0 where they are not unknown")
+    most = len(truth.point_ids) // 2
+    require(0 <= whole_number("count", count) <= most, "count", "range", low=0, high=most, value=count)
+    usual = scale == 1 and constant == 0
+    require(unknown or usual, "distances", "requires", name="scale or constant", other="unknown=True")
     random = np.random.default_rng(seed)
     first, second = random.permutation(len(truth.point_ids))[: 2 * count].reshape(2, -1)
     places = Cartesian(truth.spheroid).positions(truth.point_positions)
@@ -247,12 +248,14 @@ def with_rig(
     _positive(frame_size=frame_size)
     random, truth = np.random.default_rng(seed), simulation.truth
     if truth.refraction is not None:
-        raise InputError("a rig is simulated without refraction")
+        raise argument_error("simulation of a rig", "not-applicable", name="refraction", other="rigs")
     distances = truth.known_distances("the simulation of a rig")
     offsets = np.atleast_2d(np.asarray(positions, dtype=np.float64))
     turns = np.atleast_2d(np.asarray(rotations, dtype=np.float64))
-    if offsets.shape != turns.shape or offsets.shape[1] != 3:
-        raise InputError("positions and rotations of a rig have three numbers for each sensor")
+    good = offsets.shape == turns.shape and offsets.shape[1] == 3
+    require(
+        good, "positions, rotations", "shape", shape="(sensors, 3)", actual=f"{offsets.shape}, {turns.shape}"
+    )
     axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
     mounts: tuple[list[Mount], list[Mount]] = ([], [])
     added: list[tuple[Floats, Floats, Indices, Indices, Floats]] = []
@@ -308,8 +311,7 @@ def with_rig(
 
 def _positive(**values: float) -> None:
     for name, value in values.items():
-        if not 0 < number(name, value) < math.inf:
-            raise InputError(f"{name} must be positive and finite, not {value}")
+        require(0 < number(name, value) < math.inf, name, "positive", value=value)
 
 
 def _observed(

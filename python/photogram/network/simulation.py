@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of, shaped, shown, truth_value, whole_number
+from photogram.arguments.arrays import argument_error, number, one_of, shaped, truth_value, whole_number
+from photogram.arguments.objects import kind_error, require, require_kind
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -29,6 +30,7 @@ from photogram.network.simulated_layout import (
 )
 from photogram.network.simulated_motion import LineScanner, RollingShutter, rolled
 from photogram.network.tables import checked_cameras
+from photogram.words import phrase
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -186,37 +188,17 @@ def simulate(
     InputError
         Arguments outside their ranges.
     """
-    _check_types(locals())
+    _check_numbers(locals())
+    require_kind("spheroid", spheroid, Spheroid, optional=True)
+    require_kind("refraction", refraction, Refraction, optional=True)
     truth_value("photo_to_ground", photo_to_ground)
     one_of("control", control, ("perimeter", "corners", "none"))
     centre = shaped("origin", origin, (3,))
+    require((np.abs(centre) < _HUGE).all(), "origin", "less", high=_HUGE, value=centre.tolist())
+    require(relief < flying_height, "relief", "less", high=flying_height, value=relief)
     footprint = frame_size / abs(principal_distance or math.nan) * flying_height
-    _check(
-        {
-            "strips": (strips >= 1, "at least 1"),
-            "photos_per_strip": (photos_per_strip >= 2, "at least 2"),
-            "forward_overlap": (0.5 < forward_overlap < 1, "between 0.5 and 1"),
-            "side_overlap": (0 < side_overlap < 1, "between 0 and 1"),
-            "principal_distance": (math.isfinite(footprint), "finite and not 0"),
-            "frame_size": (frame_size > 0, "positive"),
-            "flying_height": (flying_height > _TINY, f"above {_TINY:g}"),
-            "relief": (0 <= relief < flying_height, "between 0 and the flying height"),
-            "points_per_photo": (4 <= points_per_photo < math.inf, "at least 4"),
-            "crab": (0 <= crab < math.pi / 4, "between 0 and pi/4"),
-            "tilt": (0 <= tilt < 0.1, "between 0 and 0.1"),
-            "control_spacing": (control_spacing >= 1, "at least 1"),
-            "control_sd": (0 <= control_sd < math.inf, "finite and not negative"),
-            "check_points": (check_points >= 0, "not negative"),
-            "image_sd": (0 < image_sd < math.inf, "finite and positive"),
-            "position_error": (0 <= position_error < math.inf, "finite and not negative"),
-            "attitude_error": (0 <= attitude_error < math.inf, "finite and not negative"),
-            "position_sd": (position_sd >= 0, "not negative"),
-            "attitude_sd": (attitude_sd >= 0, "not negative"),
-            "origin": (bool((np.abs(centre) < _HUGE).all()), f"below {_HUGE:g}"),
-            "blunders": (blunders >= 0, "not negative"),
-            "blunder_size": (0 <= blunder_size < math.inf, "finite and not negative"),
-        }
-    )
+    if not math.isfinite(footprint):
+        raise InputError(phrase("block.not-zero", name="principal_distance", value=principal_distance))
     taking = checked_cameras(cameras)
     _check_motion(motion, plain=spheroid is None and refraction is None, cameras=bool(taking))
     streams = _generator(seed).spawn(7)
@@ -259,7 +241,7 @@ def simulate(
             plan, ground, poses, principal_distance, seen, spheroid, photo_to_ground, refraction
         )
     if not len(taken.image_points):
-        raise InputError("no point is seen on two photos")
+        raise InputError(phrase("simulation.no-points"))
     used, image_points = np.unique(taken.image_points, return_inverse=True)
     ground, terrain = ground[used], terrain[used]
 
@@ -323,10 +305,7 @@ def _looks(
     motion: RollingShutter | LineScanner | None,
     attitude_error: float,
 ) -> tuple[float, float]:
-    """Return how far aside cameras see, and how far they may be inclined, of (tilt, crab); radians.
-
-    InputError: photos that see too little, or to the horizon, or past each other.
-    """
+    """Return half the angle of view of cameras, and their largest inclination, of (tilt, crab); radians."""
     tilt, crab = angles
     spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))
     steepest = 2 * tilt
@@ -335,12 +314,8 @@ def _looks(
         steepest += 4 * attitude_error
     half_angle = math.atan(spread)
     if not _NARROWEST < half_angle < _WIDEST - steepest:
-        raise InputError("principal_distance and frame_size: the photos see too little, or to the horizon")
-    if steepest > _FAR_MORE * half_angle:
-        raise InputError(
-            f"tilt: photos that see {half_angle:.2g} rad to either side and look up to {steepest:.2g} rad"
-            " aside do not overlap"
-        )
+        raise InputError(phrase("simulation.view-angle", angle=half_angle))
+    require(steepest <= _FAR_MORE * half_angle, "tilt", "most", high=_FAR_MORE * half_angle / 2, value=tilt)
     return half_angle, steepest
 
 
@@ -359,48 +334,59 @@ def _title(strips: int, photos_per_strip: int, motion: RollingShutter | LineScan
     return f"simulated block, {counted(strips, 'strip')} of {of}"
 
 
-_WHOLE_NUMBERS = ("strips", "photos_per_strip", "control_spacing", "check_points", "blunders")
-_CLASSES = {"spheroid": Spheroid, "refraction": Refraction}
-_OTHERS = ("control", "origin", "photo_to_ground", "cameras", "start_cameras", "motion", "seed")
+_WHOLE_NUMBERS = {"strips": 1, "photos_per_strip": 2, "control_spacing": 1, "check_points": 0, "blunders": 0}
+"""Least values."""
+_BETWEEN = {
+    "forward_overlap": (0.5, 1),
+    "side_overlap": (0, 1),
+    "flying_height": (_TINY, _HUGE),
+    "frame_size": (0, _HUGE),
+    "image_sd": (0, _HUGE),
+    "principal_distance": (-_HUGE, _HUGE),
+}
+"""Limits, which are excluded."""
+_FROM = {"crab": (0, math.pi / 4), "tilt": (0, 0.1), "points_per_photo": (4, _HUGE)}
+_FROM |= dict.fromkeys(("relief", "control_sd", "position_error", "attitude_error"), (0, _HUGE))
+_FROM |= dict.fromkeys(("blunder_size", "position_sd", "attitude_sd"), (0, _HUGE))
+"""Limits, of which the first is included; the last two arguments may be infinite."""
 
 
-def _check_types(arguments: Mapping[str, object]) -> None:
-    """Refuse arguments of another type: all are numbers but for a few."""
-    for name, value in arguments.items():
-        if name in _WHOLE_NUMBERS:
-            whole_number(name, value)
-        elif name in _CLASSES:
-            if value is not None and not isinstance(value, _CLASSES[name]):
-                raise InputError(f"{name} is a {_CLASSES[name].__name__} or None, not {shown(value)}")
-        elif name not in _OTHERS and _HUGE < abs(number(name, value)) < math.inf:
-            raise InputError(f"{name} must be below {_HUGE:g}")
+def _check_numbers(arguments: Mapping[str, Any]) -> None:
+    """Refuse numbers outside their limits."""
+    for name, least in _WHOLE_NUMBERS.items():
+        count = whole_number(name, arguments[name])
+        require(count >= least, name, "least", low=least, value=count)
+    for name, (low, high) in _BETWEEN.items():
+        value = number(name, arguments[name])
+        require(low < value < high, name, "range", low=low, high=high, value=value)
+    for name, (low, high) in _FROM.items():
+        value = number(name, arguments[name])
+        good = low <= value < high or (value == math.inf and name in ("position_sd", "attitude_sd"))
+        require(good, name, "range", low=low, high=high, value=value)
 
 
 def _check_motion(motion: object, *, plain: bool, cameras: bool) -> None:
-    """Refuse what is no motion, and what it does not go with."""
+    """Refuse objects that are not motions, and combinations that no simulation supports."""
     if motion is None:
         return
     if not isinstance(motion, RollingShutter | LineScanner):
-        raise InputError(f"motion is a RollingShutter, a LineScanner or None, not {shown(motion)}")
-    if not plain:
-        raise InputError(
-            "motion is simulated in rectangular space, without refraction: it goes without these"
-        )
-    if isinstance(motion, LineScanner) and cameras:
-        raise InputError("motion is that of a line scanner, which has a lens without distortion: no cameras")
+        raise kind_error("motion", "a RollingShutter, a LineScanner or None", motion)
+    require(plain, "motion", "not-applicable", name="a spheroid or refraction", other="photos that move")
+    scanner = isinstance(motion, LineScanner) and cameras
+    require(
+        not scanner,
+        "motion",
+        "not-applicable",
+        name="cameras",
+        other="a LineScanner, which has no distortion",
+    )
 
 
 def _generator(seed: int | np.random.Generator) -> np.random.Generator:
     try:
         return np.random.default_rng(seed)
     except (TypeError, ValueError) as error:
-        raise InputError(f"seed: {error}") from None
-
-
-def _check(ranges: dict[str, tuple[bool, str]]) -> None:
-    for name, (fine, expected) in ranges.items():
-        if not fine:
-            raise InputError(f"{name} must be {expected}")
+        raise argument_error("seed", "value", value=error) from None
 
 
 def _blunders(images: int, count: int, size: float, random: np.random.Generator) -> Blunders:

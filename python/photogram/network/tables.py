@@ -8,16 +8,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped, shown
+from photogram.arguments.arrays import argument_error, names, shaped
+from photogram.arguments.objects import instances, kind_error, require
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.messages import listed
 from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
+from photogram.words import phrase
 
 RECTANGULAR_COLUMNS = ("X", "Y", "Z")
 GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
 ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")
+TABLE = "a table (a mapping of column names to columns)"
 
 
 class Table(Protocol):
@@ -78,12 +80,12 @@ def table_arguments(
 
 def different(name: str, values: Sequence[str]) -> list[str]:
     """Return names that are all different."""
-    found = names(name, values)
-    if len(set(found)) != len(found):
+    checked = names(name, values)
+    if len(set(checked)) != len(checked):
         seen: set[str] = set()
-        repeated = next(value for value in found if value in seen or seen.add(value))  # type: ignore[func-returns-value]
-        raise InputError(f"{name}: {repeated!r} stands there more than once")
-    return found
+        repeated = next(value for value in checked if value in seen or seen.add(value))  # type: ignore[func-returns-value]
+        raise argument_error(name, "repeated", kind="name", name=repeated)
+    return checked
 
 
 def numbered(count: int) -> list[str]:
@@ -95,16 +97,16 @@ def _has(table: Table, table_name: str, name: str) -> bool:
     try:
         return bool(name in table)
     except TypeError:
-        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
+        raise kind_error(table_name, TABLE, table) from None
 
 
 def _column(table: Table, table_name: str, name: str) -> Sequence[Any]:
     if not _has(table, table_name, name):
-        raise InputError(f"{table_name} has no column {name}")
+        raise argument_error(table_name, "absent", kind="column", name=name)
     try:
         column: Sequence[Any] = table[name]
     except (TypeError, KeyError, IndexError):
-        raise InputError(f"{table_name} is no table, a mapping of column names to columns") from None
+        raise kind_error(table_name, TABLE, table) from None
     return column
 
 
@@ -115,7 +117,7 @@ def _rows(table: Table, table_name: str) -> int:
     known = next((each for each in (name, *first) if _has(table, table_name, each)), name)
     column = _column(table, table_name, known)
     if not isinstance(column, Sized) or np.ndim(column) == 0:
-        raise InputError(f"{table_name}, column {known} is not a list of names or numbers: {shown(column)}")
+        raise argument_error(f"{table_name}, column {known}", "list", value=column)
     return len(column)
 
 
@@ -139,11 +141,13 @@ def _columns(
 def _distances(photos: Table, principal_distance: float | None, cameras: Sequence[Camera]) -> Floats | None:
     name = "principal_distance_mm"
     if cameras:
-        if name in photos or principal_distance is not None:
-            raise InputError("principal distances and cameras are both given: the cameras have them")
+        given = name in photos or principal_distance is not None
+        require(not given, "photos", "exclusive", first="principal_distance", second="cameras")
         return None
-    if name not in photos and principal_distance is None:
-        raise InputError(f"photos has no column {name} and no principal_distance was given")
+    given = name in photos or principal_distance is not None
+    require(
+        given, "photos", "requires", name="a block without cameras", other=f"principal_distance or {name}"
+    )
     return _columns(photos, "photos", [name], principal_distance)[:, 0]
 
 
@@ -168,55 +172,40 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
     try:
         return np.array([index[name] for name in images], dtype=np.int64)
     except KeyError as error:
-        numbers = f": they are {listed(list(ids), 3)}" if ids and ids[0] == "0" else ""
-        raise InputError(
-            f"images names the {kind} {error.args[0]!r}, which the {kind}s do not list{numbers}"
-        ) from None
+        raise argument_error("images", "unknown", kind=kind, name=error.args[0], names=list(ids)) from None
 
 
 def checked_cameras(cameras: object) -> tuple[Camera, ...]:
-    """Return the cameras of a block; InputError of what is none, equal names, different units."""
-    if not isinstance(cameras, Sequence):
-        raise InputError(f"cameras is no list: {shown(cameras)}")
-    for each in cameras:
-        if not isinstance(each, Camera):
-            raise InputError(f"cameras holds what is no Camera: {shown(each)}")
-    names = [each.name for each in cameras if each.name]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"cameras: {twice!r} stands there more than once")
-    units = {each.unit for each in cameras}
-    if len(units) > 1:
-        raise InputError("cameras: image coordinates of one block are in one unit, mm or px")
-    return tuple(cameras)
+    """Return cameras with different names and one unit."""
+    checked = instances("cameras", cameras, Camera)
+    different("cameras", [each.name for each in checked if each.name])
+    if len({each.unit for each in checked}) > 1:
+        raise InputError(phrase("block.camera-units"))
+    return checked
 
 
 def photo_indices(given: object, cameras: Sequence[Camera], photos: int) -> Indices:
-    """Return (P,) which camera each photo has.
+    """Return (P,) indices of the cameras of photos.
 
-    Given are (P,) indices or names of cameras, one for all photos, or None: the only camera there is, or one
-    for each photo. InputError: cameras that are not there, another number of photos, None where it does not
-    say which.
+    Given are (P,) indices or names of cameras, one for all photos, or None: the only camera, or one for each
+    photo.
     """
     if given is None:
-        if len(cameras) not in (1, photos):
-            raise InputError("photo_cameras must say which photo has which camera")
+        unique = len(cameras) in (1, photos)
+        require(unique, "photo_cameras", "missing", name="the camera of each photo")
         return np.zeros(photos, dtype=np.int64) if len(cameras) == 1 else np.arange(photos)
     whole = [given] * photos if isinstance(given, str | int) else given
     try:
-        listed = list(whole)  # type: ignore[call-overload]
+        rows = list(whole)  # type: ignore[call-overload]
     except TypeError:
-        raise InputError(f"photo_cameras is no list of cameras: {shown(given)}") from None
-    if len(listed) != photos:
-        raise InputError(f"photo_cameras has {len(listed)} rows, but there are {photos} photos")
+        raise argument_error("photo_cameras", "list", value=given) from None
+    require(len(rows) == photos, "photo_cameras", "count", count=photos, actual=len(rows))
     places: dict[object, int] = {each.name: row for row, each in enumerate(cameras) if each.name}
-    found = np.empty(photos, dtype=np.int64)
-    for row, each in enumerate(listed):
-        place = places.get(each) if isinstance(each, str) else _index(each, len(cameras))
-        if place is None:
-            raise InputError(f"photo_cameras: there is no camera {shown(each)}")
-        found[row] = place
-    return found
+    indices = [places.get(each) if isinstance(each, str) else _index(each, len(cameras)) for each in rows]
+    if None in indices:
+        name = str(rows[indices.index(None)])
+        raise argument_error("photo_cameras", "absent", kind="camera", name=name)
+    return np.array(indices, dtype=np.int64)
 
 
 def _index(each: object, count: int) -> int | None:

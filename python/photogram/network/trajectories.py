@@ -17,9 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown, whole_number
+from photogram.arguments.arrays import (
+    argument_error,
+    names,
+    number,
+    numbers,
+    one_of,
+    shaped,
+    whole_number,
+)
+from photogram.arguments.objects import kind_error, require, require_kind
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.unknowns import Numbers, Unknown
 
@@ -149,8 +157,14 @@ class Table:
     def __post_init__(self) -> None:
         one_of("interpolation", self.interpolation, get_args(Interpolation))
         one_of("attitude_interpolation", self.attitude_interpolation, ("linear", "lagrange"))
-        if (self.velocities is None) == (self.interpolation == "hermite"):
-            raise InputError("velocities are given for the interpolation hermite, and for no other")
+        given = self.velocities is not None
+        require(
+            given == (self.interpolation == "hermite"),
+            "table",
+            "together",
+            name="velocities",
+            other="hermite",
+        )
         times, turned = increasing("times", self.times), increasing("attitude_times", self.attitude_times)
         self._set("times", times)
         self._set("attitude_times", turned)
@@ -173,7 +187,7 @@ def increasing(name: str, values: ArrayLike) -> Floats:
     """Return (k,) finite times that increase."""
     times = np.atleast_1d(numbers(name, values))
     if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise InputError(f"{name} do not increase, or are no times: {shown(values)}")
+        raise kind_error(name, "increasing times", values)
     return times
 
 
@@ -183,7 +197,8 @@ def rotations(name: str, values: ArrayLike, count: int) -> Floats:
     apart = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
     bad = (apart > 1e-6) | (np.linalg.det(matrices) < 0)
     if bad.any():
-        raise InputError(f"{name}[{int(np.argmax(bad))}] is no rotation matrix")
+        row = int(np.argmax(bad))
+        raise kind_error(f"{name}[{row}]", "a rotation matrix", matrices[row].tolist())
     return matrices
 
 
@@ -216,19 +231,16 @@ class Polynomial:
     @property
     def _placed(self) -> tuple[float, float]:
         if self.reference is None or self.scale is None:
-            raise InputError("a polynomial without reference and scale is of no trajectory")
+            raise argument_error("polynomial", "missing", name="reference or scale")
         return self.reference, self.scale
 
     def over(self, first: float, last: float) -> Polynomial:
         """Return it with reference and scale for a span of time."""
-        least, most = DEGREES["polynomial"]
-        if not least <= whole_number("degree of a polynomial", self.degree) <= most:
-            raise InputError(f"the degree of a polynomial is from {least} to {most}, not {self.degree}")
+        _degree("polynomial", self.degree)
         for name, value in (("reference", self.reference), ("scale", self.scale)):
-            if value is not None and not (
-                np.isfinite(number(f"{name} of a polynomial", value)) and (value or name != "scale")
-            ):
-                raise InputError(f"{name} of a polynomial is no number of seconds: {value}")
+            where = f"{name} of a polynomial"
+            if value is not None and not (np.isfinite(number(where, value)) and (value or name != "scale")):
+                raise argument_error(where, "positive" if name == "scale" else "finite", value=value)
         alone = not last > first
         reference = self.reference if self.reference is not None else 0.0 if alone else (first + last) / 2
         scale = self.scale if self.scale is not None else 1.0 if alone else (last - first) / 2
@@ -283,32 +295,29 @@ class Spline:
     @property
     def _knots(self) -> Floats:
         if self.knots is None:
-            raise InputError("a spline without knots is of no trajectory")
+            raise argument_error("spline", "missing", name="knots")
         return numbers("knots", self.knots)
 
     def over(self, first: float, last: float) -> Spline:
         """Return it with knots for a span of time: even over it, as many beyond each end as the degree."""
-        least, most = DEGREES["spline"]
-        p = whole_number("degree of a spline", self.degree)
-        if not least <= p <= most:
-            raise InputError(f"the degree of a spline is from {least} to {most}, not {p}")
-        if (self.every is None) == (self.knots is None):
-            raise InputError("a spline needs either every or knots")
+        p = _degree("spline", self.degree)
+        one = (self.every is None) != (self.knots is None)
+        require(one, "spline", "exclusive", first="every", second="knots")
         for name, pair in (("smooth", self.smooth), ("correlation", self.correlation)):
             if pair is not None and (not isinstance(pair, tuple | list) or len(pair) != 2):
-                raise InputError(f"{name} of a spline is a pair of numbers: {shown(pair)}")
+                raise argument_error(f"{name} of a spline", "numbers", count=2, value=pair)
             for value in pair or ():
                 number(f"{name} of a spline", value)
         if self.every is not None:
-            if not (0 < number("every", self.every) < np.inf and last > first):
-                raise InputError(f"every is a positive number of seconds of a table, not {self.every}")
+            good = 0 < number("every", self.every) < np.inf and last > first
+            require(good, "every (seconds within the table)", "positive", value=self.every)
             parts = max(1, round((last - first) / self.every))
             h = (last - first) / parts
             return replace(self, every=None, knots=first + h * np.arange(-p, parts + p + 1))
         knots = self._knots
         ascend = knots.ndim == 1 and np.isfinite(knots).all() and (np.diff(knots) >= 0).all()
         if not ascend or len(knots) < 2 * p + 2 or not knots[p] < knots[-p - 1]:
-            raise InputError(f"knots of a spline of degree {p} decrease, or are too few: {shown(self.knots)}")
+            raise kind_error("knots", f"{2 * p + 2} or more numbers in ascending order", self.knots)
         return self
 
     def row(self, origin: float) -> BasisRow:
@@ -323,8 +332,8 @@ class Spline:
             found += self._differences(*self.smooth)
         if self.correlation is not None:
             time, sd = self.correlation
-            if not (0 < time < np.inf and 0 < sd < np.inf):
-                raise InputError(f"correlation is a time and a standard deviation: {self.correlation}")
+            good = 0 < time < np.inf and 0 < sd < np.inf
+            require(good, "correlation", "positive", value=self.correlation)
             knots, p = self._knots, self.degree
             places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
             found.append(([0], [1.0], sd))
@@ -336,7 +345,7 @@ class Spline:
     def _differences(self, order: int, sd: float) -> list[tuple[list[int], list[float], float]]:
         """Return divided differences at the Greville points, those of even knots times h^q."""
         if order not in (1, 2, 3) or not 0 < sd < np.inf:
-            raise InputError(f"smooth is an order of 1, 2 or 3 and a standard deviation: {self.smooth}")
+            raise kind_error("smooth", "an order of 1, 2 or 3 and a standard deviation", self.smooth)
         knots, p = self._knots, self.degree
         places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
         h = float(np.median(np.diff(places)))
@@ -352,6 +361,13 @@ class Spline:
 
 
 Basis = Polynomial | Spline
+
+
+def _degree(kind: str, degree: int) -> int:
+    low, high = DEGREES[kind]
+    checked = whole_number(f"degree of a {kind}", degree)
+    require(low <= checked <= high, f"degree of a {kind}", "whole-range", low=low, high=high, value=checked)
+    return checked
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,19 +416,16 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         self._set("name", names("name of a trajectory", [self.name])[0])
-        if not isinstance(self.table, Table):
-            raise InputError(f"the table of the trajectory {self.name} is no Table: {shown(self.table)}")
-        one_of(f"position_axes of the trajectory {self.name}", self.position_axes, get_args(PositionAxes))
-        one_of(f"angles of the trajectory {self.name}", self.angles, get_args(Angles))
+        require_kind(f"table of trajectory {self.name}", self.table, Table)
+        one_of(f"position_axes of trajectory {self.name}", self.position_axes, get_args(PositionAxes))
+        one_of(f"angles of trajectory {self.name}", self.angles, get_args(Angles))
         if self.position_axes != "table" and len(self.table.times) < 2:
-            raise InputError(f"the trajectory {self.name} has one position, which is along no flight")
+            raise argument_error(f"positions of trajectory {self.name}", "least", low=2, value=1)
         kinds = (("position", PositionCoefficient), ("rotation", RotationCoefficient))
         self._set("coefficients", tuple(self._coefficients(name, kind) for name, kind in kinds))
         if self.body is not None:
             if not isinstance(self.body, tuple | list) or len(self.body) != 2:
-                raise InputError(
-                    f"body of the trajectory {self.name} is no pair of times and matrices: {shown(self.body)}"
-                )
+                raise kind_error(f"body of trajectory {self.name}", "a pair of times and matrices", self.body)
             times, matrices = self.body
             times = increasing("times of a body", times)
             self._set("body", (times, rotations("matrices of a body", matrices, len(times))))
@@ -425,7 +438,7 @@ class Trajectory:
         if basis is None:
             return ()
         if not isinstance(basis, Polynomial | Spline):
-            raise InputError(f"{what} of the trajectory {self.name} is no basis: {shown(basis)}")
+            raise kind_error(f"{what} of trajectory {self.name}", "a Polynomial or a Spline", basis)
         basis = basis.over(*self.table.span)
         self._set(what, basis)
         value = _of_each(f"value of the {what} of {self.name}", basis.value, basis.count)

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import names, number, shaped
+from photogram.arguments.arrays import argument_error, names, number, shaped
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.words import phrase
 
 __all__ = [
     "Boresight",
@@ -47,10 +49,9 @@ _UNKNOWNS = dict(_photocore.UNKNOWNS)
 def rotation(name: str, value: ArrayLike) -> Floats:
     """Return a (3, 3) rotation matrix; InputError where it is not orthonormal to six digits, or mirrored."""
     matrix = shaped(name, value, (3, 3))
-    if not np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL:
-        raise InputError(f"{name} is no rotation matrix: {matrix.tolist()}")
-    if np.linalg.det(matrix) < 0:
-        raise InputError(f"{name} is mirrored: its determinant is -1")
+    orthonormal = np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL
+    if not orthonormal or np.linalg.det(matrix) < 0:
+        raise kind_error(name, "a rotation matrix (with the determinant 1)", matrix.tolist())
     return matrix
 
 
@@ -96,10 +97,10 @@ class Unknown:
         self._set("attitude", self._attitude())
         deviations = shaped(f"sd of {self.title}", getattr(self, "sd"), (len(self.components),))  # noqa: B009
         if not (deviations >= 0).all():
-            raise InputError(f"sd of {self.title} is no standard deviation: {deviations.tolist()}")
+            raise argument_error(f"sd of {self.title}", "not-negative", value=deviations.tolist())
         self._set("deviations", deviations)
         if self.is_open and not np.isinf(deviations).all():
-            raise InputError(f"{self.title} is weighted or held: {' and '.join(self.GIVEN)} must be given")
+            raise InputError(phrase("block.unknown-value", unknown=self.title, names=list(self.GIVEN)))
 
     @property
     def is_open(self) -> bool:
@@ -112,7 +113,7 @@ class Unknown:
 
     def _set(self, name: str, value: Floats) -> None:
         if not np.isfinite(value).all() and name != "deviations":
-            raise InputError(f"{self.title} has a value that is not finite: {value.tolist()}")
+            raise argument_error(f"value of {self.title}", "finite", value=value.tolist())
         object.__setattr__(self, name, value)
 
     def _position(self) -> Floats:
@@ -223,8 +224,7 @@ class Drift(Numbers):
         super().__post_init__()
         if self.epoch is not None:
             epoch = number(f"epoch of {self.title}", self.epoch)
-            if not np.isfinite(epoch):
-                raise InputError(f"epoch of {self.title} is not finite: {epoch}")
+            require(np.isfinite(epoch), f"epoch of {self.title}", "finite", value=epoch)
             object.__setattr__(self, "epoch", epoch)
 
 
@@ -450,18 +450,18 @@ def _place(own: Unknown, value: ArrayLike | None, what: str = "through") -> Floa
     if own.is_open:
         return np.zeros(3)
     if value is None:
-        raise InputError(f"{what} of {own.title} must be given, or neither of {' and '.join(own.GIVEN)}")
+        raise InputError(phrase("block.unknown-value", unknown=own.title, names=list(own.GIVEN)))
     return shaped(f"{what} of {own.title}", value, (3,))
 
 
 def _across(name: str, value: ArrayLike | None) -> Floats:
     """Return axes of which the third has a direction."""
     if value is None:
-        raise InputError(f"{name} must be given where the place is")
+        raise argument_error(name, "requires", name="through", other="a direction")
     third = shaped(name, value, (3,))
     length = float(np.linalg.norm(third))
-    if not (length > 0 and np.isfinite(length)):
-        raise InputError(f"{name} is no direction: {third.tolist()}")
+    good = length > 0 and np.isfinite(length)
+    require(good, name, "kind", kind="a vector with a positive length", value=third.tolist())
     third = third / length
     first = np.cross(np.eye(3)[np.abs(third).argmin()], third)
     first /= np.linalg.norm(first)
@@ -469,13 +469,11 @@ def _across(name: str, value: ArrayLike | None) -> Floats:
 
 
 def different_unknowns(unknowns: Iterable[Unknown]) -> list[Unknown]:
-    """Return unknowns, each once, in the order in which they come; refuse two of one type and name."""
-    found = list({id(each): each for each in unknowns}.values())
+    """Return unknowns, each once, in their order; refuse two of one type and name."""
+    distinct = list({id(each): each for each in unknowns}.values())
     titles: set[str] = set()
-    for each in found:
+    for each in distinct:
         if each.title in titles:
-            raise InputError(
-                f"two unknowns are called {each.title}: observations that have one in common take one object"
-            )
+            raise InputError(phrase("block.repeated-object", kind="unknown", name=each.title))
         titles.add(each.title)
-    return found
+    return distinct

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.statistics.findings import Observations
+from photogram.statistics.findings import Tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,7 @@ class Pictured(Protocol):
         """The image observations that took part."""
 
     @property
-    def tested(self) -> list[Observations]:
+    def tested(self) -> Sequence[Tested]:
         """All observations with their standardized residuals, by kind."""
 
     @property

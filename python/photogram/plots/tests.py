@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from photogram.statistics.patterns import SPEAKING
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram.statistics.findings import Observations
+    from photogram.statistics.findings import Tested
 
 NORMAL = NormalDist()
 MAX_QUANTILES = 1500  # Test values drawn against the normal distribution, with all of the ends
@@ -50,7 +51,7 @@ def tests(result: Any) -> Plot:
     return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
 
 
-def _speaking(group: Observations) -> Observations:
+def _speaking(group: Tested) -> Tested:
     """Return a group without the components that weigh nothing: at 0 they would be a spike, and no test."""
     sizes = np.nan_to_num(np.abs(group.values))
     silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
@@ -86,7 +87,7 @@ def _bell(x: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
-def _quantiles(groups: list[Observations], outlying: list[Bools], unit_weight: float) -> Panel:
+def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: float) -> Panel:
     values = np.concatenate([each.values.ravel() for each in groups])
     tested = np.isfinite(values)
     marked = np.concatenate([each.ravel() for each in outlying])[tested]
@@ -138,7 +139,7 @@ def _rows(n: int) -> Any:
     return np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
 
 
-def _worst(groups: list[Observations], outlying: list[Bools]) -> list[tuple[float, str]]:
+def _worst(groups: Sequence[Tested], outlying: list[Bools]) -> list[tuple[float, str]]:
     found = []
     for each, own in zip(groups, outlying, strict=True):
         sizes = np.where(own, np.nan_to_num(np.abs(each.values)), 0.0)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.results.observation_kinds import ObservedKind
 from photogram.show.quantity import Axis, Quantity
@@ -49,7 +49,9 @@ class Terms:
     parts: Mapping[str, slice]
     of_photos: tuple[Quantity, ...] = ()  # What tables tell first: of photos, of points that took part
     of_points: tuple[Quantity, ...] = ()
-    kinds: Iterable[ObservedKind] = ()  # Observations beside images
+    kinds: Iterable[ObservedKind] = ()  # Other observations than images
+    # (o,) rows of these in the block, in the order of the core
+    observation_rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     lengths: Floats | None = None  # (3,) of the units of coordinates, where two of them are angles
     linear_unit: str = ""
     split: bool = False  # Whether JSON documents tell differences of positions from those of attitudes

@@ -37,6 +37,9 @@ def block_terms(result: Result) -> Terms:
             ),
         ),
         kinds=result.kinds.values(),
+        observation_rows=np.array(
+            [row for rows, _ in block.observation_groups for row in rows], dtype=np.int64
+        ),
         lengths=lengths,
         linear_unit=block.linear_unit,
         split=True,

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
-LEVEL = 0.05  # Of tests for significance
-CORRELATED = 0.95  # Larger correlations are reported
-ASKED = 20  # Cameras with correlations to poses of photos
-INSEPARABLE = 0.9999  # R^2 above which a parameter is not separable
-FROM_PRIOR = 0.05  # Redundancy number of a weight below which the weight determines the parameter
+LEVEL = 0.05  # Significance level of terms
+CORRELATED = 0.95  # The report lists larger correlations
+ASKED = 20  # Largest number of cameras with correlations to the poses of photos
+INSEPARABLE = 0.9999  # Largest R^2 of a parameter that is separable from the others
+FROM_PRIOR = 0.05  # With a lower redundancy number the weight determines the parameter, not the images
 FAR = 5.0
 """A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
 
@@ -147,7 +147,7 @@ class Calibration:
     terms
         Terms as they are kept or left out together, tested at 1 percent, with what they do to images.
     removable
-        The term that may be left out: the least significant one that stands alone; None where all are needed.
+        The term that may be left out: the least significant one that stands alone; None if all are needed.
         Never several at once: without one of them the others have other tests.
     """
 

@@ -8,23 +8,22 @@ from typing import Any, TypeVar
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.selection import Adjusted, Selected, Selection
+from photogram.words import phrase
 
 __all__ = ["Covariances", "Failure", "Propagated"]
 
 T = TypeVar("T")
 Failure = _photocore.BlockError | _photocore.CollectionError
 
-STEP = 0.01
-"""Of differences, in standard deviations."""
-TOGETHER = 32
-"""Things whose joint covariance is computed for its diagonal."""
+STEP = 0.01  # Step of differences, in standard deviations
+TOGETHER = 32  # Size of groups with a joint covariance
 COMPLEX_STEP = 1e-30
-SPREAD = 0.1
-"""Of second differences, in standard deviations along the axes of the ellipsoid."""
+SPREAD = 0.1  # Step of second differences, in standard deviations along the axes of the ellipsoid
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +191,7 @@ class Covariances:
         """
         selected = self._adjusted.selected(unknowns)
         if any(kind == "step" for kind, _ in selected.rows):
-            raise InputError("a rotation step has no value: take the photo")
+            raise InputError(phrase("covariance.step"))
         value = _evaluated(function, selected, selected.values)
         partials = _partials(function, selected, value)
         cofactors = self._asked(
@@ -242,7 +241,7 @@ def _evaluated(function: Callable[..., Any], selected: Selected, values: Floats)
     """Evaluate a function; refuse what is no finite number."""
     found = np.asarray(function(*selected.arrays(values)))
     if found.dtype.kind not in "fiub" or not np.isfinite(found).all():
-        raise InputError("the function returns what is no finite real number at the adjusted values")
+        raise argument_error("function", "finite", value=value_field(found))
     return found.astype(float)
 
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message
+from photogram.messages import Message, unknown_name
 from photogram.network.block import Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
@@ -18,7 +19,7 @@ from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
 from photogram.results.covariance import Failure
 from photogram.results.selection import photo_components
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
@@ -26,41 +27,26 @@ if TYPE_CHECKING:
 __all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
 
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
-TURNS = (*ANGLES, "rotation ")
-"""What names of unknowns begin with that are no coordinates."""
-NOTABLE_LOSS = 1e-9
-"""A larger part of a variance that is rounding is told."""
+TURNS = (*ANGLES, "rotation ")  # First words of names of rotations
+NOTABLE_LOSS = 1e-9  # Largest part of a variance by rounding without a message
 
 
 @dataclass(frozen=True)
 class ResultDatum:
-    """What coordinates and standard deviations refer to.
+    """What coordinates and standard deviations refer to."""
 
-    Attributes
-    ----------
-    kind
-        `observations` (control, weights and observations give it), `minimal control` (control and weights are
-        just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`.
-    held
-        Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other
-        kinds than minimum constraints those from which the network was taken to its datum.
-    points, photos
-        What carries inner constraints, or what cofactors are relative to.
-    attitudes
-        Photos whose attitudes carry inner constraints.
-    scale
-        Whether inner constraints take the scale from them, too: nothing else gives one.
-    lost
-        About how large a part of the variances rounding may be.
-    """
-
+    # `observations` (control, weights and observations give it), `minimal control` (control and weights are
+    # just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`
     kind: str
+    # Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other kinds
+    # than minimum constraints those from which the network was taken to its datum
     held: tuple[tuple[str, str], ...] = ()
+    # points, photos: What carries inner constraints, or what cofactors are relative to
     points: tuple[str, ...] = ()
     photos: tuple[str, ...] = ()
-    scale: bool = False
-    lost: float = 0.0
-    attitudes: tuple[str, ...] = ()
+    scale: bool = False  # Whether inner constraints take the scale from them, too: nothing else gives one
+    lost: float = 0.0  # About how large a part of the variances rounding may be
+    attitudes: tuple[str, ...] = ()  # Photos whose attitudes carry inner constraints
     row: DatumRow | None = field(default=None, repr=False)
     """As the core knows it."""
 
@@ -123,17 +109,7 @@ def datum_of(
     *,
     held: Sequence[tuple[int, int]] | None = None,
 ) -> ResultDatum:
-    """Return the datum of what the core found: that of inner constraints or, without, what it held.
-
-    Parameters
-    ----------
-    block, solution
-        The block, and what the core found.
-    row
-        Inner constraints, or what cofactors are relative to.
-    held
-        What is held of the block that this one is a part of; None: what the core has held.
-    """
+    """Return the datum of what the core found: that of inner constraints or, without, what it held."""
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     own += _held_coefficients(block, solution)
@@ -173,93 +149,52 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
     """Remark on what a block without control rests on: its datum, or the weights of its photos."""
     messages = []
     if datum.lost > NOTABLE_LOSS:
-        messages.append(
-            Message(
-                f"up to {datum.lost:.0e} of the variances is rounding: the datum that was held first is far"
-                " from the one asked for, or short; hold a photo in the middle (MinimumConstraints)"
-            )
-        )
+        messages.append(Message(phrase("free.rounding", share=datum.lost)))
     if datum.kind == "inner constraints":
-        return [
-            Message(
-                f"there is no control: the datum is that of {datum}; coordinates and standard deviations"
-                " refer to it"
-            ),
-            *messages,
-        ]
+        return [Message(phrase("free.inner", datum=datum.phrase)), *messages]
     if datum.kind == "relative":
-        return [Message(f"standard deviations are {datum}"), *messages]
+        return [Message(phrase("free.relative", datum=datum.phrase)), *messages]
     if datum.kind == "minimum constraints":
-        fixed = "; ".join(map(str, held_unknowns(datum.held)))
-        return [
-            Message(
-                "there is no control, and nothing else gives a datum: held at their initial values are"
-                f" {fixed}; coordinates and standard deviations refer to these"
-                f"{_levelled(block, len(datum.held))}"
-            )
-        ]
+        fixed, levels = held_unknowns(datum.held), _levelled(block, len(datum.held))
+        return [Message(phrase("free.minimum", fixed=fixed, levels=levels or ""))]
     if datum.kind == "minimal control":
-        return [
-            Message(
-                "control and weights of photos are exactly minimal: they give a datum and check nothing"
-                " (their redundancy numbers are zero); in_datum takes the result to another one"
-            )
-        ]
+        return [Message(phrase("free.minimal-control"))]
     held = np.isfinite(block.point_sd) & (point_rays > 0)[:, np.newaxis]
     if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
-    of = "trajectories" if block.timed else "photos"
-    return [Message(f"there is no control: the datum of the block rests on the weights of its {of}")]
+    return [Message(phrase(f"free.weights.{'trajectories' if block.timed else 'photos'}"))]
 
 
-def _levelled(block: Block, held: int) -> str:
-    """Say what a plumb line, or equal heights, leave open that alone, beside distances, give of a datum."""
+def _levelled(block: Block, held: int) -> Phrase | None:
+    """Return the motions that a plumb line, or equal heights, without other datum leave open."""
     kinds = {type(each) for each in block.observations}
     scale = [] if Distance in kinds else ["scale"]
     beyond, kinds = held - 4 - len(scale), kinds - {Distance}
     if kinds == {OnPlumbLine} and beyond in (0, -2):
-        what = ["place", "azimuth"] if beyond == 0 else ["the turn about it", "the shift along it"]
-        return f"; a plumb line gives the vertical, both tilts are known: open are {', '.join(what + scale)}"
-    if kinds == {EqualHeight} and beyond == 1:
-        return (
-            "; points of equal height level the network in the direction of their line only: it can still"
-            " tilt about that line; a third point aside of it on the same level, a pair across, or a plumb"
-            " line would hold it"
-        )
-    return ""
+        motions = ["place", "azimuth"] if beyond == 0 else ["turn", "shift"]
+        return phrase("free.plumb-line", motions=[phrase(f"free.{name}") for name in motions + scale])
+    return phrase("free.equal-heights") if kinds == {EqualHeight} and beyond == 1 else None
 
 
 def inner_datum(datum: object) -> InnerConstraints:
-    """Return inner constraints; refuse anything else.
-
-    Raises
-    ------
-    InputError
-        Anything else.
-    """
+    """Return inner constraints; refuse anything else."""
     if not isinstance(datum, InnerConstraints):
-        raise InputError(f"the datum is no InnerConstraints but of the type {type(datum).__name__}")
+        raise argument_error("datum", "kind", kind="InnerConstraints", value=value_field(datum))
     return datum
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:
-    """Return what cofactors are to be relative to, as the core knows it.
-
-    Raises
-    ------
-    InputError
-        Neither or both, or names that are not in the block.
-    """
+    """Return what cofactors are to be relative to, as the core knows it."""
     if (photo is None) == (points is None):
-        raise InputError("relative to what: a photo, or points?")
+        raise InputError(phrase("error.exclusive", first="photo", second="points"))
     if photo is not None:
         if photo not in block.photo_ids:
-            raise InputError(f"there is no photo {photo!r}")
+            raise InputError(unknown_name("photo", photo, block.photo_ids))
         return "relative", [], [block.photo_ids.index(photo)], False, [], None
     index = {name: i for i, name in enumerate(block.point_ids)}
     wanted = list(points or [])
     if missing := [name for name in wanted if name not in index]:
-        raise InputError(f"there is no point {missing[0]!r}")
+        raise InputError(unknown_name("point", missing[0], block.point_ids))
     return "relative", [index[name] for name in wanted], [], False, [], None
 
 
@@ -271,23 +206,12 @@ def refused(
     if kind == "memory":
         return OutOfMemoryError(message)
     if kind == "left out":
-        return InputError(f"the point {block.point_ids[points[0]]} was left out of the adjustment")
+        return InputError(phrase("free.left-out", point=block.point_ids[points[0]]))
     if kind == "datum":
-        return InputError(
-            "the points and photos of the datum do not carry it: there must be three points or photos that do"
-            " not lie on a line, in each part that it is for"
-        )
+        return InputError(phrase("free.few"))
     if kind == "not free":
         state = network.adjust(datum=None, threads=0, progress=None).state if state is None else state
-        return AdjustmentError(f"the block is not free: {_holding(network.resistance(state, threads=0))}")
+        resistance = sorted(network.resistance(state, threads=0), key=lambda each: -each[1])
+        parts = [phrase("free.part", kind=kind, share=share) for kind, share in resistance]
+        return AdjustmentError(phrase("free.not-free", kinds=parts))
     return AdjustmentError(message)
-
-
-def _holding(resistance: Sequence[tuple[str, float]]) -> str:
-    """Say what keeps a network from moving, and by how much."""
-    parts = [f"{kind} ({share:.2g})" for kind, share in sorted(resistance, key=lambda each: -each[1])]
-    return (
-        "its datum is given by observations of the kinds "
-        + ", ".join(parts)
-        + "; in parentheses, the part of what a motion changes in them that remains when the whole moves"
-    )

@@ -24,37 +24,23 @@ from photogram.network.rays import Rays, meet
 from photogram.statistics.exchanges import are_exchanged
 from photogram.words import Phrase
 
-MOST = 40
-"""Images of a photo that are out; with more of them it is the photo."""
-UNCERTAIN = 3.0
-"""By how much photos, which are taken for known, may raise T."""
-STEPS = 4
-"""Of Gauss and Newton from where the rays meet."""
-HELD = 1e-6
-"""Standard deviation of fixed coordinates, in that of an image at the distance of the object."""
+MOST = 40  # Largest number of excluded images of a photo
+UNCERTAIN = 3.0  # Factor of T by errors of photos, which are fixed here
+STEPS = 4  # Gauss-Newton steps from the intersection of the rays
+HELD = 1e-6  # Standard deviation of fixed coordinates, relative to an image at the distance of the object
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two names that are exchanged.
+    """Two names that are exchanged."""
 
-    Attributes
-    ----------
-    photos
-        On this photo; several where the images do not tell on which of them.
-    points
-        The names.
-    as_named, exchanged
-        T of both points as they are named, and with the names exchanged on the first of the photos.
-    dimension
-        Degrees of freedom of both.
-    """
-
-    photos: tuple[str, ...]
+    photos: tuple[str, ...]  # several if the images do not show on which photo
     points: tuple[str, str]
+    # as_named, exchanged: T of both points as they are named, and with the names exchanged on the first of
+    # the photos
     as_named: float
     exchanged: float
-    dimension: int
+    dimension: int  # degrees of freedom of both
 
     @property
     def sentence(self) -> Phrase:
@@ -182,7 +168,7 @@ class _Fit:
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
     def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) least sums of squares of (n,) points; infinite where rays do not meet before the cameras.
+        """(n,) least sums of squares of (n,) points; infinite if rays do not meet before the cameras.
 
         Images `rows` are those of the points `own` among these.
         """

@@ -89,7 +89,7 @@ class Feature:
 
     @property
     def form(self) -> str:
-        """What the test says of the deviations, in words; empty where there is none."""
+        """What the test says of the deviations, in words; empty if there is none."""
         if self.probability is None:
             return ""
         if self.probability < LEVEL:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,13 +13,9 @@ from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
 from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_trial import KINDS, OBSERVATION
-from photogram.results.observation_kinds import kind_words
 from photogram.results.patterns import CameraImages, patterns
-from photogram.results.reliability_summary import ReliabilitySummary
-from photogram.results.suspects import observations_of_core
-from photogram.results.tested_observations import tested_singly
-from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
+from photogram.results.tests import Tests
+from photogram.statistics.findings import Findings, Removed, Systematic, Tested
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
@@ -36,35 +31,22 @@ HARMFUL = {
 """Reasons of the core for leaving out a point that would distort the others, and messages on its images."""
 
 
-_TESTED = {"control": "test.control"}
-"""Codes of the names of kinds that are no plurals of them."""
-DISTANCES = frozenset({"c", "f", "fx", "fy"})
-"""What principal distances are called."""
-UNKNOWN = 1 / 3
-"""A principal distance whose standard deviation is a larger part of it might be any."""
+DISTANCES = frozenset({"c", "f", "fx", "fy"})  # Names of principal distances
+UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, as a part of it
 
 
 def network_findings(
     result: AdjustedNetwork,
-    held: Iterable[Tested],
+    fixed: Iterable[Tested],
     systematic: Sequence[Systematic],
-    labels: Sequence[str] = (),
-    order: Sequence[int] = (),
 ) -> Findings:
-    """Return the tests that every network has: with those of what is held, and of patterns.
-
-    `labels` are those of the observations beside images, in the order of the core, and `order` their rows.
-    """
-    unit_weight = None if result.KNOWN else result.sum_and_freedom
+    """Return the findings that every network has, with tests of fixed values and of patterns."""
+    tests = Tests(result)
     return Findings(
         status=result.status,
         observations=[
-            *(
-                tested_singly(result)
-                if result.reliability_summary is None  # a loss has changed the weights
-                else groups_tested(result.reliability_summary, labels, order, unit_weight)
-            ),
-            *(each if unit_weight is None else by_f(each, *unit_weight) for each in held),
+            *(tests.components if result.reliability_summary is None else tests.groups),
+            *(each if result.KNOWN else each.studentized(*result.sum_and_freedom) for each in fixed),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
@@ -83,10 +65,8 @@ def block_findings(result: Result) -> Findings:
     intersected = not result.photo_given_sd.any()
     # Data snooping needs the whole block and adjusted photos.
     tests_more = result.WHOLE and not intersected
-    labels = [each.label for each in observations_of_core(result.block)]
-    order = [row for rows, _ in result.block.observation_groups for row in rows]
-    held, systematic = ([], []) if intersected else (held_tested(result), _patterns(result))
-    found = network_findings(result, held, systematic, labels, order)
+    fixed, systematic = ([], []) if intersected else (held_tested(result), _patterns(result))
+    found = network_findings(result, fixed, systematic)
     return replace(
         found,
         undetermined=left_open(result),
@@ -198,44 +178,3 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
         return []
     fields = {"hidden": hidden, "all": redundancy.size, "limit": TESTABLE}
     return [Phrase("line.unseen", fields)]
-
-
-def groups_tested(
-    summary: ReliabilitySummary,
-    labels: Sequence[str] = (),
-    order: Sequence[int] = (),
-    unit_weight: tuple[float, float] | None = None,
-) -> list[Tested]:
-    """Return the tests of all groups, kind by kind.
-
-    `labels` are those of the observations beside images, in the order of the core, `order` their rows in the
-    block, `unit_weight` the weighted sum of squares and the degrees of freedom where that is estimated; None
-    where it is known.
-    """
-    suspects, tests = summary.suspects, summary.tests
-    testable = summary.testable
-    found = []
-    for kind, name in enumerate(KINDS):
-        own = np.flatnonzero(suspects.kinds == kind)
-        parts = [(Phrase(_TESTED.get(name, f"test.{name}s")), own)]
-        if kind == OBSERVATION:
-            named = np.array(labels, dtype=object)[suspects.subjects[own]]
-            parts = [
-                (Phrase("test.observations", {"kind": kind_words(each)}), own[named == each])
-                for each in sorted(set(labels))
-            ]
-        for what, groups in parts:
-            if not testable[groups].any():
-                continue
-            values = np.where(testable[groups], tests.statistic[groups], math.nan)
-            rows = suspects.subjects[groups]
-            if kind == OBSERVATION:
-                rows = np.argsort(np.argsort(np.array(order)[rows]))
-            rank = tests.rank[groups].astype(np.float64)
-            tested = Tested(what, values, _named(summary, groups), "T", rank, rows=rows)
-            found.append(tested if unit_weight is None else by_f(tested, *unit_weight))
-    return found
-
-
-def _named(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], Phrase]:
-    return lambda place: summary.suspects.name(int(groups[place[0]]))

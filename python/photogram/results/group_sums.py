@@ -16,7 +16,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -28,7 +28,6 @@ from photogram.network.strips import strips_of
 from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
@@ -36,6 +35,7 @@ from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,33 +51,22 @@ __all__ = [
     "observables",
 ]
 
-TESTABLE = 0.5
-"""A group with less redundancy is not tested: the mixture is nearly singular."""
+TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
-SMALL = 1000
-"""Observations of a network all of whose groups are taken column by column."""
-TOGETHER = 32
-"""Groups beyond so many share the columns of others, which are far from them."""
+SMALL = 1000  # Largest number of observations with exact sums
+TOGETHER = 32  # Largest number of groups with columns of their own
 
 
 @dataclass(frozen=True)
 class Probing:
-    """How sums over R are found.
+    """How sums over R are found."""
 
-    Attributes
-    ----------
-    exact
-        Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
-        network of 1,000 observations.
-    vectors
-        Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that.
-    seed
-        Of the signs; the same seed gives the same bits.
-    """
-
+    # Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
+    # network of 1,000 observations
     exact: int | None = None
+    # Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that
     vectors: int = 32
-    seed: int = 1
+    seed: int = 1  # of the signs; equal seeds give equal bits
 
     def options(self, observations: int) -> dict[str, Any]:
         """Return what the core takes, for a network of so many observations."""
@@ -87,25 +76,16 @@ class Probing:
 
 @dataclass(frozen=True)
 class GroupSum:
-    """A group of observations after the adjustment.
-
-    Attributes
-    ----------
-    name
-        The group.
-    count, squares, redundancy
-        Observations, their weighted sum of squares q, the sum r of their redundancy numbers.
-    spread
-        s: q has the variance 2 s where the standard deviations are right.
-    test
-        Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5.
-    """
+    """A group of observations after the adjustment."""
 
     name: str
+    # count, squares, redundancy: Observations, their weighted sum of squares q, the sum r of their redundancy
+    # numbers
     count: int
     squares: float
     redundancy: float
-    spread: float
+    spread: float  # s: the variance of q is 2 s if the standard deviations are right
+    # Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5
     test: GlobalTest | None
 
     @property
@@ -190,13 +170,7 @@ class GroupSums(Documented, Brief):
 
 
 class Left:
-    """What an adjustment leaves of groups of its observations, and of all others as one more group.
-
-    Attributes
-    ----------
-    counts, squares, redundancy
-        (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
-    """
+    """What an adjustment leaves of groups of its observations, and of all others as one more group."""
 
     def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
@@ -234,20 +208,17 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
         "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
         "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
     }
-    if isinstance(result, Result):
-        count = len(result.block.observations)
-        of_observations, own = np.full(count, np.nan), np.full(count, np.nan)
-        for kind in result.kinds.values():
-            of_observations[kind.rows] = kind.squares
-            own[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
-        squares["observations"] = of_observations
-        redundancy["observations"] = np.where(np.isfinite(of_observations), own, np.nan)
+    kinds = [*result._terms().kinds]
+    size = sum(len(kind.rows) for kind in kinds)
+    of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
+    for kind in kinds:
+        of_observations[kind.rows] = kind.squares
+        shares[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
+        components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
+    squares["observations"] = of_observations
+    redundancy["observations"] = np.where(np.isfinite(of_observations), shares, np.nan)
     ones = {name: np.where(np.isfinite(values), 1.0, np.nan) for name, values in redundancy.items()}
-    if isinstance(result, Result):
-        components = np.ones(len(result.block.observations))
-        for kind in result.kinds.values():
-            components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
-        ones["observations"] *= components
+    ones["observations"] *= components
     counts = np.round(grouping.summed(ones)).astype(np.int64)
     return counts, grouping.summed(squares), grouping.summed(redundancy)
 
@@ -262,7 +233,7 @@ def observables(network: object) -> Observables:
     if isinstance(given, Block):
         return block_observables(given)
     if not hasattr(given, "_observables"):
-        raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+        raise argument_error("network", "kind", kind=phrase("groups.network"), value=value_field(network))
     found: Observables = given._observables()
     return found
 
@@ -333,9 +304,9 @@ def group_sums(
         No adjusted network, none with covariances, groups that there are not.
     """
     if not isinstance(result, AdjustedNetwork):
-        raise InputError(f"not the result of an adjustment: {shown(result)}")
+        raise argument_error("result", "kind", kind=phrase("groups.result"), value=value_field(result))
     if not np.isfinite(result.redundancy[result.used_images]).all():
-        raise InputError("the result has no redundancy numbers: adjust with covariance=True")
+        raise InputError(phrase("groups.no-redundancy"))
     grouping = grouped(observables(result), groups)
     counts, squares, redundancy = sums_of(result, grouping)
     spread = np.clip(_spread(result, grouping, counts, probing or Probing()), 0.0, redundancy)

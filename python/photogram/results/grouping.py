@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.unadjusted import Given
 from photogram.statistics.components import GroupsOf
@@ -18,12 +17,9 @@ from photogram.statistics.components import GroupsOf
 GroupsArgument = str | Sequence[str] | Mapping[str, Any]
 """A basis, several of them (every combination is a group), or labels by part of the network."""
 
-BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")
-"""What groups can be made by."""
-PARTS = ("images", "control", "stations", "observations")
-"""What labels of the user's own can be of."""
-MANY_RAYS = 5
-"""As many rays or more are one group."""
+BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")  # Bases of groups
+PARTS = ("images", "control", "stations", "observations")  # Parts with labels of the user
+MANY_RAYS = 5  # Smallest number of rays of the last group
 
 _Labels = NDArray[np.object_]
 
@@ -109,14 +105,10 @@ def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
     if isinstance(groups, Mapping):
         labels = _own(of, groups)
     else:
-        if not isinstance(groups, str | list | tuple):
-            raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(groups)}")
-        bases = (groups,) if isinstance(groups, str) else tuple(groups)
-        for basis in bases:
+        bases = tuple(groups) if isinstance(groups, list | tuple) else (groups,)
+        for basis in bases or (None,):
             if not isinstance(basis, str) or basis not in BASES:
-                raise InputError(f"groups are by {', '.join(BASES)}, or labels, not {shown(basis)}")
-        if not bases:
-            raise InputError("groups are by one basis at least")
+                raise argument_error("groups", "choice", names=[*BASES], value=value_field(basis))
         labels = _by(of, bases)
     return _numbered(of, labels)
 
@@ -180,7 +172,7 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
     """Label as the user does."""
     unknown = set(given) - set(PARTS)
     if unknown:
-        raise InputError(f"labels are of {', '.join(PARTS)}, not {shown(sorted(map(str, unknown))[0])}")
+        raise argument_error("labels", "choice", names=[*PARTS], value=min(map(str, unknown)))
     by_kind = _by(of, ["kind"])
     parts = {"images": "images", "control": "points", "stations": "photos", "observations": "observations"}
     found: dict[str, Any] = {}
@@ -192,7 +184,7 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
                 labels = np.repeat(labels[:, np.newaxis], default.shape[1], axis=1)
             if labels.shape != default.shape:
                 shapes = f"{default.shape[:1]} or {default.shape}"
-                raise InputError(f"labels of {name} have the shape {labels.shape}, not {shapes}")
+                raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=labels.shape)
             found[part] = np.vectorize(_text, otypes=[object])(labels) if labels.size else labels
     return replace(by_kind, **found)
 

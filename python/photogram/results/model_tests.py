@@ -22,63 +22,51 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
-from photogram.results.result import Result
+from photogram.results.network import AdjustedNetwork
 from photogram.results.scores import quadratic, score
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram import Result
+
 __all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
 
-KEPT = 0.01
-"""Level of the test that a term must pass to be kept."""
-EFFECT = 0.2
-"""Standard deviations of an image: terms that move none by more are not worth having."""
-DECISIVE, POSITIVE = 10.0, 2.0
-"""Differences of BIC."""
-CHECKS = 10
-"""Check points from which they say something of models."""
-SEEN = 2000
-"""Images on which the effect of terms is looked at."""
+KEPT = 0.01  # Significance level of useful terms
+EFFECT = 0.2  # Smallest effect of useful terms on an image, in standard deviations
+DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC with decisive and positive evidence
+CHECKS = 10  # Smallest number of check points for their root mean square
+SEEN = 2000  # Number of images for the effect of terms
 
 
 @dataclass(frozen=True)
 class TermsTest:
-    """A test of terms of a camera, all together.
+    """A test of terms of a camera, all together."""
 
-    Attributes
-    ----------
-    camera, names
-        The camera and its parameters.
-    statistic
-        T: by how much the weighted sum of squares rises without them, or falls with them.
-    dimension, freedom
-        k, and the degrees of freedom of the unit variance with the terms; infinite where that is known.
-    probability
-        Of a value as large where the terms are what they are held to.
-    effect
-        How far they move an image at the most, in standard deviations of it; NaN for terms that are held.
-    """
-
-    camera: str
+    camera: str  # camera and its parameters
     names: tuple[str, ...]
-    statistic: float
+    statistic: float  # T: by how much the weighted sum of squares rises without them, or falls with them
+    # dimension, freedom: k, and the degrees of freedom of the unit variance with the terms; infinite where
+    # that is known
     dimension: int
     freedom: float
-    probability: float
+    probability: float  # Of a value as large where the terms are what they are held to
+    # How far they move an image at the most, in standard deviations of it; NaN for terms that are held
     effect: float
 
     @property
@@ -201,10 +189,10 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
     found = _camera(result, camera)
     rows = _rows(found, names)
     if not set(rows) <= set(found.estimated):
-        raise InputError(f"not all of {', '.join(names)} of the camera {found.name} are estimated")
+        raise InputError(phrase("models.fixed", names=list(names), camera=found.name))
     q = found.cofactors[np.ix_(rows, rows)]
     if not np.isfinite(q).all():
-        raise InputError("the result has no covariances")
+        raise InputError(phrase("models.no-covariances"))
     statistic = quadratic(q, found.values[rows])
     freedom = result.freedom_of_scale
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
@@ -242,12 +230,12 @@ def score_test(
         found = _camera(result, camera)
         rows = _rows(found, names)
         if set(rows) & set(found.estimated):
-            raise InputError(f"some of {', '.join(names)} of the camera {found.name} are estimated already")
+            raise InputError(phrase("models.estimated", names=list(names), camera=found.name))
         columns, title = _partials(result, found, rows), found.name
     else:
         columns = np.asarray(partials, dtype=np.float64)
         if columns.ndim != 3 or columns.shape[1:] != (m, 2) or not np.isfinite(columns).all():
-            raise InputError(f"partials are finite and have the shape (k, {m}, 2), not {columns.shape}")
+            raise InputError(phrase("models.partials", images=m, actual=str(columns.shape)))
         title = camera or ""
         names = tuple(names) or tuple(f"effect {k + 1}" for k in range(len(columns)))
     used = result.used_images
@@ -256,7 +244,7 @@ def score_test(
     k = len(b)
     statistic = score(factored(result), b, v)
     if statistic is None:
-        raise InputError(f"the unknowns of the block take up {', '.join(names)}: nothing can be tested")
+        raise InputError(phrase("models.inseparable", names=list(names)))
     freedom = result.freedom_of_scale - k
     omega = result.covariance_scale * (freedom + k) - statistic
     scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
@@ -280,10 +268,9 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
         Fewer than two results, other observations, no degrees of freedom.
     """
     if not isinstance(results, Mapping) or len(results) < 2:
-        raise InputError("compare takes two results at least, by the names of their models")
-    for name, result in results.items():
-        if not isinstance(result, Result):
-            raise InputError(f"{shown(name)} is not the result of the adjustment of a block: {shown(result)}")
+        raise InputError(phrase("models.few"))
+    for result in results.values():
+        _require_block(result)
     names, all_results = list(results), list(results.values())
     first = all_results[0]
     for name, other in zip(names[1:], all_results[1:], strict=True):
@@ -368,20 +355,27 @@ def _corrected(camera: Camera, measured: Floats) -> Floats:
 
 
 def _camera(result: Result, name: str | None) -> AdjustedCamera:
-    if not isinstance(result, Result):
-        raise InputError(f"not the result of the adjustment of a block: {shown(result)}")
+    _require_block(result)
     for each in result.cameras:
         if each.name == name or (name is None and len(result.cameras) == 1):
             return each
-    raise InputError(f"the block has no camera {shown(name)}" if name else "which camera? name it")
+    cameras = [each.name for each in result.cameras]
+    if name is None:
+        raise InputError(phrase("models.which-camera", names=cameras))
+    raise InputError(unknown_name("camera", name, cameras))
+
+
+def _require_block(result: object) -> None:
+    if not (isinstance(result, AdjustedNetwork) and hasattr(result, "block")):
+        raise InputError(phrase("models.not-a-block", value=value_field(result)))
 
 
 def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
     if isinstance(names, str) or not names:
-        raise InputError(f"terms are a list of names, not {shown(names)}")
+        raise argument_error("names", "kind", kind="a list of names", value=value_field(names))
     for name in names:
         if name not in camera.names:
-            raise InputError(f"the camera {camera.name} has no parameter {shown(name)}")
+            raise InputError(unknown_name("parameter", str(name), camera.names))
     return [camera.names.index(name) for name in names]
 
 
@@ -401,20 +395,11 @@ def _probability(value: float, k: int, freedom: float) -> float:
 
 def _check_same(name: str, one: Result, other_name: str, other: Result) -> None:
     """Refuse models of other observations."""
-    what = None
-    if one.block.image_xy.shape != other.block.image_xy.shape:
-        what = "images"
-    elif not np.array_equal(one.block.image_xy, other.block.image_xy):
-        what = "image coordinates"
-    elif not np.array_equal(one.block.image_sd, other.block.image_sd):
-        what = "standard deviations of images"
-    elif not np.array_equal(one.used_images, other.used_images):
-        count = int((one.used_images != other.used_images).sum())
-        raise InputError(
-            f"{count} images are used by one of {name} and {other_name} only: adjust both without them"
-        )
-    if what:
-        raise InputError(f"{name} and {other_name} have other {what}: their sums of squares say nothing")
+    for what in ("image_xy", "image_sd"):
+        if not np.array_equal(getattr(one.block, what), getattr(other.block, what)):
+            raise InputError(phrase("models.observations", one=name, other=other_name, what=what))
+    if count := int((one.used_images != other.used_images).sum()):
+        raise InputError(phrase("models.images", n=count, one=name, other=other_name))
 
 
 def _count(result: Result) -> int:
@@ -425,7 +410,7 @@ def _model(name: str, result: Result, known: bool) -> Model:
     k, squares = _count(result), result.sums_of_squares.total
     counted = _all_freedom(result)
     if counted < 1:
-        raise InputError(f"{name} has no degrees of freedom")
+        raise InputError(phrase("models.no-freedom", model=name))
     n = counted + k
     bic = (squares if known else n * math.log(squares / n)) + k * math.log(n)
     differences = result.point_differences[(result.point_kinds == "check") & result.used_points]

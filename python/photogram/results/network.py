@@ -491,6 +491,16 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """Return image observations as a data frame: residuals, redundancy numbers, test values."""
         return self._table("image")
 
+    def test_table(self) -> pd.DataFrame:
+        """Return the tests of all observations as a data frame, a row for each component.
+
+        Columns are the type (`image`, `control`, `station`, ...), row, photo and point of the observation,
+        component and unit, residual, standard deviation, redundancy number, smallest error that the test
+        detects (level 0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) with its
+        probability `p`, and whether the verdict considers the observation an outlier.
+        """
+        return self._table("test")
+
     def control_table(self) -> pd.DataFrame:
         """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
         return self._table("control")

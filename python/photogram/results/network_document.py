@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Indices
 from photogram.plots.accessor import sketch_of
-from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_sections import (
     images_section,
-    linked,
     photos_section,
     points_section,
     weakest_tables,
@@ -29,15 +27,14 @@ from photogram.results.network_tables import (
     points,
     stations,
 )
-from photogram.results.tested_observations import IMAGE_COORDINATES, outlying, tested_singly
+from photogram.results.tests import Tests
 from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
-from photogram.show.quantity import Axis, Quantities, Quantity, members, records
+from photogram.show.quantity import Quantities, Quantity, members, records
 from photogram.statistics.evidence import GLOBAL
-from photogram.statistics.findings import Tested
 from photogram.words import phrase
 
 ORDERINGS = {
@@ -50,6 +47,8 @@ ORDERINGS = {
 }
 NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
+WORST = 25
+"""Observations in the table of the worst."""
 
 
 def network_document(
@@ -74,16 +73,22 @@ def network_document(
     below the plan. `datum` describes the reference of coordinates, `poses` the meaning of the poses of
     photos, `work` are further figures on the normal equations, `details` sections of the text report alone.
     """
-    pictures, tested = drawings(result), tested_singly(result)
-    worst = _worst_of(tested)
+    pictures, tests = drawings(result), Tests(result)
+    worst = tests.largest(WORST)
     weak = weakest_points(result), weakest_photos(result)
-    worst_photos, worst_points = _worst_images(result, worst)
+    images_of_worst = worst[worst[:, 0] == 0, 1]
+    worst_photos = result.given.image_photos[images_of_worst].tolist()
+    worst_points = result.image_points[images_of_worst].tolist()
     worst_photos += [each.row for each in weak[1]]
     worst_points += [each.row for each in weak[0]]
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
         " residual; the rest"
         " goes into the unknowns. Their sum is the number of observations beyond what is needed."
+    )
+    intro_of_worst = (
+        "A residual alone says little: an error shows in it only by the share of its redundancy number. The"
+        " test value considers both. Names of photos and points lead to their rows below."
     )
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
@@ -103,7 +108,7 @@ def network_document(
             Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
             Section("reliability", "Reliability", reliability),
             _tests_section(result, pictures["tests"]),
-            Section("worst", "Worst observations", _worst_table(result, tested, worst), _WORST_INTRO),
+            Section("worst", "Worst observations", _worst_table(tests, worst), intro_of_worst),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
@@ -298,96 +303,23 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
     ]
 
 
-WORST = 25  # Observations in the table
-Worst = tuple[float, Tested, tuple[int, ...]]  # Size of a test value, kind, index
-
-
-def _worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
-    """Return the observations of least probability, with |test value| as the measure of what is alike."""
-    found: list[Worst] = []
-    for tested in groups:
-        sizes = np.where(np.isnan(tested.values), -1.0, np.abs(tested.values))
-        flat = sizes.ravel()
-        if not flat.size:
-            continue
-        few = np.argpartition(-flat, min(count, flat.size - 1))[:count]
-        for index in few[flat[few] > 0].tolist():
-            place = tuple(int(each) for each in np.unravel_index(index, sizes.shape))
-            found.append((float(flat[index]), tested, place))
-    found.sort(key=lambda each: (-each[0], str(each[1].kind), each[2]))
-    return found[:count]
-
-
-def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
-    own = [place[0] for _, tested, place in worst if tested.kind == IMAGE_COORDINATES]
-    return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
-
-
-_WORST_INTRO = (
-    "A residual alone says little: an error shows in it only by the share of its redundancy number."
-    " The test"
-    " value takes both into account. Names of photos and points lead to their rows below."
-)
-
-
-def _worst_table(
-    result: AdjustedNetwork, every: Sequence[Tested], worst: Sequence[Worst]
-) -> list[quantity.Table]:
-    """Return the observations whose test values are the largest, of all kinds; none without test values."""
-    if not worst:
+def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
+    """Return the table of the observations at the places of the largest test values; none without these."""
+    if not len(places):
         return []
-    terms, marks = result._terms(), {each.kind: outlying(result.verdict, each) for each in every}
-    numbers = dict(zip((each.kind for each in every), _numbers(result), strict=True))
-    rows: list[tuple[Any, ...]] = []
-    for _, tested, place in worst:
-        residuals, sd, redundancy, axes = numbers[tested.kind]
-        axis, photo, point = axes[place[1]], -1, -1
-        name = str(tested.name(place))
-        if tested.kind == IMAGE_COORDINATES:
-            photo, point = result.given.image_photos[place[0]], result.image_points[place[0]]
-            name = f"image {axis.name}"
-        numbers_of = (residuals[place] * axis.factor, sd[place] * axis.factor, unit_written(axis.small))
-        marked = marks[tested.kind][place]
-        rows.append((name, photo, point, *numbers_of, redundancy[place], tested.values[place], marked))
-    names, of_photos, of_points, misfits, deviations, units, shares, tests, outliers = zip(*rows, strict=True)
-    columns = [
-        Quantity(names, kind="name", head="Observation"),
-        linked("photo", [str(terms.photos[row]) if row >= 0 else "" for row in of_photos], of_photos),
-        linked("point", [str(terms.points[row]) if row >= 0 else "" for row in of_points], of_points),
-        Quantity(misfits, head="Residual"),
-        Quantity(deviations, head="sd given"),
-        Quantity(units, kind="name", head="Unit"),
-        Quantity(shares, head="Redundancy", decimals=3),
-        Quantity(
-            tests,
-            head=f"Test value {worst[0][1].statistic}",
-            decimals=2,
-            marked=np.array(outliers, dtype=bool),
-        ),
-    ]
-    count = sum(int(np.count_nonzero(np.abs(np.nan_to_num(each.values)) > NOTABLE)) for each in every)
-    said = "Marked observations are the outliers of the verdict: the section Tests has the limits."
-    note = f"The {len(rows)} of the largest test values; {count} exceed {NOTABLE:g} in size. {said}"
+    names = []
+    for kind, row, part in places.tolist():
+        each = tests.components[kind]
+        image = each.type == "image"
+        names.append(f"image {each.axes[part].name}" if image else str(each.name((row, part))))
+    count = sum(int(np.count_nonzero(np.abs(each.values) > NOTABLE)) for each in tests.components)
+    note = (
+        f"The {len(places)} of the largest test values; {count} exceed {NOTABLE:g} in size. Marked"
+        " observations are the outliers of the verdict: the section Tests has the limits."
+    )
+    columns = [Quantity(names, kind="name", head="Observation")]
+    columns += [each for each in tests.columns(places) if each.name != "component"]
     return [quantity.Table("worst", "Worst observations", columns, note)]
-
-
-def _numbers(result: AdjustedNetwork) -> list[tuple[Floats, Floats, Floats, tuple[Axis, ...]]]:
-    """Return residuals, standard deviations, redundancy numbers and components of every kind."""
-    terms = result._terms()
-    return [
-        (result.residuals, result.image_given_sd, result.redundancy, terms.image_axes),
-        (result.point_residuals, result.point_given_sd, result.point_redundancy, terms.point_axes),
-        (result.photo_residuals, result.photo_given_sd, result.photo_redundancy, terms.photo_axes),
-        *(
-            (
-                each.residuals,
-                each.sd,
-                each.redundancy,
-                tuple(map(component_axis, each.components, each.units)),
-            )
-            for each in terms.kinds
-        ),
-    ]
 
 
 CAPTIONS = {

@@ -11,14 +11,12 @@ from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
-    from photogram.statistics.findings import Observations
 
-__all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
+__all__ = ["ObservedKind", "observed_kinds"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,44 +25,24 @@ class ObservedKind:
 
     Components that were not observed are NaN, and so are observations of points that were left out. Arrays
     cannot be written.
-
-    Attributes
-    ----------
-    kind
-        Its name.
-    rows
-        (k,) which observations of the block they are.
-    names
-        What each is of.
-    components, units
-        Names and units of the r components: the linear unit of the object space, or radians.
-    sd
-        (k, r) standard deviations a priori.
-    residuals
-        (k, r) observed minus computed.
-    redundancy
-        (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated.
-    standardized
-        (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of
-        an observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
-        redundancy.
-    squares
-        (k,) v' W v, weights as the loss has changed them.
-    weights
-        (k,) factor by which the loss has changed the weight; 1 without a loss.
     """
 
     kind: str
-    rows: Indices
-    names: list[str]
+    rows: Indices  # (k,) which observations of the block they are
+    names: list[str]  # What each is of
+    # components, units: Names and units of the r components: the linear unit of the object space, or radians
     components: tuple[str, ...]
     units: tuple[str, ...]
-    sd: Floats
-    residuals: Floats
+    sd: Floats  # (k, r) standard deviations a priori
+    residuals: Floats  # (k, r) observed minus computed
+    # (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated
     redundancy: Floats
+    # (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of an
+    # observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
+    # redundancy
     standardized: Floats
-    squares: Floats
-    weights: Floats
+    squares: Floats  # (k,) v' W v, weights as the loss has changed them
+    weights: Floats  # (k,) factor by which the loss has changed the weight; 1 without a loss
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -137,18 +115,6 @@ def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
         units=first.units,
         **{name: joined(name) for name in numbers},
     )
-
-
-def tested_kind(kind: ObservedKind) -> Observations:
-    """Return the components of a kind with their standardized residuals, where these say something."""
-    from photogram.statistics.findings import Observations
-
-    def named(index: tuple[int, ...]) -> Phrase:
-        return parts_of([kind.components[index[1]]], named_observation(kind.kind, kind.names[index[0]]))
-
-    standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
-    own = Phrase("test.components", {"kind": kind_words(kind.kind)})
-    return Observations(own, standardized, named)
 
 
 def named_observation(kind: str, of: str) -> Phrase:

@@ -30,8 +30,8 @@ from photogram.results.film_pictures import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.results.tested_observations import outlying, tested_observations
-from photogram.statistics.findings import Observations
+from photogram.results.tests import Tests
+from photogram.statistics.findings import Tested
 
 
 class PicturedNetwork(Pictured):
@@ -67,15 +67,19 @@ class PicturedNetwork(Pictured):
         """(P,) which photos are strips of a scanner, whose images are samples and lines."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
+    @cached_property
+    def _tests(self) -> Tests:
+        return Tests(self.result)
+
     @property
-    def tested(self) -> list[Observations]:
+    def tested(self) -> Sequence[Tested]:
         """All observations with their standardized residuals."""
-        return tested_observations(self.result)
+        return self._tests.normal
 
     @property
     def outlying(self) -> list[Bools]:
         """Which of them are outliers of the verdict."""
-        return [outlying(self.result.verdict, each) for each in self.tested]
+        return self._tests.outliers
 
     @property
     def unit_weight(self) -> float:

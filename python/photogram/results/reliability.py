@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of
+from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
@@ -31,7 +30,7 @@ from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Quantity, Table, members, records
 from photogram.statistics.distributions import lambda0
-from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
@@ -39,34 +38,22 @@ if TYPE_CHECKING:
 
 __all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
-SEPARATED = 1.6448536269514722
-"""Of the normal distribution, 95 percent on one side."""
-SEARCHED = 100
-"""Observations of the largest norm whose effect on every unknown is looked into."""
+SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
+SEARCHED = 100  # Number of examined observations: those of the largest norm
 
 
 @dataclass(frozen=True)
 class Inseparable:
-    """Two groups of observations whose errors cannot be told apart.
+    """Two groups of observations whose errors cannot be told apart."""
 
-    Attributes
-    ----------
-    first, second
-        What they are called.
-    groups
-        Their numbers among all.
-    correlation
-        Largest canonical correlation of their residuals: an error of one moves the test of the other by this
-        share.
-    factor
-        How many minimal detectable errors an error must have to be attributed to the right one of the two in
-        95 of 100 cases; infinite where nothing tells them apart.
-    """
-
-    first: str
+    first: str  # names
     second: str
-    groups: tuple[int, int]
+    groups: tuple[int, int]  # their numbers among all
+    # Largest canonical correlation of their residuals: an error of one moves the test of the other by this
+    # share
     correlation: float
+    # How many minimal detectable errors an error must have to be attributed to the right one of the two in 95
+    # of 100 cases; infinite if nothing tells them apart
     factor: float
 
     def __str__(self) -> str:
@@ -75,25 +62,13 @@ class Inseparable:
 
 @dataclass(frozen=True)
 class Moved:
-    """The unknown that an undetected error moves most.
+    """The unknown that an undetected error moves most."""
 
-    Attributes
-    ----------
-    observation, component
-        Whose minimal detectable error it is.
-    unknown
-        Kind, number and component of the unknown.
-    effect
-        By how much it moves, in its unit.
-    in_sd
-        The same in its standard deviations (a priori unit weight).
-    """
-
-    observation: str
+    observation: str  # the one with the minimal detectable error
     component: str
-    unknown: tuple[str, int, int]
-    effect: float
-    in_sd: float
+    unknown: tuple[str, int, int]  # Kind, number and component of the unknown
+    effect: float  # By how much it moves, in its unit
+    in_sd: float  # The same in its standard deviations (a priori unit weight)
 
 
 class Reliability:
@@ -158,14 +133,13 @@ class Reliability:
 
     @property
     def detectable(self) -> Floats:
-        """(M,) minimal detectable error of each row alone; infinite where it shows in no residual."""
-        return self._over(self.sd * math.sqrt(self.lambda0(1)), np.sqrt(_shown(self.redundancy)))
+        """(M,) minimal detectable error of each row alone; infinite if it shows in no residual."""
+        return minimal_detectable_error(self.sd, _shown(self.redundancy), self._delta)
 
     @property
     def external(self) -> Floats:
-        """(M,) by how many standard deviations it moves anything at the most when it is not found."""
-        r = _shown(self.redundancy)
-        return self._over(np.sqrt(self.lambda0(1) * (1 - r)), np.sqrt(r))
+        """(M,) largest effect of an undetected error on anything, in its standard deviations."""
+        return largest_effect(_shown(self.redundancy), self._delta)
 
     @property
     def group_detectable(self) -> Floats:
@@ -187,11 +161,6 @@ class Reliability:
     def untestable(self) -> Bools:
         """(G,) whether no error is found by its own residual: too little redundancy in every direction."""
         return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
-
-    @staticmethod
-    def _over(numerator: Floats, denominator: Floats) -> Floats:
-        with np.errstate(divide="ignore"):
-            return np.asarray(numerator / denominator)
 
     @cached_property
     def _effects(self) -> Floats:
@@ -397,17 +366,10 @@ def reliability_of(
     power: float,
     unit_weight: str,
 ) -> Reliability:
-    """Return the reliability of a network that is adjusted, with checked options.
-
-    Raises
-    ------
-    InputError
-        Options that cannot be.
-    """
+    """Return the reliability of a network that is adjusted, with checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     for name, value in (("level", level), ("power", power)):
-        if not 0 < number(name, value) < 1:
-            raise InputError(f"{name} is a probability between 0 and 1, not {value:g}")
+        probability(name, number(name, value))
     known = unit_weight == "known"
     return Reliability(trial, covariances, level=level, power=power, known=known)
 

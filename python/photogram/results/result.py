@@ -294,7 +294,7 @@ class Result(OnFilm, AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        refuse_trajectories(self.block, "relative_to", "whose pose is not held as a whole")
+        refuse_trajectories(self.block, "relative_to")
         return self._in(relative_datum(self.block, photo, points))
 
     def _in(self, row: DatumRow) -> Self:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.results import network_tables
+from photogram.results import tests
 from photogram.results.axes import component_axis, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features, deviation_quantities, quantity_columns
@@ -196,7 +196,7 @@ def _each(every: Sequence[Any], what: str) -> Any:
 
 
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
-    **network_tables.TABLES,
+    **tests.TABLES,
     "check": check_points,
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),

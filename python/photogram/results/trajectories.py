@@ -40,23 +40,15 @@ Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPoses:
-    """Poses of a trajectory at n times. Arrays cannot be written.
+    """Poses of a trajectory at n times. Arrays cannot be written."""
 
-    Attributes
-    ----------
-    times
-        (n,) seconds.
-    positions, attitudes
-        (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is geographic), and
-        (n, 3, 3) matrices whose columns are the axes of the photo there.
-    covariances
-        (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the
-        photo's own axes, A Exp(rho), in radians.
-    """
-
-    times: Floats
+    times: Floats  # (n,) seconds
+    # (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is
+    # geographic), and (n, 3, 3) matrices whose columns are the axes of the photo there
     positions: Floats
     attitudes: Floats
+    # (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the photo's
+    # own axes, A Exp(rho), in radians
     covariances: Floats
 
     def __post_init__(self) -> None:
@@ -70,30 +62,19 @@ class TrajectoryPoses:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedTrajectory:
-    """A trajectory after the adjustment. Arrays cannot be written.
-
-    Attributes
-    ----------
-    given
-        The trajectory as it was given.
-    position, rotation
-        (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians.
-    position_sd, rotation_sd
-        (K, 3) their standard deviations; 0 for known ones.
-    position_redundancy, rotation_redundancy
-        (K, 3) redundancy numbers of what was given of them; 0 unless weighted.
-    joint
-        Gives covariances of common unknowns, by their names, all with all.
-    """
+    """A trajectory after the adjustment. Arrays cannot be written."""
 
     given: Trajectory
+    # (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians
     position: Floats
     rotation: Floats
-    position_sd: Floats
+    position_sd: Floats  # (K, 3) standard deviations; 0 if fixed
     rotation_sd: Floats
+    # (K, 3) redundancy numbers of the given values; 0 unless
+    # weighted
     position_redundancy: Floats
     rotation_redundancy: Floats
-    joint: Joint
+    joint: Joint  # Gives covariances of common unknowns, by their names, all with all
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -266,17 +247,7 @@ def adjusted_trajectories(
 def restarted_motion(
     block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
 ) -> Block:
-    """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given.
-
-    Parameters
-    ----------
-    block
-        The block that was adjusted.
-    adjusted
-        All its trajectories.
-    turns
-        By their names what tables take over (:meth:`AdjustedTrajectory.restarted`).
-    """
+    """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given."""
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the value that its unknown was given.

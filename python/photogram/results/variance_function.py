@@ -27,30 +27,18 @@ if TYPE_CHECKING:
 
 __all__ = ["Bin", "VarianceFunction"]
 
-OUTSIDE = 0.025
-"""On each side of an interval."""
+OUTSIDE = 0.025  # Probability on each side of an interval
 
 
 @dataclass(frozen=True)
 class Bin:
-    """Images of about the same radius.
+    """Images of about the same radius."""
 
-    Attributes
-    ----------
-    value
-        Their mean radius.
-    count, redundancy
-        Coordinates, and the sum of their redundancy numbers.
-    factor
-        Of the variance as their residuals have it: the function's, times q / r with its weights.
-    interval
-        In which it lies with 95 percent (Satterthwaite); NaN with too little redundancy.
-    """
-
-    value: float
-    count: int
+    value: float  # Their mean radius
+    count: int  # number of coordinates, sum of redundancy numbers
     redundancy: float
-    factor: float
+    factor: float  # Of the variance as their residuals have it: the function's, times q / r with its weights
+    # In which it lies with 95 percent (Satterthwaite); NaN with too little redundancy
     interval: tuple[float, float]
 
     @classmethod

@@ -22,8 +22,7 @@ from photogram.words import Phrase
 
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none: known without error, and held."""
-BORDER = 2.0 / SINGULAR
-"""More than T can be where C is not singular, over the squares of scaled differences."""
+BORDER = 2.0 / SINGULAR  # Exceeds T over the squares of scaled differences if C is regular
 
 
 def agreement(
@@ -39,22 +38,10 @@ def agreement(
 ) -> Agreement:
     """Test known values against an adjustment.
 
-    Parameters
-    ----------
-    differences
-        (n, k) adjusted minus given; NaN where nothing is known.
-    cofactors
-        (n k, n k) joint cofactors of the adjusted values, point by point; or (n, k, k) those of each point
-        alone: then there is no test of all together.
-    given
-        (n, k, k) covariances of the given values, in squares of the same units.
-    scale, second
-        The variance by which covariances are scaled, and the degrees of freedom with which it was estimated.
-    name, apart
-        Name the point at a place, and give the fields of its difference, by its (k,) standard deviations, C
-        included.
-    level
-        Of the test of all together, both sides.
+    `differences` (n, k) are adjusted minus known values, NaN if unknown; `given` (n, k, k) are covariances of
+    the known values. `cofactors` are joint (n k, n k); with those of each point, (n, k, k), there is no test
+    of all points together. `scale` is the variance of unit weight with `second` degrees of freedom. `apart`
+    returns the fields of the difference of a point by its (k,) standard deviations, C included.
     """
     count, width = differences.shape
     rows = np.isfinite(differences)
@@ -89,15 +76,7 @@ def _blocks(matrix: Floats, width: int) -> Floats:
 
 
 def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
-    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact.
-
-    Parameters
-    ----------
-    d
-        (m,) differences.
-    covariance
-        (m, m), C.
-    """
+    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact."""
     if not np.isfinite(covariance).all():
         return math.nan, math.nan
     scale = scale_of(covariance)

@@ -31,24 +31,17 @@ from photogram.words import Phrase
 
 __all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
 
-LEAST_REDUNDANCY = 5.0
-"""Of a group whose variance is estimated."""
-LEAST_SHARE = 0.01
-"""Of its redundancy in the number of its observations."""
-REFUSED = 1.0
-"""A redundancy below which nothing can be said of a variance."""
+LEAST_REDUNDANCY = 5.0  # Smallest redundancy of a group with an estimated variance
+LEAST_SHARE = 0.01  # Smallest ratio of its redundancy and its number of observations
+REFUSED = 1.0  # Smallest redundancy for any estimate of a variance
 MOST_CONDITION = 100.0
 """Of the Helmert matrix, scaled to unit diagonal: beyond it components cannot be told apart."""
-LIMIT_OF_STEP = 10.0
-"""By which a step changes a factor at the most, up or down."""
-LOWER_BOUND = 0.01
-"""Of a component, in the given variance."""
-BY_HELMERT = 5
-"""Every so many steps one is Helmert's, where it is positive: Foerstner's converge linearly."""
+LIMIT_OF_STEP = 10.0  # Largest ratio of factors in a step
+LOWER_BOUND = 0.01  # Smallest component, as a part of the given variance
+BY_HELMERT = 5  # Interval of Helmert steps, since Foerstner's converge linearly
 WORTH_CHANGING = (0.64, 1.56)
 """Components within these limits (standard deviations wrong by less than 25 percent) change nothing."""
-NODES = 4
-"""Of the integral that the likelihood ratio is."""
+NODES = 4  # Nodes of the integral of the likelihood ratio
 
 
 class Weighted(Protocol):
@@ -85,46 +78,24 @@ class GroupsOf:
 
 @dataclass(frozen=True)
 class Component:
-    """The variance component of a group.
+    """The variance component of a group."""
 
-    Attributes
-    ----------
-    name
-        The group; where several were merged, the larger one.
-    members
-        The groups that it is of.
-    count, squares, redundancy
-        Observations, q and r with the last weights.
-    factor
-        theta: the variance is the given one times this.
-    sd, least_sd
-        Of the factor; the second from the redundancy alone, which is less. NaN where held.
-    interval
-        In which the factor lies with 95 percent, from the logarithm.
-    test_value, probability
-        ln(theta) / its standard deviation; of one as large where the given variance is right.
-    significant
-        Whether that is below the level divided by the number of components (Bonferroni).
-    images
-        Whether it is of image coordinates.
-    held
-        Why it is not estimated; empty where it is.
-    """
-
-    name: str
+    name: str  # The group; where several were merged, the larger one
     members: tuple[str, ...]
-    count: int
+    count: int  # observations; q and r with the last weights
     squares: float
     redundancy: float
-    factor: float
+    factor: float  # theta: the ratio of estimated and given variance
+    # sd, least_sd: Of the factor; the second from the redundancy alone, which is less. NaN where held
     sd: float
     least_sd: float
-    interval: tuple[float, float]
+    interval: tuple[float, float]  # In which the factor lies with 95 percent, from the logarithm
+    # ln(theta) / its standard deviation, and the probability of a value as large
     test_value: float
     probability: float
-    significant: bool
+    significant: bool  # Whether that is below the level divided by the number of components (Bonferroni)
     images: bool
-    held: str
+    held: str  # why it is not estimated; empty if it is
 
     @property
     def factor_of_sd(self) -> float:
@@ -140,37 +111,19 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Variance components of groups.
+    """Variance components of groups."""
 
-    Attributes
-    ----------
-    components
-        Estimated and held ones.
-    factors
-        (G,) theta of every group that was given.
-    matrix
-        (k, k) Helmert matrix of the components at the end.
-    converged
-        Whether q_g = r_g was reached.
-    steps
-        Of every step the factors it was made from, q and r, (G,) each.
-    messages
-        What was merged or held, and why; negative components.
-    equality
-        Likelihood ratio of all estimated components being equal, its degrees of freedom and probability; None
-        for less than two, or where it was not asked for.
-    level
-        Of the tests, all together.
-    """
-
-    components: tuple[Component, ...]
-    factors: Floats
-    matrix: Floats
-    converged: bool
+    components: tuple[Component, ...]  # Estimated and held ones
+    factors: Floats  # (G,) theta of every group that was given
+    matrix: Floats  # (k, k) Helmert matrix of the components at the end
+    converged: bool  # Whether q_g = r_g was reached
+    # Of every step the factors it was made from, q and r, (G,) each
     steps: list[tuple[Floats, Floats, Floats]]
-    messages: list[Phrase]
+    messages: list[Phrase]  # merged, fixed and negative components, with reasons
+    # Likelihood ratio of all estimated components being equal, its degrees of freedom and probability; None
+    # for less than two, or where it was not asked for
     equality: tuple[float, int, float] | None
-    level: float
+    level: float  # of all tests together
 
     @property
     def limit(self) -> float:
@@ -180,22 +133,14 @@ class Estimate:
 
     @property
     def reference(self) -> float:
-        """The component of all image coordinates together; 1 where there are none."""
+        """The component of all image coordinates together; 1 if there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
         weights = [each.redundancy for each in own]
         return float(np.average([each.factor for each in own], weights=weights)) if own else 1.0
 
 
 def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
-    """Return the factors that Helmert's equations give for the free components, others staying as they are.
-
-    Parameters
-    ----------
-    matrix, squares
-        (k, k) H and (k,) q.
-    free
-        The components that are estimated.
-    """
+    """Return the factors of Helmert's equations for the free components; others do not change."""
     rows = np.array(free, dtype=np.int64)
     held = np.setdiff1d(np.arange(len(squares)), rows)
     right = squares[rows] - matrix[np.ix_(rows, held)].sum(axis=1)
@@ -353,7 +298,7 @@ class _Run:
         self.state = self.adjust(self.factors)
 
     def iterate(self) -> bool:
-        """Go on until nothing changes; False where a component had to be held on the way."""
+        """Go on until nothing changes; False if a component had to be held on the way."""
         while True:
             free = self.free
             squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)

@@ -23,7 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.arguments.arrays import probability
 from photogram.errors import InputError
+from photogram.words import phrase
 
 LEVEL = 0.05
 """Probability of a false alarm of the global test, and of any single test among all of an adjustment."""
@@ -33,7 +35,7 @@ def critical_normal(level: float) -> float:
     """Return the value that the absolute value of a standard normal variable exceeds with the level."""
     from statistics import NormalDist  # takes long to import
 
-    return -NormalDist().inv_cdf(_level(level) / 2)
+    return -NormalDist().inv_cdf(probability("level", level) / 2)
 
 
 def critical_student(level: float, dof: float) -> float:
@@ -43,7 +45,11 @@ def critical_student(level: float, dof: float) -> float:
     """
     if not dof > 0:
         return math.inf
-    return critical_normal(level) if math.isinf(dof) else _photocore.student_limit(_level(level), dof)
+    return (
+        critical_normal(level)
+        if math.isinf(dof)
+        else _photocore.student_limit(probability("level", level), dof)
+    )
 
 
 def critical_tau(level: float, dof: float) -> float:
@@ -69,7 +75,7 @@ def critical_tau(level: float, dof: float) -> float:
 
 def critical_chi_square(level: float, dof: float) -> float:
     """Return the value that a chi-square variable exceeds with the level."""
-    return _photocore.chi_square_quantile(_level(level), dof, upper=True)
+    return _photocore.chi_square_quantile(probability("level", level), dof, upper=True)
 
 
 def critical_fisher(level: float, first: float, second: float) -> float:
@@ -81,7 +87,7 @@ def critical_fisher(level: float, first: float, second: float) -> float:
         return math.inf
     if math.isinf(second):
         return critical_chi_square(level, first) / first
-    return _photocore.fisher_limit(_level(level), first, second)
+    return _photocore.fisher_limit(probability("level", level), first, second)
 
 
 def log_chi_square(x: ArrayLike, dof: ArrayLike) -> NDArray[np.float64]:
@@ -94,7 +100,7 @@ def log_chi_square(x: ArrayLike, dof: ArrayLike) -> NDArray[np.float64]:
 
     Returns
     -------
-    Natural logarithms, finite also where the probability is no number; NaN where there is no degree of
+    Natural logarithms, finite also where the probability is no number; NaN if there is no degree of
     freedom, or a value is negative or NaN.
     """
     both = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(dof, dtype=np.float64))
@@ -124,11 +130,11 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
         Degrees of freedom of the tested group.
     dof
         f of the adjustment where the unit weight is estimated from it: the test is F with `dimension` and
-        f - `dimension`. Infinite where the unit weight is known.
+        f - `dimension`. Infinite if the unit weight is known.
 
     Returns
     -------
-    17.0746 for Baarda's choice, the default; infinite where f is no more than the dimension.
+    17.0746 for Baarda's choice, the default; infinite if f is no more than the dimension.
 
     Raises
     ------
@@ -136,9 +142,7 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
         Level and power are not in their ranges.
     """
     if not 0 < level < power < 1:
-        raise InputError(
-            "the level (significance) must be positive and less than the power, the power less than 1"
-        )
+        raise InputError(phrase("error.power", level=level, power=power))
     if not dof > dimension:
         return math.inf
     return _photocore.detectable_noncentrality(level, power, dimension, dof - dimension)
@@ -159,7 +163,7 @@ def b_method(dimension: float, level: float = 0.001, power: float = 0.80) -> tup
 
 def bonferroni(level: float, tests: int) -> float:
     """Return the level of each of so many tests, so that any of them rejects by chance with the level."""
-    return _level(level) / max(tests, 1)
+    return probability("level", level) / max(tests, 1)
 
 
 def benjamini_hochberg(
@@ -170,7 +174,7 @@ def benjamini_hochberg(
     Parameters
     ----------
     probabilities
-        (n,) p-values; NaN where nothing is tested.
+        (n,) p-values; NaN if nothing is tested.
     level
         False discovery rate.
     dependent
@@ -181,15 +185,9 @@ def benjamini_hochberg(
     ranks = np.arange(1, np.count_nonzero(~np.isnan(p)) + 1)
     if not ranks.size:
         return np.zeros(p.shape, dtype=bool)
-    allowed = _level(level) * ranks / (ranks.size * (np.sum(1 / ranks) if dependent else 1.0))
+    allowed = probability("level", level) * ranks / (ranks.size * (np.sum(1 / ranks) if dependent else 1.0))
     within = np.flatnonzero(p[order[: ranks.size]] <= allowed)
     rejected = np.zeros(p.shape, dtype=bool)
     if within.size:
         rejected[order[: within[-1] + 1]] = True
     return rejected
-
-
-def _level(level: float) -> float:
-    if not 0 < level < 1:
-        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
-    return level

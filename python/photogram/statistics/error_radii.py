@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import numbers
+from photogram.arguments.arrays import argument_error, numbers, value_field
+from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
 from photogram.statistics.distributions import critical_normal
 
 __all__ = [
@@ -43,8 +43,7 @@ __all__ = [
     "upper_order",
 ]
 
-INDEFINITE = 1e-9
-"""Of the largest variance: a more negative one, or a larger asymmetry, is no rounding error."""
+INDEFINITE = 1e-9  # Largest negative variance or asymmetry by rounding, as a part of the largest variance
 
 
 def linear_error(sd: ArrayLike, probability: float) -> Floats:
@@ -66,7 +65,7 @@ def linear_error(sd: ArrayLike, probability: float) -> Floats:
     InputError
         What is no such array, a negative standard deviation, another probability.
     """
-    return critical_normal(1 - _probability(probability)) * _deviations(sd)
+    return critical_normal(1 - checked_probability("probability", probability)) * _deviations(sd)
 
 
 def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLike | None = None) -> Floats:
@@ -79,18 +78,18 @@ def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLik
     probability
         Between 0 and 1.
     offsets
-        (n, 2) means of the errors; zero where it is not given.
+        (n, 2) means of the errors; zero if it is not given.
 
     Returns
     -------
-    (n,) in the unit of the standard deviations; NaN where a covariance or an offset is.
+    (n,) in the unit of the standard deviations; NaN if a covariance or an offset is.
 
     Raises
     ------
     InputError
         Arrays of other shapes, a matrix that is no covariance (with its row), another probability.
     """
-    return _radii(*_principal(covariances, offsets, 2), _probability(probability))
+    return _radii(*_principal(covariances, offsets, 2), checked_probability("probability", probability))
 
 
 def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
@@ -113,7 +112,7 @@ def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
     InputError
         As of :func:`circular_error`.
     """
-    return _radii(*_principal(covariances, None, 3), _probability(probability))
+    return _radii(*_principal(covariances, None, 3), checked_probability("probability", probability))
 
 
 def mixture_circular(covariances: ArrayLike, probability: float) -> float:
@@ -135,7 +134,7 @@ def mixture_circular(covariances: ArrayLike, probability: float) -> float:
     InputError
         As of :func:`circular_error`.
     """
-    return _mixture(_principal(covariances, None, 2)[0], _probability(probability))
+    return _mixture(_principal(covariances, None, 2)[0], checked_probability("probability", probability))
 
 
 def mixture_linear(sd: ArrayLike, probability: float) -> float:
@@ -157,7 +156,7 @@ def mixture_linear(sd: ArrayLike, probability: float) -> float:
     InputError
         As of :func:`linear_error`.
     """
-    return _mixture(_deviations(sd)[:, np.newaxis], _probability(probability))
+    return _mixture(_deviations(sd)[:, np.newaxis], checked_probability("probability", probability))
 
 
 def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
@@ -181,9 +180,9 @@ def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
     """
     sizes = np.abs(numbers("values", values))
     if sizes.ndim != 1 or not sizes.size or not np.isfinite(sizes).all():
-        raise InputError("values is not a list of finite numbers, one at least")
+        raise argument_error("values", "kind", kind="a list of finite numbers", value=value_field(values))
     # The product of decimal fractions may be larger than a whole number by rounding: 0.07 of 100.
-    order = max(math.ceil(_probability(probability) * sizes.size - 1e-9), 1)
+    order = max(math.ceil(checked_probability("probability", probability) * sizes.size - 1e-9), 1)
     return order, float(np.partition(sizes, order - 1)[order - 1])
 
 
@@ -210,29 +209,24 @@ def upper_order(count: int, probability: float, confidence: float = 0.95) -> int
     InputError
         A negative count, or what is no probability.
     """
-    p = _probability(probability)
+    p = checked_probability("probability", probability)
     if count < 0:
-        raise InputError(f"the count of values is not negative: {count}")
+        raise argument_error("count", "not-negative", value=count)
     above = np.arange(count)
     ratios = np.log((count - above) / (above + 1)) + math.log(p) - math.log1p(-p)
     logs = count * math.log1p(-p) + np.concatenate([[0.0], np.cumsum(ratios)])
-    order = int(np.searchsorted(np.cumsum(np.exp(logs)), _probability(confidence))) + 1
+    order = int(np.searchsorted(np.cumsum(np.exp(logs)), checked_probability("confidence", confidence))) + 1
     return order if order <= count else None
-
-
-def _probability(value: float) -> float:
-    if not 0 < value < 1:
-        raise InputError(f"a probability lies between 0 and 1: {value:g}")
-    return value
 
 
 def _deviations(sd: ArrayLike) -> Floats:
     """Return (n,) standard deviations."""
     found = numbers("sd", sd, missing=True)
     if found.ndim != 1:
-        raise InputError(f"sd has the shape {found.shape}, not (n,)")
+        raise argument_error("sd", "shape", shape="(n,)", actual=found.shape)
     if (found < 0).any():
-        raise InputError(f"sd[{np.argmax(found < 0)}] is negative")
+        row = int(np.argmax(found < 0))
+        raise argument_error(f"sd[{row}]", "not-negative", value=float(found[row]))
     return found
 
 
@@ -240,10 +234,10 @@ def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> 
     """Return (n, k) standard deviations along the principal axes, the largest first, and means along them."""
     given = numbers("covariances", covariances, missing=True)
     if given.ndim != 3 or given.shape[1:] != (size, size):
-        raise InputError(f"covariances has the shape {given.shape}, not (n, {size}, {size})")
+        raise argument_error("covariances", "shape", shape=f"(n, {size}, {size})", actual=given.shape)
     means = np.zeros(given.shape[:2]) if offsets is None else numbers("offsets", offsets, missing=True)
     if means.shape != given.shape[:2]:
-        raise InputError(f"offsets has the shape {means.shape}, not {given.shape[:2]}")
+        raise argument_error("offsets", "shape", shape=given.shape[:2], actual=means.shape)
     rows = np.column_stack([given.reshape(-1, size * size), means])
     known: Bools = np.logical_and.reduce(np.isfinite(rows), axis=1)
     finite = np.where(known[:, np.newaxis, np.newaxis], given, np.eye(size))
@@ -251,23 +245,19 @@ def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> 
     asymmetry = np.abs(finite - np.swapaxes(finite, 1, 2)).max(axis=(1, 2), initial=0.0)
     bad = np.flatnonzero(np.maximum(asymmetry, -values[:, 0]) > INDEFINITE * np.abs(values).max(axis=1))
     if bad.size:
-        raise InputError(f"covariances[{bad[0]}] is not symmetric and positive semidefinite")
+        raise argument_error(f"covariances[{bad[0]}]", "covariance-singular")
     sds = np.where(known[:, np.newaxis], np.sqrt(np.maximum(values[:, ::-1], 0.0)), np.nan)
     return sds, np.einsum("nij,ni->nj", vectors[:, :, ::-1], means)
 
 
-REACH = 8.6
-"""In standard deviations: what lies beyond is less than the rounding of 1, in the plane, too."""
-CENTRED_NODES = 24
-"""Of an integral over no more than `REACH` standard deviations: right to 1e-12."""
-NODES = 40
-"""Of one over twice as many."""
+REACH = 8.6  # In standard deviations; the probability beyond is less than the rounding of 1
+CENTRED_NODES = 24  # For an integral over at most `REACH` standard deviations, accurate to 1e-12
+NODES = 40  # For an integral over twice as many
 LEAST_RATIO = 1e-7
 """Of an axis to the largest. One without error counts as that long: from a probability of 0.01 no radius
 changes by 1e-10 of it."""
 STEPS = 100
-CONVERGED = 1e-11
-"""Of a radius: a smaller step is the last one, and leaves much less."""
+CONVERGED = 1e-11  # Largest relative size of the last step of a radius
 
 
 def _radii(sds: Floats, means: Floats, probability: float) -> Floats:
@@ -378,7 +368,7 @@ def _rule(count: int) -> tuple[Floats, Floats]:
 
 
 def _leg(hypotenuse: Floats, other: Floats) -> Floats:
-    """Return the other leg of right triangles; 0 where there is none."""
+    """Return the other leg of right triangles; 0 if there is none."""
     return np.asarray(np.sqrt(np.maximum((hypotenuse - other) * (hypotenuse + other), 0.0)))
 
 

@@ -17,27 +17,22 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Observations, Systematic, Tested, Text, by_f, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
-FEW = 5
-"""With fewer degrees of freedom only gross disagreement can be seen."""
+FEW = 5  # With fewer degrees of freedom tests detect large disagreement only
 
-ENOUGH = 20
-"""Tested observations that the median of their test values needs."""
+ENOUGH = 20  # Smallest number of test values for a median
 
 EXPLAINED, SINGLE = 0.8, 0.2
 """Of what residuals are too large by: what a lens explains at least, and one observation at most."""
 
-WITHHELD = 0.001
-"""Level of check points below which a result is withheld: one good block in a thousand."""
+WITHHELD = 0.001  # Significance level of check points that forbid the use
 
-MEDIAN = 0.6744897501960817
-"""Of the absolute value of a standard normal variable."""
+MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
-GLOBAL = Phrase("test.global")
-"""The kind of the test of all residuals together."""
+GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
 """Logarithm of the probability, kind, and place of an observation whose test rejects."""
@@ -45,44 +40,22 @@ Beyond = tuple[float, Tested, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Test:
-    """One test.
+    """One test."""
 
-    Attributes
-    ----------
-    kind, subject
-        What is tested, and the one of its kind; the latter empty if it is one thing.
-    statistic
-        What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals.
-    distribution, dof
-        `chi2`, `F`, `normal`, `t` or another, and its degrees of freedom.
-    value
-        Of the statistic.
-    limits
-        What it may be at least and at most; None where there is no such side.
-    p
-        Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers.
-    log10_p
-        Its decimal logarithm.
-    level
-        What p is compared with.
-    tests
-        Among so many tests: the level is a share of that of all together (Bonferroni).
-    accepted
-        Whether p is no less than the level.
-    """
-
-    kind: Text
+    kind: Text  # type of the tested observations
     subject: Text
-    statistic: str
-    distribution: str
+    statistic: str  # What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
+    distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
+    # What it may be at least and at most; None if there is no such side
     limits: tuple[float | None, float | None]
+    # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
     p: float
-    log10_p: float
-    level: float
-    tests: int
-    accepted: bool
+    log10_p: float  # Its decimal logarithm
+    level: float  # What p is compared with
+    tests: int  # Among so many tests: the level is a share of that of all together (Bonferroni)
+    accepted: bool  # Whether p is no less than the level
 
     @property
     def name(self) -> str:
@@ -210,7 +183,7 @@ class Evidence:
         test = self.test
         assert test is not None
         omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom
-        studentized = [_studentized(each, omega, f) for each in self.found.observations]
+        studentized = [each.studentized(omega, f) for each in self.found.observations]
         return Evidence(replace(self.found, observations=studentized)).beyond()
 
     def _common(self, robust: float) -> float:
@@ -271,7 +244,7 @@ class Evidence:
 
     @cached_property
     def factor(self) -> float:
-        """By how much residuals are larger than expected; NaN where that is not known."""
+        """By how much residuals are larger than expected; NaN if that is not known."""
         return self.test.factor if self.test is not None else math.nan
 
     def interval(self) -> Phrase:
@@ -359,13 +332,6 @@ def _relative(tested: Tested) -> Floats:
     return np.asarray(np.sqrt(values / medians))
 
 
-def _studentized(tested: Tested, omega: float, f: float) -> Tested:
-    """Return tests with the unit weight that the others give."""
-    if tested.statistic == "w":
-        return by_t(Observations(tested.kind, tested.values, tested.name), omega, f)
-    return by_f(tested, omega, f) if tested.statistic == "T" else tested
-
-
 def _distribution(
     statistic: str, level: float, dimension: float, second: float
 ) -> tuple[str, tuple[float, ...], float]:
@@ -420,7 +386,7 @@ def _log10(p: float) -> float:
 
 
 def _largest(tested: Tested, level: float, number: int) -> Test | None:
-    """Return the test of the kind with the least probability; None where nothing is tested."""
+    """Return the test of the kind with the least probability; None if nothing is tested."""
     place = tested.largest()
     return None if place is None else _test_at(tested, place, level, number)
 

@@ -17,8 +17,7 @@ from photogram.statistics.distributions import critical_chi_square
 
 CHANCE = 1e-4
 """Chance that one of the pairs that are tried agrees better when exchanged, though it is not exchanged."""
-LEVEL = 0.001
-"""Chance that what is right disagrees as much."""
+LEVEL = 0.001  # Significance level of exchanged names
 
 
 def are_exchanged(
@@ -30,19 +29,7 @@ def are_exchanged(
     variance: float = 1.0,
     uncertain: float = 1.0,
 ) -> bool:
-    """Tell whether two things are exchanged; the formula stands above.
-
-    Parameters
-    ----------
-    named, exchanged
-        Chi-square of both, infinite where it cannot be had.
-    dimension
-        Degrees of freedom m of both together.
-    pairs
-        How many pairs are looked at, k.
-    variance, uncertain
-        s^2 and u.
-    """
+    """Return whether two things are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
     if not (math.isfinite(exchanged) and dimension > 0):
         return False
     fits = exchanged < uncertain * variance * critical_chi_square(LEVEL, dimension)

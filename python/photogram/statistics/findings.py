@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,46 +23,22 @@ Text = str | Phrase
 """A message or a name: a code with fields, or a text of a user or of a program that has no code for it."""
 
 
-@dataclass(frozen=True)
-class Observations:
-    """Observations of one kind and their test values."""
-
-    kind: Text  # What they are, in the plural
-    values: Floats  # Test values in any shape, of either sign; NaN where nothing is tested
-    name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
-
-
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """Test values of one kind of observations.
+    """Tests of the observations of one type: of single components, or of groups that may err together."""
 
-    Attributes
-    ----------
-    kind
-        What they are, in the plural.
-    values
-        Test values in any shape, NaN where nothing is tested.
-    name
-        Names the observation at an index of `values`.
-    statistic
-        `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with
-        `dimension`) or `F` (`dimension` and `second`).
-    dimension, second
-        Degrees of freedom.
-    held
-        Whether these are no observations but held values, which nothing takes out.
-    rows
-        (k,) row of each group among images, points, photos or observations; None if these are the indices.
-    """
-
-    kind: Text
-    values: Floats
-    name: Callable[[tuple[int, ...]], Text]
-    statistic: str
+    kind: Text  # What they are, in the plural
+    values: Floats  # Test values in any shape; NaN if nothing is tested
+    name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
+    # `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with `dimension`)
+    # or `F` (`dimension` and `second`)
+    statistic: str = "w"
     dimension: ArrayLike = 1.0
     second: ArrayLike = math.inf
-    held: bool = False
-    rows: Indices | None = None
+    held: bool = False  # Whether these are fixed values, which cannot be removed
+    rows: Indices | None = (
+        None  # (k,) rows of groups among images, points, ...; None if these are the indices
+    )
 
     def at(self, place: tuple[int, ...]) -> Tested:
         """Return the test of one observation."""
@@ -125,47 +101,31 @@ class Tested:
             return log_chi_square(squares / factor**2, self.dimension)
         return log_fisher(squares, self.dimension, self.second)
 
-
-def by_w(observations: Observations) -> Tested:
-    """Return observations tested with a known unit weight; their values are Baarda's w."""
-    return Tested(observations.kind, observations.values, observations.name, "w")
-
-
-def by_t(observations: Observations, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
-    """Return observations tested with the unit weight that the others give; their values are w."""
-    t = externally_studentized(observations.values, weighted_sum_of_squares, degrees_of_freedom)
-    return Tested(observations.kind, t, observations.name, "t", second=max(degrees_of_freedom - 1, 1))
-
-
-def by_f(tested: Tested, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
-    """Return groups tested by T with the unit weight that the others give: F."""
-    dimension = np.asarray(tested.dimension, dtype=np.float64)
-    others = degrees_of_freedom - dimension
-    with np.errstate(divide="ignore", invalid="ignore"):
-        left = np.maximum(weighted_sum_of_squares - tested.values, 1e-12 * weighted_sum_of_squares) / others
-        values = np.where(others > 0, tested.values / dimension / left, math.nan)
-    return replace(tested, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
+    def studentized(self, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Self:
+        """Return the tests with the unit weight of the other observations: t for w, F for T."""
+        omega, f = weighted_sum_of_squares, degrees_of_freedom
+        if self.statistic == "w":
+            t = externally_studentized(self.values, omega, f)
+            return replace(self, values=t, statistic="t", second=max(f - 1, 1))
+        if self.statistic != "T":
+            return self
+        dimension = np.asarray(self.dimension, dtype=np.float64)
+        others = f - dimension
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.maximum(omega - self.values, 1e-12 * omega) / others
+            values = np.where(others > 0, self.values / dimension / left, math.nan)
+        return replace(self, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
 
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """How n points with known values agree with an adjustment that they took no part in.
+    """How n points with known values agree with an adjustment that they took no part in."""
 
-    Attributes
-    ----------
-    points
-        The test of each point by itself, T_i = d_i' C_ii^-1 d_i.
-    together
-        The test of all with their cross covariances; None without these, or without points.
-    sd
-        (n, k) standard deviations of the differences: roots of C_ii.
-    apart
-        Fields of how far the point at a place is off, given its (k,) standard deviations.
-    """
-
-    points: Tested
+    points: Tested  # The test of each point by itself, T_i = d_i' C_ii^-1 d_i
+    # The test of all with their cross covariances; None without these, or without points
     together: GlobalTest | None
-    sd: Floats
+    sd: Floats  # (n, k) standard deviations of the differences: roots of C_ii
+    # Fields of how far the point at a place is off, given its (k,) standard deviations
     apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
@@ -176,33 +136,19 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Systematic:
-    """A test of the pattern of residuals.
+    """A test of the pattern of residuals."""
 
-    Attributes
-    ----------
-    kind, subject
-        What is tested, and of what; the latter empty if it is one thing.
-    sentence
-        What the test says: what, how large, what it would do.
-    statistic, distribution, dof, value
-        Of the test.
-    probability, level
-        Its p-value and the level it is compared with.
-    large
-        Whether the pattern is large enough to matter: with a small probability the model is likely wrong.
-    fall
-        By how much the weighted sum of squares would fall without it, where that was asked for.
-    """
-
-    kind: Text
-    sentence: Text
+    kind: Text  # what is tested
+    sentence: Text  # result of the test: what, how large, effect
     statistic: str
     distribution: str
     dof: tuple[float, ...]
     value: float
-    probability: float
+    probability: float  # p-value
     level: float
+    # Whether the pattern is large enough to matter: with a small probability the model is likely wrong
     large: bool
+    # By how much the weighted sum of squares would fall without it, where that was asked for
     fall: float = 0.0
     subject: Text = ""
 
@@ -216,7 +162,7 @@ class Systematic:
 class GroupFactor:
     """The estimated variance component of a group of observations."""
 
-    group: Text  # Its name
+    group: Text
     factor: float  # By which its standard deviations are too small: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
     significant: bool  # Whether it differs from 1, and by enough to change weights
@@ -224,28 +170,15 @@ class GroupFactor:
 
 @dataclass(frozen=True)
 class Removed:
-    """What data snooping has taken out.
+    """What data snooping has taken out."""
 
-    Attributes
-    ----------
-    removed
-        Each that was taken out and did not return, in order: name, and what else the log says of it.
-    images, control
-        Shares of the images and of the control that were taken out.
-    rivals
-        What cannot be told apart from them.
-    exchanged
-        Names that are exchanged among them.
-    kept
-        Suspects that were not taken out, with the reason.
-    """
-
+    # Removed observations in order: name and other members of the log
     removed: Sequence[Mapping[str, Any]]
-    images: float = 0.0
+    images: float = 0.0  # shares of removed images and control
     control: float = 0.0
-    rivals: Sequence[Text] = ()
-    exchanged: Sequence[Text] = ()
-    kept: Sequence[Text] = ()
+    rivals: Sequence[Text] = ()  # observations that cannot be distinguished from these
+    exchanged: Sequence[Text] = ()  # exchanged names among them
+    kept: Sequence[Text] = ()  # suspects that were not removed, with the reason
 
 
 @dataclass(frozen=True, kw_only=True)

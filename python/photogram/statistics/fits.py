@@ -14,6 +14,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ class Fit:
         try:
             root = scale[:, np.newaxis] * np.linalg.cholesky(covariance / np.outer(scale, scale))
         except (np.linalg.LinAlgError, FloatingPointError):
-            raise InputError("the covariance is not positive definite") from None
+            raise InputError(phrase("error.covariance")) from None
         a, y = np.linalg.solve(root, columns), np.linalg.solve(root, values)
         size = np.linalg.norm(a, axis=0)
         size[size == 0] = 1.0
@@ -84,7 +85,5 @@ class Fit:
         return left.T @ self.whitened / squares, 1 / np.sqrt(squares)
 
 
-BLIND = 1e-8
-"""A column that the others explain up to this part of its length cannot be tested."""
-UNCHECKED = 1e-10
-"""Share of its weight that the others leave an observation, below which nothing checks it."""
+BLIND = 1e-8  # Smallest part of a column that is independent of the others
+UNCHECKED = 1e-10  # Smallest redundancy number of a checked observation

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import is_covariance, numbers
+from photogram.arguments.arrays import argument_error, is_covariance, numbers
+from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.statistics.distributions import LEVEL, critical_student
+from photogram.words import phrase
 
 __all__ = ["coverage_factor", "effective_freedom", "joint_freedom", "rmse_interval", "welch_satterthwaite"]
 
@@ -35,7 +37,7 @@ def effective_freedom(covariance: ArrayLike) -> float:
 
     Returns
     -------
-    Between 1 and m; NaN where there is no error, or one is not known.
+    Between 1 and m; NaN if there is no error, or one is not known.
 
     Raises
     ------
@@ -44,13 +46,13 @@ def effective_freedom(covariance: ArrayLike) -> float:
     """
     matrix = numbers("covariance", covariance, missing=True)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise InputError(f"covariance has the shape {matrix.shape}, not (m, m)")
+        raise argument_error("covariance", "shape", shape="(m, m)", actual=matrix.shape)
     trace = float(np.trace(matrix))
     if trace == 0 or not np.isfinite(matrix).all():
         return math.nan
     unit = matrix / trace
     if np.diag(unit).min() < 0 or np.abs(unit - unit.T).max() > ROUNDING:
-        raise InputError("covariance is not symmetric and positive semidefinite")
+        raise InputError(phrase("error.covariance-singular"))
     return 1 / float(np.sum(unit**2))
 
 
@@ -70,19 +72,18 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
 
     Returns
     -------
-    Lower and upper end in the same unit; NaN where the degrees of freedom are.
+    Lower and upper end in the same unit; NaN if the degrees of freedom are.
 
     Raises
     ------
     InputError
         A negative error, degrees of freedom that are not positive, a level that is no probability.
     """
-    if not 0 < level < 1:
-        raise InputError(f"a level is a probability between 0 and 1, not {level:g}")
+    checked_probability("level", level)
     if rmse < 0:
-        raise InputError(f"a root mean square error is not negative: {rmse:g}")
+        raise argument_error("rmse", "not-negative", value=rmse)
     if freedom <= 0:
-        raise InputError(f"degrees of freedom are positive: {freedom:g}")
+        raise argument_error("freedom", "positive", value=freedom)
     if math.isnan(freedom):
         return math.nan, math.nan
     if math.isinf(freedom):
@@ -103,7 +104,7 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
 
     Returns
     -------
-    Infinite where nothing was estimated.
+    Infinite if nothing was estimated.
 
     Raises
     ------
@@ -112,9 +113,10 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
     """
     own, dof = _contributions("u", u), numbers("freedom", freedom)
     if dof.shape != own.shape:
-        raise InputError(f"freedom has the shape {dof.shape}, not {own.shape}")
+        raise argument_error("freedom", "shape", shape=own.shape, actual=dof.shape)
     if not (dof > 0).all():
-        raise InputError(f"freedom[{np.argmin(dof > 0)}] is not positive")
+        row = int(np.argmin(dof > 0))
+        raise argument_error(f"freedom[{row}]", "positive", value=float(dof[row]))
     return _freedom(float(np.sum(own**2)), float(np.sum(own**4 / dof)))
 
 
@@ -135,7 +137,7 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
 
     Returns
     -------
-    Infinite where nothing was estimated.
+    Infinite if nothing was estimated.
 
     Raises
     ------
@@ -145,11 +147,11 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
     c = _contributions("contributions", contributions)
     matrix = numbers("covariance_of_components", covariance_of_components)
     if matrix.shape != 2 * c.shape:
-        raise InputError(f"covariance_of_components has the shape {matrix.shape}, not {2 * c.shape}")
+        raise argument_error("covariance_of_components", "shape", shape=2 * c.shape, actual=matrix.shape)
     if not is_covariance(matrix, singular=True):
-        raise InputError("covariance_of_components is not symmetric and positive semidefinite")
+        raise InputError(phrase("error.covariance-singular"))
     if not 0 <= given < math.inf:
-        raise InputError(f"given is not a variance: {given:g}")
+        raise argument_error("given", "not-negative", value=given)
     return _freedom(float(np.sum(c)) + given, float(c @ matrix @ c) / 2)
 
 
@@ -161,7 +163,7 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
     probability
         Of the interval: 0.95 gives 1.96 where u is known.
     freedom
-        Degrees of freedom of u, infinite where it is known.
+        Degrees of freedom of u, infinite if it is known.
     truncated
         Whether they are truncated to a whole number first, as the GUM does.
 
@@ -174,10 +176,9 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
     InputError
         What is no probability, degrees of freedom that are not positive.
     """
-    if not 0 < probability < 1:
-        raise InputError(f"a probability lies between 0 and 1: {probability:g}")
+    checked_probability("probability", probability)
     if not freedom > 0:
-        raise InputError(f"degrees of freedom are positive: {freedom:g}")
+        raise argument_error("freedom", "positive", value=freedom)
     whole = truncated and math.isfinite(freedom)
     return critical_student(1 - probability, math.floor(freedom + ROUNDING) if whole else freedom)
 
@@ -186,10 +187,10 @@ def _contributions(name: str, values: ArrayLike) -> Floats:
     """Return (k,) finite values that are not negative."""
     found = numbers(name, values)
     if found.ndim != 1:
-        raise InputError(f"{name} has the shape {found.shape}, not (k,)")
+        raise argument_error(name, "shape", shape="(k,)", actual=found.shape)
     bad = ~(np.isfinite(found) & (found >= 0))
     if bad.any():
-        raise InputError(f"{name}[{np.argmax(bad)}] is not a number of zero or more: {found[bad][0]:g}")
+        raise argument_error(f"{name}[{np.argmax(bad)}]", "not-negative", value=float(found[bad][0]))
     return found
 
 

@@ -25,6 +25,7 @@ from datetime import date
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -32,103 +33,56 @@ from photogram.statistics.distributions import LEVEL, bonferroni, critical_stude
 from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
-YEAR = 365.2425
-"""Days."""
-MOST = 3
-"""Changes of one quantity that are told apart."""
+YEAR = 365.2425  # days
+MOST = 3  # Largest number of changes of one quantity
 
 
 @dataclass(frozen=True)
 class Change:
-    """An accepted hypothesis on one quantity.
+    """An accepted hypothesis on one quantity."""
 
-    Attributes
-    ----------
-    kind
-        `drift`, `step`, `single`, or the name of a regressor.
-    size, sd
-        In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor.
-    statistic, log10_p
-        t, and the decimal logarithm of its probability.
-    at
-        The first occasion after a step, or the single one; None of others.
-    sentence
-        What it says.
-    """
-
-    kind: str
+    kind: str  # `drift`, `step`, `single`, or the name of a regressor
+    # size, sd: In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor
     size: float
     sd: float
-    statistic: float
+    statistic: float  # t
     log10_p: float
-    at: int | None
+    at: int | None  # The first occasion after a step, or the single one; None of others
     sentence: str
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One quantity on all occasions.
-
-    Attributes
-    ----------
-    name, unit
-        Of the quantity.
-    values, sd
-        (k,) as given.
-    mean, mean_sd
-        Weighted mean over all occasions.
-    model
-        (k,) what the accepted changes make of the mean.
-    off, off_sd
-        (k,) each value less the mean of the others, for a control chart.
-    drift, drift_sd
-        A unit of time, where nothing else changes; NaN where times are equal.
-    steps
-        (k - 1,) t of a step before occasions 2 ... k; NaN where there is none.
-    test
-        Chi-square of the residuals about the mean.
-    changes
-        What was accepted.
-    """
+    """One quantity on all occasions."""
 
     name: str
     unit: str
-    values: Floats
+    values: Floats  # (k,) as given
     sd: Floats
-    mean: float
+    mean: float  # weighted mean over all occasions
     mean_sd: float
-    model: Floats
-    off: Floats
+    model: Floats  # (k,) what the accepted changes make of the mean
+    off: Floats  # (k,) value minus mean of the others, for a control chart
     off_sd: Floats
-    drift: float
+    drift: float  # per unit of time; NaN if all times are equal
     drift_sd: float
-    steps: Floats
-    test: GlobalTest | None
-    changes: tuple[Change, ...]
+    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN if there is none
+    test: GlobalTest | None  # Chi-square of the residuals about the mean
+    changes: tuple[Change, ...]  # accepted changes, the most certain first
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Values on several occasions, compared.
+    """Values on several occasions, compared."""
 
-    Attributes
-    ----------
-    occasions, times
-        What the occasions are called, and when they were (in the unit of time).
-    series
-        The quantities.
-    constancy
-        Test of all together, with all covariances: nothing changes.
-    tests, level, limit
-        Number of single tests, level of all together, and the |t| that is accepted.
-    """
-
+    # Names of the occasions, and their times in the unit of time
     occasions: tuple[str, ...]
     times: Floats
-    series: tuple[Series, ...]
-    constancy: GlobalTest
+    series: tuple[Series, ...]  # The quantities
+    constancy: GlobalTest  # Test of all together, with all covariances: nothing changes
+    # Number of single tests, their level together, and the largest accepted |t|
     tests: int
     level: float
     limit: float
@@ -226,44 +180,26 @@ def history(
 ) -> History:
     """Compare values that were determined on several occasions: constancy, drift, steps, single ones.
 
-    Parameters
-    ----------
-    values
-        (k, m) of m quantities on k occasions, in the order of time.
-    covariance
-        (k, m, m) of each occasion, or (k, m, k, m) of all where they have something in common.
-    times
-        (k,) that do not fall; None: 0, 1, 2 ...
-    occasions, names, units, unit_of_time
-        What occasions and quantities are called in sentences, units of quantities and of times.
-    regressors
-        Other causes by name: (k,) values and their unit.
-    freedom
-        Degrees of freedom from which the covariance was estimated; infinite where it is known.
-    level
-        Probability that anything is found where nothing changes: of the test of constancy, and of all single
-        tests together.
-
-    Raises
-    ------
-    InputError
-        Fewer than two occasions, shapes that do not fit, times that fall, a covariance that is none.
+    `values` (k, m) are m quantities on k occasions in ascending order of `times`. `covariance` is that of one
+    occasion (k, m, m), or of all values (k, m, k, m), estimated with `freedom` degrees of freedom.
+    `regressors` are other causes by name: (k,) values and their unit. `level` is the probability of a false
+    alarm of the test of constancy, and of all single tests together.
     """
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
-        raise InputError("values must be finite numbers (k, m) of two occasions at least")
+        raise InputError(phrase("history.values"))
     k, m = x.shape
     c = _together(np.asarray(covariance, dtype=np.float64), k, m)
     t = np.arange(float(k)) if times is None else np.asarray(times, dtype=np.float64)
     if t.shape != (k,) or not (np.diff(t) >= 0).all():
-        raise InputError("times must be k numbers that do not fall")
+        raise InputError(phrase("history.times", count=k))
     named = tuple(occasions) or tuple(f"occasion {i + 1}" for i in range(k))
     hypotheses = _hypotheses(t, named, unit_of_time, regressors or {})
     tests = m * len(hypotheses.kinds)
     quantities = names or [f"value {j + 1}" for j in range(m)]
     of_units = units or [""] * m
     if (len(named), len(quantities), len(of_units)) != (k, m, m):
-        raise InputError(f"there are {k} occasions of {m} quantities: names or units are not as many")
+        raise InputError(phrase("history.names", occasions=k, quantities=m))
     series = tuple(
         _series(
             x[:, j], c[:, j, :, j], hypotheses, quantities[j], of_units[j], freedom, bonferroni(level, tests)
@@ -285,7 +221,7 @@ def _together(covariance: Floats, k: int, m: int) -> Floats:
         whole = np.zeros((k, m, k, m))
         whole[np.arange(k), :, np.arange(k), :] = covariance
     if whole.shape != (k, m, k, m) or not np.isfinite(whole).all():
-        raise InputError(f"covariance must be finite numbers ({k}, {m}, {m}) or ({k}, {m}, {k}, {m})")
+        raise InputError(phrase("history.covariance", k=k, m=m))
     return whole
 
 
@@ -306,11 +242,11 @@ def _hypotheses(
     for name, (given, of_what) in regressors.items():
         u = np.asarray(given, dtype=np.float64)
         if u.shape != (k,) or not np.isfinite(u).all():
-            raise InputError(f"{name} must be {k} finite numbers")
+            raise argument_error(name, "numbers", count=k, value=value_field(given))
         if k > 2 and np.ptp(u) > 0:
             found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
     if not found:
-        raise InputError("all occasions are at one time: nothing can have changed")
+        raise InputError(phrase("history.equal-times"))
     return _Hypotheses(
         np.column_stack([column for column, _, _ in found]),
         tuple(kind for _, kind, _ in found),

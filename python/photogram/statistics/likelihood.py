@@ -19,38 +19,22 @@ from collections.abc import Sequence
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import global_test
 
-IMPROVEMENT = 25.0
-"""The sum of squares must fall by this factor, residuals to a fifth."""
-CHANCE = 1e-4
-"""Probability that any of the hypotheses tried is accepted by chance, about."""
-RIVAL = 10.0
-"""And all others must be less likely by this difference of Lambda."""
-PASSES = 0.01
-"""Level of the global test that a hypothesis passes, on both sides."""
-TESTED = 4.0
-"""Degrees of freedom from which a hypothesis can be accepted and not only be possible."""
+IMPROVEMENT = 25.0  # Required ratio of the sums of squares
+CHANCE = 1e-4  # Probability of an accepted wrong hypothesis, approximately
+RIVAL = 10.0  # Required difference of Lambda to all other hypotheses
+PASSES = 0.01  # Significance level of the global test of a hypothesis
+TESTED = 4.0  # Smallest degrees of freedom of an accepted hypothesis
 
 
 @dataclass(frozen=True)
 class Judged:
-    """The hypotheses that explain the residuals best.
+    """The hypotheses that explain the residuals best."""
 
-    Attributes
-    ----------
-    best
-        Their places among those tried, the best first; more than one where these cannot be told apart.
-    likelihood
-        Lambda of the first.
-    fall
-        How many times smaller residuals would be.
-    explained
-        Whether it is sure that one of them is so; else it is possible.
-    """
-
+    # Their places among those tried, the best first; more than one where these cannot be told apart
     best: tuple[int, ...]
-    likelihood: float
-    fall: float
-    explained: bool
+    likelihood: float  # lambda of the first
+    fall: float  # factor by which residuals would be smaller
+    explained: bool  # certain; otherwise possible
 
     @property
     def accepted(self) -> bool:
@@ -79,17 +63,17 @@ def judged(
     given
         Omega of the data as given, positive.
     changed
-        Omega of each hypothesis, positive; infinite where it cannot be fitted.
+        Omega of each hypothesis, positive; infinite if it cannot be fitted.
     degrees_of_freedom
         f.
     parameters
-        How many parameters each fits besides; one more must gain ln f. None where they fit none.
+        How many parameters each fits besides; one more must gain ln f. None if they fit none.
     known_weight
         Whether Omega has the unit weight of given standard deviations, so that it can pass its global test.
 
     Returns
     -------
-    None where no hypothesis improves as much as a mistake would.
+    None if no hypothesis improves as much as a mistake would.
     """
     f = degrees_of_freedom
     counts = [0] * len(changed) if parameters is None else parameters

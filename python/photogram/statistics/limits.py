@@ -51,7 +51,7 @@ class GlobalTest:
     probability_below, probability_above
         Of a sum as small as this, and of one as large, where the standard deviations are right.
     reference_dof
-        Degrees of freedom of the unit weight that it is compared with; infinite where that is known. The test
+        Degrees of freedom of the unit weight that it is compared with; infinite if that is known. The test
         is then chi-square, else F.
     """
 
@@ -175,7 +175,7 @@ def externally_studentized(
     Returns
     -------
     t of the same shape: Student with f - 1 degrees of freedom. Unbounded: where an observation makes up all
-    of Omega, it is very large. NaN where w is, and everywhere with less than two degrees of freedom.
+    of Omega, it is very large. NaN if w is, and everywhere with less than two degrees of freedom.
     """
     w = np.asarray(standardized, dtype=np.float64)
     omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)

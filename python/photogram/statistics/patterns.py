@@ -16,23 +16,17 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-MOST = 20_000
-"""Values whose distribution is looked at; of more every so many-th."""
+MOST = 20_000  # Largest number of values in the test of normality
 
-BINS = 5
-"""Of the frame in each direction."""
+BINS = 5  # Bins of the frame in each direction
 
-FULL = 10.0
-"""Redundancy that a bin of the frame needs."""
+FULL = 10.0  # Smallest redundancy of a bin
 
-SINGULAR = 1e-6
-"""Determinant, in the product of the diagonal, below which a matrix may be singular."""
+SINGULAR = 1e-6  # Smallest determinant of a regular matrix, as a part of the product of its diagonal
 
-SPEAKING = 1e-3
-"""Standardized residuals that are all smaller belong to weights of nothing, and say nothing."""
+SPEAKING = 1e-3  # Smallest maximum of standardized residuals that are tested
 
-CELLS = 10
-"""Of the frame in each direction: images in one cell are neighbours."""
+CELLS = 10  # Cells of the frame in each direction; images in one cell are neighbours
 
 
 @dataclass(frozen=True)
@@ -103,20 +97,10 @@ class FramePattern:
 def frame_pattern(
     xy: Floats, residuals: Floats, redundancy: Floats, parameters: int = 0
 ) -> FramePattern | None:
-    """Test whether the mean residuals in the bins of a frame are zero.
+    """Test whether the mean residuals (m, 2) in the bins of a frame are zero.
 
-    Parameters
-    ----------
-    xy
-        (m, 2) image coordinates, any unit.
-    residuals, redundancy
-        (m, 2) ~v, on the scale of the other residuals, and r.
-    parameters
-        Of the camera that are estimated: so many degrees of freedom less.
-
-    Returns
-    -------
-    None where no four bins of 5 x 5 have a redundancy of 10 in both axes.
+    The number of estimated camera `parameters` reduces the degrees of freedom. None unless four of 5 x 5 bins
+    have a redundancy of 10 in both axes.
     """
     if not len(xy):
         return None
@@ -153,8 +137,7 @@ def _summed(groups: Indices, values: Floats) -> Floats:
     return np.stack([np.bincount(groups, weights=column, minlength=BINS**2) for column in values.T], axis=1)
 
 
-_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Elements of a symmetric matrix."""
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # Upper triangle of a symmetric matrix
 
 
 def group_patterns(
@@ -165,17 +148,6 @@ def group_patterns(
     Of a photo: film or scanner, an axis that is not as assumed. With b = (1, x, y) centred and scaled it is
     the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes: chi-square with six degrees of
     freedom.
-
-    Parameters
-    ----------
-    groups, count
-        (m,) the group of each row, and how many there are.
-    xy, residuals, redundancy
-        (m, 2) as in :func:`frame_pattern`.
-
-    Returns
-    -------
-    (count,) statistics and p-values; NaN for groups with a redundancy below 10 in an axis.
     """
     numbers = np.bincount(groups, minlength=count)
     means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
@@ -251,12 +223,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
 
     summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
     since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
-    0 without a pattern; NaN where nothing has a neighbour.
-
-    Parameters
-    ----------
-    xy, photos, residuals
-        (m, 2), (m,), (m, 2) image coordinates, photo and ~v of each image.
+    0 without a pattern; NaN if nothing has a neighbour.
     """
     if not len(xy):
         return math.nan
@@ -289,13 +256,6 @@ def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Fl
 
     summed over x and y; about 2 where the residuals of one photo say nothing of the next, towards 0 where
     they drift. NaN of fewer than three photos.
-
-    Parameters
-    ----------
-    photos, count
-        (m,) the photo of each image, and how many there are.
-    residuals, redundancy
-        (m, 2) ~v and r.
     """
     steps = squares = 0.0
     for v, r in zip(residuals.T, redundancy.T, strict=True):

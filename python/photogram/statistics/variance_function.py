@@ -23,10 +23,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 
-LEAST = 1e-6
-"""A redundancy number below this takes no part."""
-CLOSE = 0.01
-"""Steps end when no coefficient moves by more than this part of its standard deviation."""
+LEAST = 1e-6  # Smallest redundancy number of a coordinate that takes part
+CLOSE = 0.01  # Largest change of a coefficient in the last step, in standard deviations
 
 
 class Residuals(Protocol):
@@ -46,31 +44,16 @@ class Residuals(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FunctionEstimate:
-    """Coefficients of a variance function.
+    """Coefficients of a variance function."""
 
-    Attributes
-    ----------
-    coefficients, sd
-        (t,) of the terms, in the given variances, with their standard deviations.
-    covariance
-        (t, t).
-    first
-        (t,) those of the first regression, which are biased.
-    factors
-        (k,) theta of every observation.
-    converged
-        Whether the fixed point was reached.
-    steps
-        How many adjustments it took.
-    """
-
+    # coefficients, sd: (t,) of the terms, in the given variances, with their standard deviations
     coefficients: Floats
     sd: Floats
-    covariance: Floats
-    first: Floats
-    factors: Floats
-    converged: bool
-    steps: int
+    covariance: Floats  # (t, t)
+    first: Floats  # (t,) those of the first regression, which are biased
+    factors: Floats  # (k,) theta of every observation
+    converged: bool  # Whether the fixed point was reached
+    steps: int  # number of adjustments
 
 
 def nonnegative(normal: Floats, right: Floats) -> Floats:
@@ -90,17 +73,7 @@ def nonnegative(normal: Floats, right: Floats) -> Floats:
 def estimate_function(
     adjust: Callable[[Floats], Residuals], terms: Floats, *, max_steps: int = 30
 ) -> FunctionEstimate:
-    """Estimate a variance function.
-
-    Parameters
-    ----------
-    adjust
-        Tells what an adjustment with (k,) factors of the variances leaves; called first with ones.
-    terms
-        (k, t) x, not negative; the first is 1.
-    max_steps
-        Adjustments at the most.
-    """
+    """Estimate a variance function."""
     factors = np.ones(len(terms))
     state = adjust(factors)
     beta: Floats = np.zeros(terms.shape[1])

@@ -8,11 +8,12 @@ from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.stellar.sky import Site
+from photogram.words import phrase
 
 HOUR = 0.0
 """Sidereal time of all images of a landmark, radians: it does not turn with the sky."""
 _STEP = 1e-6
-"""Of the differences that carry weights over, radians."""
+"""Of the differences that transform weights, radians."""
 
 
 def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tuple[Floats, Floats]:
@@ -45,11 +46,10 @@ def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tu
     """
     weight = shaped("weight", weight, (2, 2))
     if not 0 < elevation < np.pi / 2:
-        raise InputError(
-            f"an elevation of {np.degrees(elevation):g} degrees is not between the horizon and the zenith"
-        )
+        raise InputError(phrase("stars.elevation", value=float(np.degrees(elevation))))
     if not np.isfinite(azimuth):
-        raise InputError(f"an azimuth of {azimuth:g} is not finite")
+        message = phrase("error.finite", value=float(azimuth))
+        raise InputError(phrase("error.at", what="azimuth", message=message))
     azimuth = np.remainder(azimuth, 2 * np.pi)
     steps = _STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     azimuths, elevations = (np.array([azimuth, elevation]) + steps).T
@@ -57,6 +57,7 @@ def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tu
     places = site.places(standard, HOUR)
     turns = np.remainder(places - places[0] + np.pi, 2 * np.pi) - np.pi
     back = np.linalg.inv((turns[1::2] - turns[2::2]).T / (2 * _STEP))
-    own = np.diag(weight)
-    spread = np.diag(own) if np.isinf(own).any() or not own.any() else back.T @ weight @ back
-    return places[0], spread
+    diagonal = np.diag(weight)
+    if np.isinf(diagonal).any() or not diagonal.any():
+        return places[0], np.diag(diagonal)
+    return places[0], back.T @ weight @ back

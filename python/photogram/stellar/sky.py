@@ -15,6 +15,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC as ARCSEC
+from photogram.words import phrase
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
@@ -53,17 +54,13 @@ class Air:
     def __post_init__(self) -> None:
         low, high = TEMPERATURES
         if not low <= self.temperature <= high:
-            raise InputError(
-                f"the air has {self.temperature:g} K; temperatures in kelvin are between {low:g} and {high:g}"
-            )
+            raise InputError(phrase("stars.temperature", value=self.temperature, low=low, high=high))
         if not 0 <= self.pressure <= HIGHEST_PRESSURE:
-            hint = ""
+            hint = []
             if HIGHEST_PRESSURE < self.pressure <= HIGHEST_PRESSURE * HECTOPASCAL:
-                hint = f"; {self.pressure:g} hPa are {self.pressure / HECTOPASCAL:.1f}"
-            raise InputError(
-                f"the pressure is {self.pressure:g} mm of mercury; it must be between 0 and"
-                f" {HIGHEST_PRESSURE:g}{hint}"
-            )
+                hint = [phrase("stars.hectopascals", mercury=self.pressure / HECTOPASCAL)]
+            fields = {"value": self.pressure, "most": HIGHEST_PRESSURE}
+            raise InputError(phrase("stars.pressure", hint=hint, **fields))
 
 
 def refraction(

@@ -32,11 +32,11 @@ from photogram.stellar.curves import (
     residual_classes,
     star_means,
 )
+from photogram.stellar.directions import Ellipse, ellipse
+from photogram.stellar.findings import plate_tests
 from photogram.stellar.movement import fictitious_points
-from photogram.stellar.outliers import studentized
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
-from photogram.stellar.result import Ellipse, ellipse
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
@@ -282,15 +282,19 @@ def _images_of(result: Result) -> list[Quantity]:
 
 def worst(result: Result, most: int) -> Table:
     """Return the plate coordinates with the largest test values."""
-    tests = studentized(result)
-    sizes = np.nan_to_num(np.abs(tests.images))
+    tests = plate_tests(result)[0]
+    values = np.abs(tests.values)
+    sizes = np.nan_to_num(values)
     order: Indices = np.argsort(-sizes, axis=None, kind="stable")[:most]
     point, star, _ = (replace(column, member="") for column in _images_of(result))
     columns = [
         point,
         star,
         column(result.solved.residuals, UM_OF_M, "Residual", 2, parts="x, y"),
-        column(tests.images, None, f"Test value {'w' if tests.known else 't'}", 2, parts="x, y"),
+        replace(
+            column(values, None, f"Test value {tests.statistic}", 2, parts="x, y"),
+            marked=result.verdict.marks(tests.kind, tests.values.shape),
+        ),
     ]
     note = f"The {len(order)} plate coordinates of the largest test values."
     places = np.column_stack(np.unravel_index(order, sizes.shape))

@@ -25,7 +25,6 @@ from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
-    from photogram.results.result import Result
 
 MIN_VIEWS_PER_PART = 3
 
@@ -122,7 +121,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     own = [priors[each] for each in cameras]
     sd = np.concatenate([each.deviations for each in own])
     if (np.isfinite(sd) & (sd > 0)).any():
-        result = cast("Result", adjusted_again(part.block(own), result.options, result.state, threads=None))
+        result = adjusted_again(part.block(own), result.options, result.state, threads=None)
     return Calibrated(calibration=part, result=result)
 
 

@@ -15,6 +15,7 @@ from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape
 from photogram.targets.start import Regularisation
+from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
@@ -28,7 +29,7 @@ def read_boards(tables: Tables) -> dict[str, Board]:
     """Read boards of columns and rows; points of others are the control of the project."""
     table = tables.rows("boards")
     if table.count > 1:
-        raise table.error(1, "several boards: those fixed to each other are one of the kind points")
+        raise table.error(1, phrase("plain.several-boards"))
     return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
 
 
@@ -37,7 +38,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
     given: dict[str, Any] = {"unit": tables.settings.length}
     for name, word, words in (("kind", kind, get_args(BoardKind)), ("shape", shape, get_args(Shape))):
         if word and word not in words:
-            raise table.error(row, f"column {name}: {word} is none of {', '.join(words)}")
+            raise table.cell_error(row, name, "error.choice", names=list(words), value=word)
         given |= {name: word} if word else {}
     if given.get("kind") == "points":
         # Their places are those of the control, which is read later.
@@ -58,7 +59,9 @@ def read_regularised(tables: Tables) -> str | None:
         return None
     word = table.texts(REGULARISED)[0]
     if word and word not in get_args(Regularisation):
-        raise table.error(0, f"column {REGULARISED}: {word} is none of {', '.join(get_args(Regularisation))}")
+        raise table.cell_error(
+            0, REGULARISED, "error.choice", names=list(get_args(Regularisation)), value=word
+        )
     return word or None
 
 

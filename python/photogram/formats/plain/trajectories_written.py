@@ -23,6 +23,7 @@ from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
+from photogram.words import phrase
 
 Place = tuple[str, str, int]
 """Trajectory, position or rotation, and the number of a coefficient."""
@@ -35,7 +36,7 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
     names = [each.name for each in found]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"two trajectories are called {twice}: tables know them by their names")
+        raise InputError(phrase("error.repeated", kind="trajectory", name=twice))
     return found
 
 

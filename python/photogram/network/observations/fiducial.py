@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import names, shaped, shown
-from photogram.errors import InputError
+from photogram.arguments.arrays import names, shaped
+from photogram.arguments.objects import kind_error, require, require_kind
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
@@ -55,8 +55,8 @@ class Fiducial(Observation):
     covariance: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.mark, Mark) or not isinstance(self.film, Film):
-            raise InputError(f"a fiducial is of a Mark and a Film, not of {shown(self.mark)}")
+        require_kind("mark of a fiducial", self.mark, Mark)
+        require_kind("film of a fiducial", self.film, Film)
         self._set("photo", names("fiducial", [self.photo])[0])
         super().__post_init__()
         self._set("unknowns", (self.mark, *self.film.unknowns))
@@ -117,12 +117,11 @@ class KnownFilm(Observation):
         self._set("photo", names("film", [self.photo])[0])
         known = tuple(self.known)
         if not set(known) <= set(FILM) or len(set(known)) < len(known) or not known:
-            raise InputError(f"of the film of {self.photo} {', '.join(FILM)} are known, not {shown(known)}")
+            raise kind_error(f"known of the film of {self.photo}", f"some of {', '.join(FILM)}", known)
         self._set("known", known)
         super().__post_init__()
         values = shaped(f"values of {self.name}", self.values, (len(known),))
-        if not np.isfinite(values).all():
-            raise InputError(f"{self.name} has values that are not finite: {values.tolist()}")
+        require(np.isfinite(values).all(), f"values of {self.name}", "finite", value=values.tolist())
         self._set("observed", np.concatenate([[FILM.index(name) for name in known], values]))
 
     @property
@@ -179,9 +178,9 @@ class KnownTogether(Observation):
         self._set("title", names("prior", [self.title])[0])
         own = tuple(self.joined)
         if not own or not all(isinstance(each, Unknown) for each in own):
-            raise InputError(f"what is known together is no list of unknowns: {shown(self.joined)}")
-        if len({id(each) for each in own}) < len(own):
-            raise InputError(f"what is known together as {self.title} has one unknown twice")
+            raise kind_error(f"joined of {self.title}", "a list of unknowns", self.joined)
+        different = len({id(each) for each in own}) == len(own)
+        require(different, f"joined of {self.title}", "repeated", kind="unknown", name=own[0].name)
         self._set("joined", own)
         super().__post_init__()
         self._set("unknowns", own)

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import is_covariance, names, number, shaped, shown
+from photogram.arguments.arrays import argument_error, is_covariance, names, number, shaped
+from photogram.arguments.objects import kind_error, require, require_kind
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.moving_photos import Moment
 from photogram.network.trajectories import Clock, Trajectory
@@ -75,39 +75,35 @@ class Observation:
     def __post_init__(self) -> None:
         given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
         for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
-            if value is not None and not isinstance(value, kind):
-                raise InputError(f"the {name} of the {self.KIND} is no {kind.__name__}: {shown(value)}")
+            require_kind(f"{name} of the {self.KIND}", value, kind, optional=True)
         if given["clock"] is not None and given["trajectory"] is None:
-            raise InputError(f"the {self.KIND} has a clock, {given['clock'].name}, but is of no trajectory")
+            raise argument_error(self.KIND, "requires", name="clock", other="trajectory")
         if hasattr(self, "time"):
             time = number(f"time of the {self.KIND}", self.time)
-            if not np.isfinite(time):
-                raise InputError(f"time of the {self.KIND} is not finite: {time}")
+            require(np.isfinite(time), f"time of the {self.KIND}", "finite", value=time)
             self._set("time", time)
         moment = self.moment
         self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
         of = [getattr(self, name) for name in self.PHOTOS]
         if moment is not None and any(each is not None for each in of):
-            raise InputError(f"the {self.KIND} of {shown(of[0])} is of a trajectory, and so of no photo")
+            raise argument_error(self.KIND, "exclusive", first="photo", second="trajectory")
         self._set("photos", tuple(names(self.KIND, of if moment is None else [moment.name])))
         self._set("unknowns", tuple(self._unknown(name, kind) for name, kind in self.UNKNOWNS))
-        for what, own in (("point", self.points), ("photo", self.photos)):
-            if len(set(own)) < len(own):
-                raise InputError(f"{self.name} is of one {what} alone")
         known = [id(each) for each in self.unknowns if each is not None]
-        if len(set(known)) < len(known):
-            raise InputError(f"{self.name} is of one unknown alone")
+        for kind_of, own in (("point", self.points), ("photo", self.photos), ("unknown", known)):
+            if len(set(own)) < len(own):
+                raise argument_error(self.KIND, "repeated", kind=kind_of, name=self.of[0])
         values = [np.ravel(self._value(name, shape)) for name, shape in self.VALUES]
         self._set("observed", np.concatenate(values) if values else np.zeros(0))
         use = np.ones(len(self.own_components), dtype=bool)
         if self.MISSING:
             use = ~np.isnan(self.observed)
         if not use.any():
-            raise InputError(f"{self.name} has no component that was observed")
+            raise argument_error(self.name, "missing", name="an observed component")
         self._set("precision", self._covariance(use))
         if self._POSITIVE and not self.observed[0] > 0:
             name = self.VALUES[0][0]
-            raise InputError(f"{name} of {self.name} is not positive: {getattr(self, name)}")
+            raise argument_error(f"{name} of {self.name}", "positive", value=getattr(self, name))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -161,18 +157,18 @@ class Observation:
             return value
         known = (value is None and name not in self.NEEDS) or name in dict(self.VALUES)
         if isinstance(value, Unknown) or not known:
-            raise InputError(f"{name} of {self.KIND} is no {kind.__name__}: {shown(value)}")
+            raise kind_error(f"{name} of {self.KIND}", f"an object of the class {kind.__name__}", value)
         return None
 
     def _value(self, name: str, shape: tuple[int, ...]) -> Floats:
-        """Check a field and return its numbers; of common unknowns what stands where they are known."""
+        """Check a field and return its numbers; zeros or the identity for common unknowns."""
         value = getattr(self, name)
         turns = shape == (3, 3)
         if isinstance(value, Unknown) or (value is None and turns):
             return np.eye(3) if turns else np.zeros(shape)
         array = shaped(f"{name} of {self.name}", value, shape, missing=self.MISSING)
         if (np.isinf(array) if self.MISSING else ~np.isfinite(array)).any():
-            raise InputError(f"{name} of {self.name} is not finite: {array.tolist()}")
+            raise argument_error(f"{name} of {self.name}", "finite", value=array.tolist())
         if turns:
             rotation(f"{name} of {self.name}", array)
         self._set(name, array if shape else float(array))
@@ -188,15 +184,13 @@ class Observation:
             with np.errstate(over="ignore", under="ignore"):
                 own = deviations[use] ** 2
             if not ((deviations[use] > 0) & (own > 0) & np.isfinite(own)).all():
-                raise InputError(f"sd of {self.name} is not positive and finite: {deviations.tolist()}")
+                raise argument_error(f"sd of {self.name}", "positive", value=deviations.tolist())
             return np.asarray(np.diag(np.where(use, deviations, 1.0) ** 2))
         if sd is not None or covariance is None:
-            raise InputError(f"{self.name} needs either sd or covariance")
+            raise argument_error(self.name, "exclusive", first="sd", second="covariance")
         matrix = shaped(f"covariance of {self.name}", covariance, (r, r), missing=True)
         if not is_covariance(matrix[np.ix_(use, use)]):
-            raise InputError(
-                f"covariance of {self.name} is not symmetric and positive definite: {matrix.tolist()}"
-            )
+            raise argument_error(self.name, "covariance")
         return matrix
 
 
@@ -259,9 +253,7 @@ def observation_rows(
     def places(each: Observation, own: tuple[str, ...], known: dict[str, int], what: str) -> list[int]:
         for name in own:
             if name not in known:
-                raise InputError(
-                    f"the observation {each.name} is of the {what} {name}, which the block has not"
-                )
+                raise argument_error(f"observation {each.name}", "absent", kind=what, name=name)
         return [known[name] for name in own]
 
     alike: dict[tuple[str, int, int, int], list[int]] = {}

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import shaped, shown
-from photogram.errors import InputError
+from photogram.arguments.arrays import shaped
+from photogram.arguments.objects import kind_error, require
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.knots import Knot
@@ -54,8 +54,8 @@ class Prior(Observation):
             return
         count = len(self.unknown.components)
         value = shaped(f"value of {self.name}", self.value, (count,))
-        if not np.isfinite(value).all() or count > 3:
-            raise InputError(f"value of {self.name} is not finite, or of rotations: {value.tolist()}")
+        good = np.isfinite(value).all() and count <= 3
+        require(good, f"value of {self.name} (not of rotations)", "finite", value=value.tolist())
         self._set("value", value)
         self._set("observed", value - self.unknown.position[:count])
 
@@ -144,19 +144,16 @@ class Smoothness(Observation):
     def __post_init__(self) -> None:
         own = tuple(self.coefficients) if isinstance(self.coefficients, Sequence) else ()
         if not all(isinstance(each, Coefficient) for each in own) or len({each.KIND for each in own}) != 1:
-            raise InputError(
-                f"a smoothness is of coefficients of one kind, not of {shown(self.coefficients)}"
-            )
-        if len({id(each) for each in own}) < len(own):
-            raise InputError("a smoothness has each of its coefficients once")
+            raise kind_error("coefficients of a smoothness", "coefficients of one kind", self.coefficients)
+        different = len({id(each) for each in own}) == len(own)
+        require(different, "smoothness", "repeated", kind="coefficient", name=own[0].name)
         self._set("coefficients", own)
         super().__post_init__()
         self._set("unknowns", own)
         factors = shaped("factors of a smoothness", self.factors, (len(own),))
         self._set("factors", factors)
         observed = np.concatenate([shaped("observed_sum", self.observed_sum, (3,)), factors])
-        if not np.isfinite(observed).all():
-            raise InputError(f"{self.name} has values that are not finite: {observed.tolist()}")
+        require(np.isfinite(observed).all(), f"values of {self.name}", "finite", value=observed.tolist())
         self._set("observed", observed)
 
     @property

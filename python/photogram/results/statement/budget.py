@@ -24,7 +24,7 @@ from photogram.results.grouping import Grouping, grouped
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
 from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
-from photogram.results.suspects import block_suspects, observations_of_core
+from photogram.results.suspects import BlockSuspects, observations_of_core
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase
@@ -240,7 +240,7 @@ class Rows:
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         self.block = result.block
-        self.suspects, self.sd = block_suspects(result.block, core), core.deviations
+        self.suspects, self.sd = BlockSuspects(result.block, core), core.deviations
         self._starts: Indices = self.suspects.row_starts
         self._sizes: Indices = np.diff(self._starts)
         self._component = core.components

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,10 +16,11 @@ from photogram.results.statement.grounds import Grounds, Said, assumptions
 from photogram.results.statement.honest import LEVEL, Bias, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
-from photogram.results.statement.standards import Asprs, Lengths, Standards
+from photogram.results.statement.standards import Asprs, Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.statistics.distributions import critical_normal
+from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
 NOT_USABLE = 4  # Exit code
@@ -51,44 +52,94 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class _Against:
-    """What speaks against handing a statement over, `high` and `low` differences at check points among it."""
+class _Evidence:
+    """The evidence of the rules of a statement."""
 
-    spoilt: bool
-    missed: bool
-    high: bool
-    warning: bool
+    found: Grounds
+    strict: bool
+    control: Sequence[LeftOut]  # control points that disagree with the rest of the block
+    high: bool  # whether differences at check points are larger, or smaller, than predicted
     low: bool
-    control: Sequence[LeftOut]
-    lengths: bool
+    lengths: bool  # whether calibrated lengths disagree with their standard deviations
 
     @property
-    def always(self) -> bool:
-        """Whether it must not be handed over as it is."""
-        return self.spoilt or self.missed or self.high
+    def missed(self) -> bool:
+        """Whether the required accuracy is missed."""
+        lengths = self.found.standards.lengths
+        return "missed" in self.classes or (lengths is not None and lengths.test.met is False)
 
     @property
-    def strictly(self) -> bool:
-        """Whether `strict` says so, too."""
-        return self.warning or self.low or bool(self.control) or self.lengths
+    def met(self) -> bool:
+        """Whether the required accuracy of lengths is met."""
+        lengths = self.found.standards.lengths
+        return lengths is not None and bool(lengths.test.met)
+
+    @property
+    def classes(self) -> list[str]:
+        """The verdicts on accuracy classes."""
+        asprs = self.found.standards.asprs
+        return [] if asprs is None else list(asprs.verdicts.values())
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a rule of `strict` fits."""
+        return self.found.result.verdict.warning or self.low or bool(self.control) or self.lengths
+
+
+def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
+    """Return a rule of a statement with the headline of a name."""
+
+    def message(e: _Evidence) -> Phrase | None:
+        if not holds(e):
+            return None
+        fields = {
+            "verdict": e.found.texts.text(e.found.result.verdict.message),
+            "points": e.found.texts.listed([each.point for each in e.control], NAMED),
+            "n": 0 if e.found.of_all is None else e.found.of_all.n,
+        }
+        return Phrase(f"headline.{name}", fields)
+
+    return Rule(name, message, exit_code, (), grave=lambda e: e.strict or name != "low")
+
+
+RULES = (
+    _rule("verdict", lambda e: not e.found.result.verdict.usable, NOT_USABLE),
+    _rule("missed", lambda e: e.missed, NOT_USABLE),
+    _rule("high", lambda e: e.high, NOT_USABLE),
+    _rule("warning", lambda e: e.strict and e.found.result.verdict.warning, NOT_USABLE),
+    _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
+    _rule("lengths", lambda e: e.strict and e.lengths, NOT_USABLE),
+    _rule("low", lambda e: e.low, NOT_USABLE),
+    _rule("none", lambda e: e.found.of_all is None and (not e.met or "not tested" in e.classes)),
+    _rule("found", lambda e: "not decided" in e.classes or "not tested" in e.classes),
+    _rule("produced", lambda e: "produced to meet" in e.classes),
+    _rule("met", lambda e: bool(e.classes) or e.met),
+    _rule("found", lambda _: True),
+)
+"""The rules of a statement; the first that fits gives the headline and the exit code."""
 
 
 def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
     """Return what the statement says of all that was found."""
-    texts, of_all, standards = found.texts, found.of_all, found.standards
-    against = _against(found)
-    bad = against.always or (strict and against.strictly)
-    doubtful = against.strictly or _doubtful(of_all)
+    texts, lengths = found.texts, found.standards.lengths
+    whole = None if lengths is None else lengths.test.together
+    high, low = _rejected(found.of_all)
+    evidence = _Evidence(
+        found,
+        strict,
+        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
+        high=high,
+        low=low,
+        lengths=whole is not None and (whole.rejected_high or whole.rejected_low),
+    )
+    _, headline, exit_code = fitting_rules(RULES, evidence)[0]
     remarks = _remarks(found)
-    remarks += [texts("control.wrong", point=each.point, p=each.p) for each in against.control[:NAMED]]
-    named = texts.listed([each.point for each in against.control], NAMED)
-    n, verdict = 0 if of_all is None else of_all.n, texts.text(found.result.verdict.message)
+    remarks += [texts("control.wrong", point=each.point, p=each.p) for each in evidence.control[:NAMED]]
+    doubtful = evidence.doubtful or _doubtful(found.of_all)
     return Judged(
-        exit=NOT_USABLE if bad else 0,
-        tone="bad" if bad else "look" if remarks or doubtful else "good",
-        headline=texts(
-            _headline(against, of_all, standards, strict=strict), verdict=verdict, points=named, n=n
-        ),
+        exit=exit_code,
+        tone="bad" if exit_code else "look" if remarks or doubtful else "good",
+        headline=texts(headline.code, **headline.fields),
         sentences=[
             *_asprs(found),
             *(_nssda(found) if "nssda" in found.asked.standards else []),
@@ -98,21 +149,6 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
         ],
         assumptions=assumptions(found, assumed),
         remarks=remarks,
-    )
-
-
-def _against(found: Grounds) -> _Against:
-    high, low = _rejected(found.of_all)
-    verdict, standards = found.result.verdict, found.standards
-    lengths = None if standards.lengths is None else standards.lengths.test.together
-    return _Against(
-        spoilt=not verdict.usable,
-        missed=_missed(standards),
-        high=high,
-        warning=verdict.warning,
-        low=low,
-        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
-        lengths=lengths is not None and (lengths.rejected_high or lengths.rejected_low),
     )
 
 
@@ -139,32 +175,6 @@ def _doubtful(of_all: Figures | None) -> bool:
         or (of_all.surface is not None and of_all.surface.rejected)
         or bool(of_all.points.wrong.any())
     )
-
-
-def _missed(standards: Standards) -> bool:
-    classes = () if standards.asprs is None else standards.asprs.verdicts.values()
-    return "missed" in classes or (standards.lengths is not None and standards.lengths.test.met is False)
-
-
-def _headline(against: _Against, of_all: Figures | None, standards: Standards, *, strict: bool) -> str:
-    verdicts = [] if standards.asprs is None else list(standards.asprs.verdicts.values())
-    met = standards.lengths is not None and standards.lengths.test.met
-    for holds, name in (
-        (against.spoilt, "verdict"),
-        (against.missed, "missed"),
-        (against.high, "high"),
-        (strict and against.warning, "warning"),
-        (strict and against.control, "control"),
-        (strict and against.lengths, "lengths"),
-        (against.low, "low"),
-        (of_all is None and (not met or "not tested" in verdicts), "none"),
-        ("not decided" in verdicts or "not tested" in verdicts, "found"),
-        ("produced to meet" in verdicts, "produced"),
-        (bool(verdicts) or bool(met), "met"),
-    ):
-        if holds:
-            return f"headline.{name}"
-    return "headline.found"
 
 
 def _asprs(of: Grounds) -> Said:

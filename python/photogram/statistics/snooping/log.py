@@ -5,95 +5,52 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 __all__ = ["Removal", "Rival", "Round"]
 
 
 @dataclass(frozen=True)
 class Rival:
-    """What may hold the error instead.
-
-    Attributes
-    ----------
-    name
-        What it is called.
-    statistic, dimension
-        Its T and degrees of freedom when the other was chosen.
-    odds
-        That of the two the chosen one errs, to one.
-    """
+    """What may hold the error instead."""
 
     name: str
-    statistic: float
+    statistic: float  # T when the other was chosen
     dimension: int
-    odds: float
+    odds: float  # that the chosen one of the two is wrong, to one
 
 
 @dataclass(frozen=True)
 class Removal:
-    """A group of observations, or a part of one, that was taken out.
+    """A group of observations, or a part of one, that was taken out."""
 
-    Attributes
-    ----------
-    round
-        In which round, from 1; 0 before the first, by a robust adjustment.
-    group
-        Its number among all groups.
-    kind, subject
-        The kind of its observations, and its name as a message.
-    rows, components, units
-        The rows that went, what they are, and their units.
-    dimension
-        m', the directions in which the error shows.
-    first_statistic
-        T at the start of the round.
-    statistic, fisher
-        T conditional on what went before it in the round, and the F that it gives.
-    log_probability
-        Natural logarithm of the probability that a good group has as large a value.
-    limit
-        The level that it was compared with.
-    error, error_sd
-        The estimated error and its standard deviation (a priori unit weight), by row, in its unit.
-    redundancy
-        The smallest redundancy of a direction that shows.
-    rivals
-        What may hold the error instead, the nearest first.
-    consequences
-        What went with it, and why.
-    prediction, prediction_log_probability, prediction_error
-        T of it, its log-probability, and observed minus predicted, against the network without it; None where
-        its point or photo is out with it.
-    returned
-        The round in which it came back; None while it is out.
-    kept
-        Why it was not taken out although its test says so; empty otherwise.
-    """
-
-    round: int
-    group: int
-    kind: str
+    round: int  # from 1; 0: by a robust adjustment before the first
+    group: int  # number among all groups
+    kind: str  # type of its observations
     subject: Phrase
-    rows: tuple[int, ...]
+    rows: tuple[int, ...]  # removed rows
     components: tuple[str, ...]
     units: tuple[str, ...]
-    dimension: int
-    first_statistic: float
+    dimension: int  # m', number of directions in which the error shows
+    first_statistic: float  # T at the start of the round
+    # statistic, fisher: T conditional on what went before it in the round, and the F that it gives
     statistic: float
     fisher: float
-    log_probability: float
-    limit: float
+    log_probability: float  # Natural logarithm of the probability that a good group has as large a value
+    limit: float  # The level that it was compared with
+    # Estimated errors of the rows and standard deviations (a priori unit weight), in the units of the rows
     error: tuple[float, ...]
     error_sd: tuple[float, ...]
-    redundancy: float
-    rivals: tuple[Rival, ...] = ()
-    consequences: tuple[str, ...] = ()
+    redundancy: float  # The smallest redundancy of a direction that shows
+    rivals: tuple[Rival, ...] = ()  # groups that may contain the error instead
+    consequences: tuple[Phrase | str, ...] = ()  # further removals and their reasons
+    # prediction, prediction_log_probability, prediction_error: T of it, its log-probability, and observed
+    # minus predicted, against the network without it; None if its point or photo is out with it
     prediction: float | None = None
     prediction_log_probability: float | None = None
     prediction_error: tuple[float, ...] = ()
-    returned: int | None = None
-    kept: str = ""
+    returned: int | None = None  # round of the return; None while it is excluded
+    kept: Phrase | str = ""  # why it was not removed although its test rejects
 
     @property
     def name(self) -> str:
@@ -115,44 +72,24 @@ class Removal:
         return tuple(rival for rival in self.rivals if rival.odds < NEAR)
 
     @property
-    def sentence(self) -> str:
-        """What was found, with what it cannot be told apart from."""
-        others = [f"{rival.name} (odds {rival.odds:.2g} : 1)" for rival in self.in_dispute]
-        return " or ".join([self.name, *others])
+    def sentence(self) -> Phrase:
+        """The removed group with its rivals."""
+        rivals = [phrase("snooping.rival", name=rival.name, odds=rival.odds) for rival in self.in_dispute]
+        return phrase("snooping.rivals", groups=[self.subject, *rivals])
 
 
-NEAR = 3.0
-"""Odds below which both are named."""
+NEAR = 3.0  # Odds of rivals that the log names
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round.
+    """One round."""
 
-    Attributes
-    ----------
-    number
-        From 1; 0 for the robust start.
-    status
-        Of the adjustment at its start.
-    weighted_sum_of_squares, degrees_of_freedom
-        Omega and f at its start.
-    tests
-        How many groups are tested.
-    limit
-        Probability below which a group is taken out.
-    removed, returned
-        Numbers in the log of what went and what came back.
-    remarks
-        What else there is to say.
-    """
-
-    number: int
-    status: str
-    weighted_sum_of_squares: float
+    number: int  # From 1; 0 for the robust start
+    status: str  # of the adjustment at the start of the round
+    weighted_sum_of_squares: float  # Omega and f at the start
     degrees_of_freedom: int
-    tests: int
-    limit: float
-    removed: Sequence[int]
+    tests: int  # number of tested groups
+    limit: float  # Probability below which a group is taken out
+    removed: Sequence[int]  # numbers in the log
     returned: Sequence[int]
-    remarks: Sequence[str] = ()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Protocol
 
@@ -14,49 +15,52 @@ from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
 
-@dataclass(frozen=True, eq=False)
-class Suspects:
-    """G groups of observations with M rows in all, one group after the other.
+class Suspects(ABC):
+    """G groups of observations with M rows in all, one group after the other."""
 
-    Attributes
-    ----------
-    row_starts
-        (G + 1,) where the rows of each group start.
-    kinds
-        (G,) which of `kind_names` each is of.
-    kind_names
-        What the kinds are called: `image`, `control`, ...
-    subjects
-        (G,) the number, within its kind, of what a group is of: an image, a point, an observation ...
-    points, photos
-        (G,) the point and the photo that a group is of; -1 where there is none. Groups of one point cannot be
-        judged one without the other.
-    loads
-        Which photos, further than its own, a group has to do with: those that its point is seen from.
-    removable
-        (G,) whether snooping may take it out.
-    parts
-        Rows that may go alone, of a group by its number: plan, height, or all of a control point. None where
-        the group goes as a whole.
-    name, row_name, unit
-        What a group is called, what one of its rows is, and the unit of that row (M).
-    photo_name
-        What a photo is called.
-    """
+    def __init__(
+        self,
+        row_starts: Indices,
+        kinds: Indices,
+        kind_names: Sequence[str],
+        subjects: Indices,
+        points: Indices,
+        photos: Indices,
+        removable: Bools,
+    ) -> None:
+        self.row_starts = row_starts  # (G + 1,) first row of each group
+        self.kinds, self.kind_names = (
+            kinds,
+            kind_names,
+        )  # (G,) types by their numbers: `image`, `control`, ...
+        self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
+        # (G,) point and photo of a group, or -1; tests of groups of one point depend on each other
+        self.points, self.photos = points, photos
+        self.removable = removable  # (G,) whether snooping may remove it
 
-    row_starts: Indices
-    kinds: Indices
-    kind_names: Sequence[str]
-    subjects: Indices
-    points: Indices
-    photos: Indices
-    loads: Callable[[int], Indices]
-    removable: Bools
-    parts: Callable[[int], Sequence[Sequence[int]] | None]
-    name: Callable[[int], Phrase]
-    row_name: Callable[[int], str]
-    unit: Callable[[int], str]
-    photo_name: Callable[[int], Phrase]
+    @abstractmethod
+    def loads(self, group: int) -> Indices:
+        """Return the photos that a group concerns: those that observe its point."""
+
+    @abstractmethod
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return the rows that may go alone, of a group by its number; None if it goes as a whole."""
+
+    @abstractmethod
+    def name(self, group: int) -> Phrase:
+        """Return the name of a group."""
+
+    @abstractmethod
+    def row_name(self, row: int) -> str:
+        """Return the component of a row."""
+
+    @abstractmethod
+    def unit(self, row: int) -> str:
+        """Return the unit of a row."""
+
+    @abstractmethod
+    def photo_name(self, photo: int) -> Phrase:
+        """Return the name of a photo."""
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -96,17 +100,10 @@ def _at(by: tuple[Indices, Indices], value: int) -> Indices:
 
 @dataclass(eq=False)
 class Out:
-    """What takes no part.
+    """What takes no part."""
 
-    Attributes
-    ----------
-    rows
-        (M,) which rows are out.
-    points, photos
-        Those that are out with all that was observed of them.
-    """
-
-    rows: Bools
+    rows: Bools  # (M,) which rows are out
+    # Excluded points and photos, with all their observations
     points: set[int] = field(default_factory=set)
     photos: set[int] = field(default_factory=set)
 
@@ -117,52 +114,27 @@ class Out:
 
 @dataclass(frozen=True)
 class Standing:
-    """How a network stands without what is out.
+    """How a network stands without what is out."""
 
-    Attributes
-    ----------
-    status
-        `converged`, or what else came of the iteration.
-    weighted_sum_of_squares, degrees_of_freedom
-        Omega and f of what takes part.
-    """
-
-    status: str
+    status: str  # `converged`, or what else came of the iteration
+    # weighted_sum_of_squares, degrees_of_freedom: Omega and f of what takes part
     weighted_sum_of_squares: float
     degrees_of_freedom: int
 
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests of all groups; NaN for what is out.
+    """Tests of all groups; NaN for what is out."""
 
-    Attributes
-    ----------
-    active
-        (G,) whether any row takes part.
-    rank
-        (G,) directions in which an error shows.
-    statistic
-        (G,) T, by which Omega falls without the group.
-    least
-        (G,) the smallest redundancy of a direction that shows.
-    shared
-        (G,) h: |correlation| of two groups of different points is no more than the root of the product.
-    residual
-        (M,) of unit weight.
-    redundancy
-        (M,) redundancy numbers.
-    error, error_sd
-        (M,) estimated error and its standard deviation, in the units of the rows.
-    """
-
-    active: Bools
-    rank: Indices
-    statistic: Floats
-    least: Floats
+    active: Bools  # (G,) whether any row takes part
+    rank: Indices  # (G,) directions in which an error shows
+    statistic: Floats  # (G,) T, by which Omega falls without the group
+    least: Floats  # (G,) the smallest redundancy of a direction that shows
+    # (G,) h: |correlation| of two groups of different points is no more than the root of the product
     shared: Floats
-    residual: Floats
-    redundancy: Floats
+    residual: Floats  # (M,) of unit weight
+    redundancy: Floats  # (M,) redundancy numbers
+    # error, error_sd: (M,) estimated error and its standard deviation, in the units of the rows
     error: Floats
     error_sd: Floats
 
@@ -174,20 +146,11 @@ class Tests:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What is out of a group against what the rest predicts.
+    """What is out of a group against what the rest predicts."""
 
-    Attributes
-    ----------
-    statistic
-        d' C^-1 d: chi-square with as many degrees of freedom as rows are out.
-    rows
-        These, of all.
-    error, error_sd
-        Observed minus predicted of each, and its standard deviation, in its unit.
-    """
-
-    statistic: float
-    rows: tuple[int, ...]
+    statistic: float  # d' C^-1 d: chi-square; its degrees of freedom are the number of excluded rows
+    rows: tuple[int, ...]  # These, of all
+    # error, error_sd: Observed minus predicted of each, and its standard deviation, in its unit
     error: tuple[float, ...]
     error_sd: tuple[float, ...]
 
@@ -198,8 +161,8 @@ class Aside:
 
     # The groups, by their numbers, that do not meet where most of their point and photo do
     images: tuple[int, ...]
-    photos: dict[int, str]  # Photos whose images agree with no pose, and why that is said
-    found_by: str = "a consensus of resections and intersections"  # What the consensus is of
+    photos: dict[int, str | Phrase]  # Photos whose images agree with no pose, with the reason
+    found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
 
 class LostSupportError(Exception):
@@ -217,44 +180,35 @@ class Trial(Protocol):
     @property
     def suspects(self) -> Suspects:
         """The groups."""
-        ...
 
     @property
     def deviations(self) -> Floats:
         """(M,) standard deviations a priori, in the units of the rows."""
-        ...
 
     @property
     def whole(self) -> bool:
         """Whether R of all rows together is small enough to be had."""
-        ...
 
     def adjust(self, out: Out) -> Standing:
         """Adjust without what is out; raises LostSupportError."""
-        ...
 
     def tests(self) -> Tests:
         """Test all groups."""
-        ...
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups; None where it cannot be predicted."""
-        ...
+        """Test what is out of groups; None if it cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
-        ...
 
     def response(self) -> tuple[Floats, Floats]:
         """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
-        ...
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for points that are out, all groups there with residuals and R as if they took part.
 
-        Each point by itself, against what the others determine; empty where that is not known.
+        Each point by itself, against what the others determine; empty if that is not known.
         """
-        ...
 
     def resist(self, scale: float) -> Floats | None:
         """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
@@ -262,8 +216,6 @@ class Trial(Protocol):
         Returns (G,) the lengths of the residuals of unit weight, zero for what no loss is applied to; None
         where that leads nowhere, and nothing has changed.
         """
-        ...
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points that are left with too few rays, and photos without support, when a group is out."""
-        ...

@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.io.yaml_text import matrix_lines
+from photogram.io.yaml_text import camera_info
 from photogram.targets.output.rig import Rig, Terms, terms_of
 
 TITLE = "camera_info of ROS"
@@ -20,26 +20,15 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     projection of the second has -fx b, b the base. All others are not rectified.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
-    rectified = [(np.eye(3), np.column_stack([each.matrix, np.zeros(3)])) for each in lenses]
+    rectified: list[tuple[Floats, Floats] | tuple[()]] = [()] * len(lenses)
     if len(lenses) == 2 and rig.tied(1):
-        rectified = _rectified(rig.sensors[1], lenses)
-    found = {}
-    for row, (lens, (turn, projection)) in enumerate(zip(lenses, rectified, strict=True)):
-        name = rig.names[row].replace("\\", "\\\\").replace('"', '\\"')
-        width, height = rig.size(row)
-        model, terms = _distortion(lens)
-        lines = [
-            f"image_width: {width}",
-            f"image_height: {height}",
-            f'camera_name: "{name}"',
-            *matrix_lines("camera_matrix", lens.matrix),
-            f"distortion_model: {model}",
-            *matrix_lines("distortion_coefficients", [terms]),
-            *matrix_lines("rectification_matrix", turn),
-            *matrix_lines("projection_matrix", projection),
-        ]
-        found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
-    return found
+        rectified = [*_rectified(rig.sensors[1], lenses)]
+    return {
+        f"{rig.files[row]}.yaml": camera_info(
+            rig.names[row], rig.size(row), lens.matrix, _distortion(lens), *turned
+        )
+        for row, (lens, turned) in enumerate(zip(lenses, rectified, strict=True))
+    }
 
 
 def _lens(rig: Rig, row: int) -> Terms:

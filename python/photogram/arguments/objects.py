@@ -1,0 +1,38 @@
+"""Objects as arguments: of a class, lists of one class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+from photogram.arguments.arrays import argument_error
+from photogram.errors import InputError
+
+_Kind = TypeVar("_Kind")
+
+
+def kind_error(name: str, kind: str, value: object) -> InputError:
+    """Return the error of an argument of another kind, such as `a Spheroid or None`."""
+    return argument_error(name, "kind", kind=kind, value=value)
+
+
+def require_kind(name: str, value: object, kind: type, *, optional: bool = False) -> None:
+    """Refuse an argument that is not an object of a class."""
+    if not (isinstance(value, kind) or (optional and value is None)):
+        raise kind_error(name, f"{kind.__name__} or None" if optional else kind.__name__, value)
+
+
+def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]:
+    """Return a list of objects of a class."""
+    if not isinstance(values, Sequence):
+        raise argument_error(name, "list", value=values)
+    for row, value in enumerate(values):
+        if not isinstance(value, kind):
+            raise kind_error(f"{name}[{row}]", kind.__name__, value)
+    return tuple(values)
+
+
+def require(condition: object, name: str, code: str, /, **fields: object) -> None:
+    """Refuse an argument unless a condition holds; `code` and fields as in `argument_error`."""
+    if not condition:
+        raise argument_error(name, code, **fields)

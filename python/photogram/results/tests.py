@@ -1,0 +1,254 @@
+"""The tests of all observations of an adjusted network: one table for verdict, documents and plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results import network_tables
+from photogram.results.axes import component_axis
+from photogram.results.network import AdjustedNetwork
+from photogram.results.network_tables import deviation, redundancy
+from photogram.results.network_trial import KINDS, OBSERVATION
+from photogram.results.observation_kinds import kind_words, named_observation, parts_of
+from photogram.show.cells import unit_written
+from photogram.show.quantity import Axis, Link, Quantity, component
+from photogram.statistics.distributions import lambda0
+from photogram.statistics.findings import Tested
+from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
+from photogram.words import Phrase, phrase
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ComponentTests(Tested):
+    """(k, c) tests of the single components of k observations of one type."""
+
+    type: str  # `image`, `control`, `station` or the type of observation
+    axes: tuple[Axis, ...]
+    residuals: Floats
+    sd: Floats
+    redundancy: Floats
+    groups: Mapping[Phrase, slice]  # types of the tests of groups, and the components of these
+    photos: Indices | None = None  # (k,) of the observations
+    points: Indices | None = None
+
+    @property
+    def observed(self) -> Bools:
+        """(k, c) components with a standard deviation and a residual."""
+        return np.isfinite(self.sd) & (self.sd > 0) & np.isfinite(self.residuals)
+
+
+class Tests:
+    """The tests of an adjusted network: of single components, and of groups that may err together."""
+
+    def __init__(self, result: AdjustedNetwork) -> None:
+        self._result, self._terms = result, result._terms()
+
+    @cached_property
+    def normal(self) -> list[ComponentTests]:
+        """Standardized residuals w of all components, type by type."""
+        result, terms = self._result, self._terms
+        photos, points = terms.photos, terms.points
+        of_photos, of_points, every = result.given.image_photos, result.image_points, slice(None)
+
+        def image(row: int) -> Phrase:
+            point, photo = points[of_points[row]], photos[of_photos[row]]
+            return phrase("named.point", point=str(point), photo=str(photo))
+
+        def control(row: int) -> Phrase:
+            return phrase("named.control", point=str(points[row]))
+
+        def station(row: int) -> Phrase:
+            return phrase("named.photo", photo=str(photos[row]))
+
+        def of_network(what: str, sd: str) -> tuple[Floats, Floats, Floats, Floats]:
+            names = (f"{what}residuals", sd, f"{what}redundancy", f"{what}standardized")
+            residuals, sd_given, shares, w = (getattr(result, name) for name in names)
+            return residuals, sd_given, shares, w
+
+        return [
+            _component_tests(
+                *(phrase("test.image_coordinates"), "image", terms.image_axes, image),
+                of_network("", "image_given_sd"),
+                {"images": every},
+                of_photos,
+                of_points,
+            ),
+            _component_tests(
+                *(phrase("test.components_of_control"), "control", terms.point_axes, control),
+                of_network("point_", "point_given_sd"),
+                {"control": every},
+                points=np.arange(len(points)),
+            ),
+            _component_tests(
+                *(phrase("test.components_of_stations"), "station", terms.photo_axes, station),
+                of_network("photo_", "photo_given_sd"),
+                {"positions": slice(3), "attitudes": slice(3, None)},
+                photos=np.arange(len(photos)),
+            ),
+            *(
+                _component_tests(
+                    phrase("test.components", kind=kind_words(each.kind)),
+                    each.kind,
+                    tuple(map(component_axis, each.components, each.units)),
+                    partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each),
+                    (each.residuals, each.sd, each.redundancy, each.standardized),
+                    {"observations": every},
+                )
+                for each in terms.kinds
+            ),
+        ]
+
+    @cached_property
+    def components(self) -> list[ComponentTests]:
+        """The tests of all components: w if the unit weight is known, else t."""
+        if self._result.KNOWN:
+            return self.normal
+        return [tests.studentized(*self._result.sum_and_freedom) for tests in self.normal]
+
+    @property
+    def groups(self) -> list[Tested]:
+        """The tests of all groups by type: T if the unit weight is known, else F; none with a loss."""
+        result, summary = self._result, self._result.reliability_summary
+        if summary is None:
+            return []
+        suspects, testable = summary.suspects, summary.testable
+        types = []
+        for kind, name in enumerate(KINDS):
+            groups = np.flatnonzero(suspects.kinds == kind)
+            rows = suspects.subjects[groups]
+            if kind != OBSERVATION:
+                types.append((phrase("test.control" if name == "control" else f"test.{name}s"), groups, rows))
+                continue
+            rows = self._terms.observation_rows[rows]
+            for each in sorted(self._terms.kinds, key=lambda each: each.kind):
+                own = np.isin(rows, each.rows)
+                title = phrase("test.observations", kind=kind_words(each.kind))
+                types.append((title, groups[own], np.searchsorted(each.rows, rows[own])))
+        found = [
+            Tested(
+                title,
+                np.where(testable[groups], summary.tests.statistic[groups], math.nan),
+                lambda place, groups=groups: suspects.name(int(groups[place[0]])),  # type: ignore[misc]
+                "T",
+                summary.tests.rank[groups].astype(np.float64),
+                rows=rows,
+            )
+            for title, groups, rows in types
+            if testable[groups].any()
+        ]
+        return found if result.KNOWN else [tests.studentized(*result.sum_and_freedom) for tests in found]
+
+    @cached_property
+    def outliers(self) -> list[Bools]:
+        """The components of each type that are outliers of the verdict, or belong to groups that are."""
+        verdict, found = self._result.verdict, []
+        for tests in self.normal:
+            marks = verdict.marks(tests.kind, tests.values.shape)
+            for kind, components in tests.groups.items():
+                marks[[place[0] for place in verdict.outlying.get(kind, ())], components] = True
+            found.append(marks)
+        return found
+
+    def largest(self, count: int) -> Indices:
+        """Return the (n, 3) places of the largest test values: type, observation and component."""
+        found = []
+        for order, tests in enumerate(self.components):
+            sizes = np.nan_to_num(np.abs(tests.values)).ravel()
+            few = np.flatnonzero(sizes > 0)
+            if len(few) > count:
+                few = few[np.argpartition(-sizes[few], count)[:count]]
+            for index in few.tolist():
+                row, component = divmod(index, tests.values.shape[1])
+                found.append((-sizes[index], str(tests.kind), row, component, order))
+        places = [(order, row, component) for *_, row, component, order in sorted(found)[:count]]
+        return np.array(places, dtype=np.int64).reshape(-1, 3)
+
+    def columns(self, places: Indices | None = None) -> list[Quantity]:
+        """Return the columns of all observed components, or of those at (n, 3) places."""
+        types = self.components
+        if places is None:
+            observed = [np.argwhere(tests.observed) for tests in types]
+            places = np.vstack([np.insert(own, 0, k, axis=1) for k, own in enumerate(observed)])
+        of_type, rows, parts = places.T
+        names = ("residuals", "sd", "redundancy", "values", "log_p")
+        numbers = {name: np.full(len(rows), np.nan) for name in names}
+        owners = {name: np.full(len(rows), -1) for name in ("photos", "points")}
+        marked = np.zeros(len(rows), dtype=bool)
+        for k, tests in enumerate(types):
+            own = of_type == k
+            place = rows[own], parts[own]
+            for name in names[:-1]:
+                numbers[name][own] = getattr(tests, name)[place]
+            numbers["log_p"][own] = replace(tests, values=tests.values[place]).log_probability()
+            marked[own] = self.outliers[k][place]
+            for name, found in owners.items():
+                if (every := getattr(tests, name)) is not None:
+                    found[own] = every[rows[own]]
+        axes = tuple(axis for tests in types for axis in tests.axes)
+        of = np.cumsum([0, *(len(tests.axes) for tests in types)])[of_type] + parts
+        sd, shares, values = (numbers[name] for name in ("sd", "redundancy", "values"))
+        freedom = math.inf if self._result.KNOWN else self._result.sum_and_freedom[1]
+        detectable = minimal_detectable_error(sd, shares, math.sqrt(lambda0(dof=freedom)))
+        statistic = types[0].statistic
+        units = np.array([unit_written(axis.small) for axis in axes], dtype=object)
+        type_names = np.array([tests.type for tests in types], dtype=object)
+        return [
+            Quantity(type_names[of_type], kind="name", name="type"),
+            Quantity(rows, kind="name", name="row"),
+            self._linked("photo", self._terms.photos, owners["photos"]),
+            self._linked("point", self._terms.points, owners["points"]),
+            *component(axes, of),
+            Quantity(numbers["residuals"], axes, "deviation", "residual", head="Residual", of=of),
+            deviation(sd, axes, head="sd given", of=of),
+            Quantity(units[of], kind="name", head="Unit"),
+            redundancy(shares, axes, of=of),
+            Quantity(detectable, axes, "deviation", "detectable", head="Detectable error", of=of),
+            Quantity(values, name=statistic, head=f"Test value {statistic}", decimals=2, marked=marked),
+            Quantity(np.exp(numbers["log_p"]), name="p", head="p", figures=2),
+            Quantity(marked, kind="name", name="outlier"),
+        ]
+
+    @staticmethod
+    def _linked(kind: str, names: np.ndarray, rows: Indices) -> Quantity:
+        texts = np.append(names.astype(object), "")[rows]
+        return Quantity(texts, (), "name", kind, head=kind.capitalize(), link=Link(kind, rows))
+
+
+def _component_tests(
+    title: Phrase,
+    kind: str,
+    axes: tuple[Axis, ...],
+    name: Callable[[int], Phrase],
+    values: tuple[Floats, Floats, Floats, Floats],
+    groups: Mapping[str, slice],
+    photos: Indices | None = None,
+    points: Indices | None = None,
+) -> ComponentTests:
+    """Return the tests of one type by its residuals, standard deviations, redundancy numbers and w."""
+    residuals, sd, shares, w = values
+    return ComponentTests(
+        kind=title,
+        values=np.where(shares > TESTABLE, w, np.nan),
+        name=lambda place: parts_of([axes[place[1]].name], name(place[0])),
+        type=kind,
+        axes=axes,
+        residuals=residuals,
+        sd=sd,
+        redundancy=shares,
+        groups={Phrase(f"test.{code}", title.fields): components for code, components in groups.items()},
+        photos=photos,
+        points=points,
+    )
+
+
+TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
+    **network_tables.TABLES,
+    "test": lambda result: Tests(result).columns(),
+}
+"""The tables of every network by the type of the things that have their rows."""
