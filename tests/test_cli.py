@@ -20,6 +20,7 @@ from photogram.cli.commands import application
 from photogram.cli.simulate import MotionOptions
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.giant import read_project
+from photogram.words import Phrase
 
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
 OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.html", "report.txt"}
@@ -382,7 +383,7 @@ def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains
     result = run("giant", "block")
     assert result.exit_code == 3
     assert "GROUND holds no component of a photographed point" in result.stderr
-    assert "the standard deviations of the photos are too large to give a datum" in result.stderr
+    assert str(Phrase("adjust.no-datum.large-sd")) in " ".join(result.stderr.split())
     assert names(tmp_path) == {"block"}
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photogram import _photocore, snoop
+from photogram import Message, _photocore, snoop
 from photogram.collection import adjust, simulate
-from photogram.messages import Message
 
 # A datum of its own: standard deviations depend on it, and without it on where the iterations end.
 FREE = np.full((8, 9), np.inf)

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import _photocore, snoop
+from photogram import Message, _photocore, snoop
 from photogram.collection import Collection, adjust, simulate
 from photogram.collection.as_block import as_block
-from photogram.messages import Message
 from photogram.results.weakest import weakest_photos, weakest_points
 
 GIVEN = simulate(photos=8, points=60, coarseness=0.2, seed=4).collection

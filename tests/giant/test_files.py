@@ -10,9 +10,8 @@ from small_project import FRAMES, GROUND, IMAGES, ground_record, replaced
 
 from photogram import InputError
 from photogram.giant import Common
-from photogram.giant.cameras import camera_records, parse_cameras
 from photogram.giant.common import common_records, parse_common
-from photogram.giant.frames import frame_records, parse_frames
+from photogram.giant.frames import camera_records, frame_records, parse_cameras, parse_frames
 from photogram.giant.ground import ground_records, parse_ground
 from photogram.giant.images import image_records, parse_images
 from photogram.giant.records import Source

@@ -283,7 +283,7 @@ class Orientation(Documented, Judged, Brief):
         return to_json(self)
 
     def _findings(self) -> Findings:
-        from photogram.absolute_orientation.findings import orientation_findings
+        from photogram.absolute_orientation.document import orientation_findings
 
         return orientation_findings(self)
 

@@ -109,7 +109,7 @@ class Planned:
         plan = self.made(job, seen, uncertainty)
         from photogram.io.csv_text import csv_text
         from photogram.show.quantity import frame
-        from photogram.targets.document import worth_files
+        from photogram.targets.page import worth_files
 
         document, worth = plan.document(), plan.calibrated.worth
         assert worth is not None
@@ -221,7 +221,7 @@ def _files(found: Calibrated, report: str) -> dict[str, bytes]:
     from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
-    from photogram.targets.document import worth_files
+    from photogram.targets.page import worth_files
     from photogram.targets.tables import views
 
     files = {"report.txt": report.encode(), **table_files(found.result)}

@@ -17,8 +17,8 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
-    from photogram.targets.calibration_result import WorthOptions
     from photogram.targets.cross_validation import Into
+    from photogram.targets.worth import WorthOptions
 
 
 ShapeName = Literal["held", "bend", "points"]
@@ -190,7 +190,7 @@ class Uncertainty:
 
     def asked(self) -> WorthOptions:
         """Return the options of the uncertainty of a calibration."""
-        from photogram.targets.calibration_result import WorthOptions
+        from photogram.targets.worth import WorthOptions
 
         return WorthOptions(
             distances=self.distances,

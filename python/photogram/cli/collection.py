@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS, Basis, Found, snooped
+from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, snooped
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
@@ -91,7 +91,7 @@ def collection(
         written |= result.files(out)
     title = problem.name
     written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
-    written |= documents.as_json(result.told)
+    written |= documents.as_json(result.subject)
 
     def summarize() -> None:
         print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
@@ -114,7 +114,7 @@ def _adjusted(
     components: list[Basis] | None,
     ordering: OrderingName,
     threads: int | None,
-) -> Found[AdjustedCollection]:
+) -> AdjustmentOutcome[AdjustedCollection]:
     """Adjust a collection, or take gross errors out of it, with the progress on standard error."""
     from photogram.collection import AdjustedCollection, adjust
 
@@ -126,10 +126,10 @@ def _adjusted(
             "progress": progress,
         }
         if not snooping.snoop:
-            return Found(
+            return AdjustmentOutcome(
                 adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
             )
         log, made = snooped(photos, components, threads, options | snooping.options)
         if not isinstance(log.result, AdjustedCollection):
             raise TypeError("a collection gives the result of a collection")
-        return Found(log.result, log, made)
+        return AdjustmentOutcome(log.result, log, made)

@@ -57,31 +57,29 @@ def snooped(
 
 
 @dataclass(frozen=True)
-class Found(Generic[Network]):
+class AdjustmentOutcome(Generic[Network]):
     """The outcome of an adjustment: result, removed observations, variance components."""
 
     result: Network
     log: Snooped | None = None
-    made: Cleaned | None = None
-    """Weights and removed observations of an alternating estimation."""
-    components: VarianceComponents | None = None
-    """Components of the given weights, which the result retains."""
+    cleaned: Cleaned | None = None  # Weights and removed observations of an alternating estimation
+    components: VarianceComponents | None = None  # Of the given weights, which the result retains
 
     @property
-    def told(self) -> Snooped | Network:
+    def subject(self) -> Snooped | Network:
         """The subject of reports."""
         return self.log or self.result
 
     @property
     def verdict(self) -> Verdict:
         """The verdict that determines the exit code."""
-        return (self.components or self.told).verdict
+        return (self.components or self.subject).verdict
 
     def estimated(
         self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
-    ) -> Found[Network]:
+    ) -> AdjustmentOutcome[Network]:
         """Return the outcome with requested components if it lacks them."""
-        if self.made is not None or not bases:
+        if self.cleaned is not None or not bases:
             return self
         from photogram.adjustment.components import variance_components
 
@@ -91,7 +89,7 @@ class Found(Generic[Network]):
 
     def files(self, out: Path) -> dict[Path, bytes]:
         """Return the file of variance components in the output folder."""
-        weights = self.made or self.components
+        weights = self.cleaned or self.components
         return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
 
     @cached_property
@@ -99,7 +97,7 @@ class Found(Generic[Network]):
         """The document of the report, with weights and removed observations."""
         from photogram.results.components_document import weighed_document
 
-        if self.made is not None:
-            return self.made.document()
-        network = self.told.document()
+        if self.cleaned is not None:
+            return self.cleaned.document()
+        network = self.subject.document()
         return network if self.components is None else weighed_document(self.components, network)

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
 from photogram.cli.command_classes import misuse
-from photogram.cli.components import COMPONENTS, Basis, Found, UnitVarianceName, snooped
+from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, UnitVarianceName, snooped
 from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, adjustment_status, with_job
@@ -96,7 +96,7 @@ def giant(
     found = found.estimated(job, block, how.components, threads)
     written |= found.files(out) | documents.plots_of(found.result, out)
     written[out / "report.txt"] = text(found.document).encode()
-    asked = documents.page(job, "giant", out, lambda: found.document) | documents.as_json(found.told)
+    asked = documents.page(job, "giant", out, lambda: found.document) | documents.as_json(found.subject)
     if listing is not None:
         from photogram.giant import listing as printout
 
@@ -133,7 +133,7 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
 
 
 def _result_files(
-    project: Project, block: Block, found: Found[Result], out: Path, as_published: bool
+    project: Project, block: Block, found: AdjustmentOutcome[Result], out: Path, as_published: bool
 ) -> dict[Path, bytes]:
     """Return all files of the output folder."""
     from photogram.giant.export import adjusted_records
@@ -182,7 +182,7 @@ def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
 
 def _adjusted_project(
     job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
-) -> Found[Result]:
+) -> AdjustmentOutcome[Result]:
     """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
     from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.errors import AdjustmentError
@@ -211,7 +211,7 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
     progress: Callable[[Progress], None] | None,
-) -> Found[Result]:
+) -> AdjustmentOutcome[Result]:
     """Take gross errors out of the block, with its weights where components are asked for."""
     from photogram import Result
     from photogram.diagnosis.after_adjustment import diagnosed
@@ -220,7 +220,7 @@ def _snooped(
     log, made = snooped(block, how.components, threads, options)
     if not isinstance(log.result, Result):
         raise TypeError("a block gives the result of a block")
-    return Found(diagnosed(log.result), log, made)
+    return AdjustmentOutcome(diagnosed(log.result), log, made)
 
 
 def _adjusted(
@@ -229,7 +229,7 @@ def _adjusted(
     how: GiantOptions,
     threads: int | None,
     progress: Callable[[Progress], None] | None,
-) -> Found[Result]:
+) -> AdjustmentOutcome[Result]:
     """Adjust the block by present rules or by the rules of 1987."""
     from photogram import AsPublished, adjust
     from photogram.diagnosis.after_adjustment import diagnosed
@@ -248,4 +248,4 @@ def _adjusted(
         covariance="verdict",
         **rules,
     )
-    return Found(diagnosed(result))
+    return AdjustmentOutcome(diagnosed(result))

@@ -22,8 +22,7 @@ from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
-from photogram.network.structuring import structure
-from photogram.network.ties import FEWEST_TIES, ties
+from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.words import Phrase, phrase
 
 EARTH_RADIUS = 6.371e6  # Metres

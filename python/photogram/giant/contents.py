@@ -6,11 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.giant.cameras import Camera, camera_records
 from photogram.giant.common import Common, common_records
 from photogram.giant.fields import parse_name
 from photogram.giant.files import written
-from photogram.giant.frames import Frame, frame_records
+from photogram.giant.frames import Camera, Frame, camera_records, frame_records
 from photogram.giant.ground import GroundPoint, ground_records
 from photogram.giant.images import ImageFrame, image_records
 from photogram.lazy_dataclasses import dataclass, field

@@ -11,12 +11,11 @@ import numpy as np
 from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
 from photogram.giant.contents import Contents
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
-from photogram.giant.frames import Frame, frame_records
+from photogram.giant.frames import Camera, Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message

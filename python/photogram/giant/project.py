@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
-from photogram.giant.cameras import parse_cameras
 from photogram.giant.common import Common, parse_common
 from photogram.giant.contents import Contents
 from photogram.giant.export import block_files
 from photogram.giant.files import NAMES, find_files, present_files, to_bytes
-from photogram.giant.frames import parse_frames
+from photogram.giant.frames import parse_cameras, parse_frames
 from photogram.giant.ground import parse_ground
 from photogram.giant.images import parse_images
 from photogram.giant.limits import Limits
