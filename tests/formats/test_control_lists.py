@@ -290,7 +290,7 @@ def test_marks_of_decimals_and_thousands(cells, delimiter, numbers):
 
 @pytest.mark.parametrize("cells", [["4.567", "1,25"], ["4,567", "1.25"], ["1,234", "1.234"]])
 def test_a_mark_that_may_divide_decimals_or_thousands_is_refused(cells):
-    with rejected("table.marks"):
+    with rejected("cells.marks"):
         [marks_of(cells, ";").plain(cell) for cell in cells]
 
 

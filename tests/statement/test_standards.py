@@ -330,7 +330,7 @@ BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
         (lambda: asprs.remarks([[0.0, 0.0]]), "error.shape"),
         (lambda: nssda(None, -1.0, 3), "error.not-negative"),
         (lambda: nssda([1.0], None, 3), "error.shape"),
-        (lambda: nssda(-np.eye(2), None, 3), "not symmetric and positive semidefinite"),
+        (lambda: nssda(-np.eye(2), None, 3), "error.covariance-singular"),
         (lambda: length_test([], [], **BAR), "error.shape"),
         (lambda: length_test([1.0, 2.0], [1.0, -2.0], **BAR), "error.not-negative"),
         (

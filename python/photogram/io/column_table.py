@@ -137,7 +137,7 @@ class ColumnTable:
             other = seen.setdefault(plain, place)
             if other != place:
                 row = int(np.flatnonzero(found.rows == place)[0])
-                raise self.cell_error(row, column, "table.similar", name=name, other=found.names[other])
+                raise self.cell_error(row, column, "cells.similar", name=name, other=found.names[other])
         return found
 
     def names_once(self, column: str) -> list[str]:
@@ -164,7 +164,7 @@ class ColumnTable:
         if numbers is None:
             return self.cells[column]
         if not np.isnan(numbers).all():  # type: ignore[arg-type]
-            raise self.head.error(phrase("table.decimals", column=column))
+            raise self.head.error(phrase("cells.decimals", column=column))
         return [""] * self.count
 
     def numbers(
@@ -242,7 +242,7 @@ class ColumnTable:
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
-            code = "table.no-sd" if table else "error.empty"
+            code = "cells.no-sd" if table else "error.empty"
             raise self.cell_error(row, columns[column], code, table=table)
 
     def words(

@@ -69,7 +69,7 @@ def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool
         if column and columns.count(column) > 1:
             both = [raw for raw, name in zip(own, columns, strict=True) if name == column]
             if settled and len(set(both)) > 1:
-                raise head.error(phrase("table.same-columns", column=column, names=both, first=both[0]))
+                raise head.error(phrase("cells.same-columns", column=column, names=both, first=both[0]))
             raise head.error(phrase("error.repeated", kind="column", name=column))
     return columns
 
@@ -148,7 +148,7 @@ def _head(
                     return below, _delimiter(below)
             if hint is not None:
                 raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
-            raise head.error(phrase("table.header", names=sorted(known)))
+            raise head.error(phrase("cells.header", names=sorted(known)))
         return head, _delimiter(head)
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)

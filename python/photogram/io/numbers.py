@@ -80,7 +80,7 @@ class Marks:
         if other in head:
             groups = _GROUPS.fullmatch(head)
             if groups is None or groups["mark"] != other or not self.thousands:
-                raise InputError(phrase("table.marks", value=text, decimal=self.decimal, other=other))
+                raise InputError(phrase("cells.marks", value=text, decimal=self.decimal, other=other))
             head = head.replace(other, "")
         return f"{head}.{tail}" if mark else head
 

@@ -72,7 +72,7 @@ class Sheet:
         """Return a column of names."""
         values = self.column(name)
         if not isinstance(values, Repeated):
-            raise InputError(phrase("table.column-kind", column=name, kind="names"), file=self.path)
+            raise InputError(phrase("cells.column-kind", column=name, kind="names"), file=self.path)
         return values
 
     def numbers(self, name: str, columns: int = 0) -> Any:
@@ -82,7 +82,7 @@ class Sheet:
         width = values.shape[1] if kind and values.ndim == 2 else 0
         fits = width == columns if columns >= 0 else width > 0 and width % columns == 0
         if kind not in tuple("iuf") or not fits:
-            raise InputError(phrase("table.column-kind", column=name, kind="numbers"), file=self.path)
+            raise InputError(phrase("cells.column-kind", column=name, kind="numbers"), file=self.path)
         return values
 
 

@@ -36,7 +36,7 @@ class Row:
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
-        return self.place.whole(text, phrase("table.cell", column=column))
+        return self.place.whole(text, phrase("cells.cell", column=column))
 
     def number(self, column: str) -> float | None:
         """Return a finite number; None where the cell is blank or the column is missing."""
@@ -44,7 +44,7 @@ class Row:
         if not text:
             return None
         number = text.replace(",", ".") if self.commas and "." not in text else text
-        return self.place.number(number, phrase("table.cell", column=column))
+        return self.place.number(number, phrase("cells.cell", column=column))
 
     def required(self, column: str) -> float:
         """Return a finite number."""

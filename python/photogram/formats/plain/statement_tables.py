@@ -68,7 +68,7 @@ def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, An
         if first[row] == second[row]:
             raise table.error(row, phrase("plain.same-ends", name=first[row]))
         if not sd < math.inf:
-            raise table.cell_error(row, "sd", "table.no-sd", table="lengths")
+            raise table.cell_error(row, "sd", "cells.no-sd", table="lengths")
         own = {"line": lines[row], "from": first[row], "to": second[row], "length": length, "sd": sd}
         found.append(own if math.isnan(temperature) else {**own, "temperature": temperature})
     return tuple(found)
