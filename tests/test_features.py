@@ -228,9 +228,9 @@ def test_a_project_declares_them(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        ((), 2, "name what to fit"),
-        (("--circle", "bore"), 2, "is not NAME=POINT"),
-        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "two features are called a"),
+        ((), 2, "contains no features"),
+        (("--circle", "bore"), 2, "must be NAME=POINT"),
+        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "the name 'a' is used by two features"),
         (("--circle", "a=x,y,z"), 1, "feature a: the point 'x' is unknown"),
     ],
 )

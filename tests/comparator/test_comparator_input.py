@@ -25,8 +25,7 @@ from photogram.comparator import (
 )
 from photogram.comparator.calibration import corrected_grid
 from photogram.comparator.cards import join_least_count
-from photogram.comparator.case import detect_orientation, intersect_legs, reduce_legs
-from photogram.comparator.closeout import close_out
+from photogram.comparator.case import close_out, detect_orientation, intersect_legs, reduce_legs
 from photogram.comparator.pointing import group, group_as_listed
 
 

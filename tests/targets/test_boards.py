@@ -47,16 +47,34 @@ def test_the_shape_goes_by_the_views():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"columns": 9, "rows": 7}, "spacing"),
-        ({"columns": 1, "rows": 7, "spacing": 1.0}, "2 or more columns"),
-        ({"columns": 9, "rows": 7, "spacing": -1.0}, "positive"),
-        ({"kind": "ring", "columns": 9, "rows": 7, "spacing": 1.0}, "is one of chessboard"),
-        ({"columns": 9, "rows": 7, "spacing": 1.0, "tag_size": 1.0}, "no tag_size"),
-        ({"kind": "aprilgrid", "columns": 6, "rows": 6, "tag_size": 0.1}, "tag_spacing"),
-        ({"kind": "points"}, "has points"),
-        ({"kind": "points", "points": np.zeros((9, 3)), "shape": "bend"}, "bend"),
-        ({"kind": "points", "points": np.zeros((2, 3)), "point_names": ["a", "a"]}, "different names"),
-        ({"columns": 9, "rows": 7, "spacing": 1.0, "shape": "round"}, "is one of held"),
+        ({"columns": 9, "rows": 7}, "error.at what=spacing message=error.empty"),
+        (
+            {"columns": 1, "rows": 7, "spacing": 1.0},
+            "error.at what=columns message=error.least low=2 value=1",
+        ),
+        (
+            {"columns": 9, "rows": 7, "spacing": -1.0},
+            "error.range low=9.999999999999999e-51 high=1e+50 value=-1.0",
+        ),
+        (
+            {"kind": "ring", "columns": 9, "rows": 7, "spacing": 1.0},
+            "ring",
+        ),
+        (
+            {"columns": 9, "rows": 7, "spacing": 1.0, "tag_size": 1.0},
+            "error.not-applicable name=tag_size other=targets.kind kind=chessboard",
+        ),
+        (
+            {"kind": "aprilgrid", "columns": 6, "rows": 6, "tag_size": 0.1},
+            "error.at what=tag_spacing message=error.empty",
+        ),
+        ({"kind": "points"}, "error.at what=points message=error.empty"),
+        ({"kind": "points", "points": np.zeros((9, 3)), "shape": "bend"}, "targets.bend"),
+        ({"kind": "points", "points": np.zeros((2, 3)), "point_names": ["a", "a"]}, "targets.names count=2"),
+        (
+            {"columns": 9, "rows": 7, "spacing": 1.0, "shape": "round"},
+            "round",
+        ),
     ],
 )
 def test_what_is_no_board_is_refused(given, said):

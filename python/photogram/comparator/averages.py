@@ -124,8 +124,14 @@ def _by_location(
         places = _means(at, np.vstack([residuals[k].xy_um for k in members]), len(grid.points))
         values = _means(at, np.vstack([residuals[k].comparator_um for k in members]), len(grid.points))
         measured = np.isfinite(values[:, 0])
-        averaged = tuple(cases[k].number for k in members)
-        averages.append(LocationAverages(averaged, grid.points[measured], places[measured], values[measured]))
+        averages.append(
+            LocationAverages(
+                cases=tuple(cases[k].number for k in members),
+                locations=grid.points[measured],
+                xy_um=places[measured],
+                residuals_um=values[measured],
+            )
+        )
     return tuple(averages)
 
 
@@ -155,11 +161,7 @@ class ListedGridSigma:
 
 
 def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
-    """Compute the figures of the listing.
-
-    They divide by 2 N - 1, and pass over what the fitted parameters take: the grid sigma of 25 points comes
-    out 5 percent small.
-    """
+    """Compute the figures of the listing."""
     points, cases = len(averages.points), len(averages.cases)
     squares = (averages.grid_um**2).sum(axis=0)
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))

@@ -15,8 +15,7 @@ from photogram.comparator.averages import (
     listed_grid_sigma,
     text_grid_sigma,
 )
-from photogram.comparator.case import PlacedCase, place_case
-from photogram.comparator.closeout import Closeout, close_out
+from photogram.comparator.case import Closeout, PlacedCase, close_out, place_case
 from photogram.comparator.combined_solution import (
     CombinedLinear,
     CombinedPolynomial,
@@ -222,7 +221,7 @@ class Calibration(Documented, Judged, Brief):
         return calibration_document(self)
 
     def _findings(self) -> Findings:
-        from photogram.comparator.findings import comparator_findings
+        from photogram.comparator.document import comparator_findings
 
         return comparator_findings(self)
 

@@ -125,10 +125,7 @@ def _format(header: Header) -> _Format:
 
 
 def join_least_count(coarse: int, unit: int) -> int:
-    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON).
-
-    The digit decides; the coarse reading is moved by at most five units to agree with it.
-    """
+    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON)."""
     tens, digit = divmod(coarse, 10)
     if abs(digit - unit) <= 5:
         return 10 * tens + unit
@@ -136,10 +133,7 @@ def join_least_count(coarse: int, unit: int) -> int:
 
 
 def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
-    """Split KASE, 100 x plate + case.
-
-    At the left of its field the program read a zero behind it, and printed 20020 for 2002.
-    """
+    """Split KASE, 100 x plate + case."""
     text = record.columns(*columns)
     digits = text.strip(" ")
     if len(digits) == 5 and digits.endswith("0"):

@@ -101,11 +101,7 @@ class PointingTests:
 
 
 def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
-    """Test pointings against the others of their case.
-
-    Each deviates from the mean of its point (of its leg, where legs were measured); deviations in x and in y
-    of a case have one standard deviation each.
-    """
+    """Test pointings against the others of their case."""
     tests = []
     for case in cases:
         _, group, counts = np.unique(

@@ -140,24 +140,24 @@ def _kinds(found: Reliability) -> list[Quantity]:
     of_rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
     rows = []
     for kind, name in enumerate(suspects.kind_names):
-        groups = tests.active & (suspects.kinds == kind)
-        components = (of_rows == kind) & ~np.isnan(redundancy)
-        if groups.any():
-            unchecked = groups & found.untestable
-            one_sided = groups & found.invisible & ~unchecked
-            counts = [np.count_nonzero(each) for each in (groups, components, unchecked, one_sided)]
-            rows.append((name, *counts, float(redundancy[components].sum())))
-    names, *numbers = zip(*rows, strict=True) if rows else ((),) * 6
-    of_groups, of_components, of_unchecked, of_one_sided, sums = map(np.array, numbers)
-    mean = sums / np.maximum(of_components, 1)
+        active = tests.active & (suspects.kinds == kind)
+        tested = (of_rows == kind) & ~np.isnan(redundancy)
+        if active.any():
+            untestable = active & found.untestable
+            invisible = active & found.invisible & ~untestable
+            numbers = [np.count_nonzero(each) for each in (active, tested, untestable, invisible)]
+            rows.append((name, *numbers, float(redundancy[tested].sum())))
+    names, *counts, sums = zip(*rows, strict=True) if rows else ((),) * 6
+    groups, components, unchecked, one_sided = map(np.array, counts)
+    mean = np.array(sums) / np.maximum(components, 1)
     return [
         Quantity(names, kind="name", member="kind", head="Kind"),
-        Quantity(of_groups, member="groups", head="Groups", decimals=0),
-        Quantity(of_components, member="components", head="Components", decimals=0),
+        Quantity(groups, member="groups", head="Groups", decimals=0),
+        Quantity(components, member="components", head="Components", decimals=0),
         Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
         Quantity(mean, head="Mean", decimals=3),
-        Quantity(of_unchecked, member="unchecked", head="Unchecked", decimals=0),
-        Quantity(of_one_sided, member="one_sided", head="One-sided", decimals=0),
+        Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
+        Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
     ]
 
 

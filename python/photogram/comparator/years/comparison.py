@@ -68,11 +68,7 @@ def quantities_of(
     covariance: Floats,
     frame: Frame,
 ) -> Quantities:
-    """Return what is compared of one comparator, over the range that its calibrations have in common.
-
-    The corrections are those that were adjusted together, with the covariance (k, 21, k, 21) of their
-    parameters.
-    """
+    """Return what is compared of one comparator, over the range that its calibrations have in common."""
     bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
     taken, names, units = _figures(frame, bent)
     nodes, apart = _apart(frame)

@@ -1,4 +1,8 @@
-"""YAML of ROS (`sensor_msgs/CameraInfo`): a file a camera; a pair is rectified so that rows are equal."""
+"""YAML of ROS (`sensor_msgs/CameraInfo`) and Kalibr (`camchain.yaml`).
+
+ROS has a file for each camera, and a pair is rectified so that rows are equal; in the file of Kalibr cameras
+follow each other, each with its pose to the one before.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,9 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.io.yaml_text import camera_info
+from photogram.io.yaml_text import camera_info, figures
 from photogram.targets.output.rig import Rig, Terms, terms_of
+from photogram.targets.vision import inverted
 
 TITLE = "camera_info of ROS"
 PLUMB_BOB_TERMS, RATIONAL_TERMS, EQUIDISTANT_TERMS = 5, 8, 4
@@ -73,3 +78,42 @@ def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats
         (turn, np.array([[focal, 0, centre[0], shift], [0, focal, centre[1], 0], [0, 0, 1, 0]]))
         for turn, shift in zip(turned, shifts, strict=True)
     ]
+
+
+KALIBR_TITLE = "camchain.yaml of Kalibr"
+KALIBR_TERMS = 4
+
+
+def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
+    """Return the file.
+
+    `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` takes points from the axes of the camera
+    before to those of this one.
+    """
+    lines = []
+    for row in range(len(rig.cameras)):
+        lens = _kalibr_lens(rig, row)
+        width, height = rig.size(row)
+        lines += [
+            f"cam{row}:",
+            "  camera_model: pinhole",
+            f"  intrinsics: {figures([*lens.focal, *lens.centre])}",
+            f"  distortion_model: {'equidistant' if lens.fisheye else 'radtan'}",
+            f"  distortion_coeffs: {figures(lens.first(KALIBR_TERMS) or [])}",
+            f"  resolution: [{width}, {height}]",
+            f"  rostopic: /{rig.files[row]}/image_raw",
+        ]
+        if row:
+            from_before = rig.sensors[row] @ inverted(rig.sensors[row - 1])
+            lines += ["  T_cn_cnm1:", *(f"  - {figures(each)}" for each in from_before)]
+    return {"camchain.yaml": "\n".join([*lines, ""]).encode()}
+
+
+def _kalibr_lens(rig: Rig, row: int) -> Terms:
+    if not (rig.tied(row) and rig.tied(max(row - 1, 0))):
+        raise rig.refusal(row, KALIBR_TITLE, [], "targets.refused-tie")
+    found = terms_of(rig.cameras[row])
+    if found is None or found.first(KALIBR_TERMS) is None:
+        code = "targets.refused" if found is None else "targets.refused-terms"
+        raise rig.refusal(row, KALIBR_TITLE, ["opencv4", "opencv_fisheye"], code)
+    return found
