@@ -34,7 +34,7 @@ from photogram.network.tables import checked_cameras, different, numbered, photo
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.network.block import Block
+    from photogram import Block
 
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
 RULES: dict[str, Callable[[Floats], Bools]] = {
