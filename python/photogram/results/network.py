@@ -51,23 +51,12 @@ REMARKS = 5  # Of a `repr`
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations of one kind, each with k components.
+    """Observations of one kind, each with k components."""
 
-    Attributes
-    ----------
-    rows
-        (r,) the points or photos that they are of.
-    residuals
-        (r, k) observed minus adjusted; 0 where fixed, NaN where nothing is observed.
-    sd
-        (r, k) standard deviations: 0 where fixed, infinite where nothing is observed.
-    redundancy, standardized
-        (r, k) redundancy numbers, and residual / (sd x root of redundancy number).
-    """
-
-    rows: Indices
-    residuals: Floats
-    sd: Floats
+    rows: Indices  # (r,) the points or photos that they are of
+    residuals: Floats  # (r, k) observed minus adjusted; 0 if fixed, NaN if not observed
+    sd: Floats  # (r, k) standard deviations: 0 if fixed, infinite if not observed
+    # (r, k) redundancy numbers, and residual / (sd x root of redundancy number)
     redundancy: Floats
     standardized: Floats
 

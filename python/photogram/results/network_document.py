@@ -47,8 +47,7 @@ ORDERINGS = {
 }
 NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
-WORST = 25
-"""Observations in the table of the worst."""
+WORST = 25  # Observations in the table of the worst
 
 
 def network_document(

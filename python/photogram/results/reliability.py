@@ -76,17 +76,6 @@ class Reliability:
 
     Arrays are over G groups of observations (`suspects`), or over their M rows, which stand one group after
     the other; rows are in the units of the observations.
-
-    Parameters
-    ----------
-    trial
-        The network as it stands.
-    covariances
-        What answers for its covariances.
-    level, power
-        Of the test of one observation or group (alpha0 and beta0).
-    known
-        Whether the unit weight is known; otherwise it is estimated, and lambda0 is that of the F test.
     """
 
     def __init__(
@@ -94,9 +83,9 @@ class Reliability:
         trial: NetworkTrial,
         covariances: Callable[[], Covariances],
         *,
-        level: float,
+        level: float,  # alpha0 and beta0 of the test of one observation or group
         power: float,
-        known: bool,
+        known: bool,  # whether the unit weight is known; otherwise lambda0 is that of the F test
     ) -> None:
         self._trial, self._covariances = trial, covariances
         self.level, self.power, self.known = level, power, known
