@@ -63,11 +63,15 @@ def _members(section: Section) -> dict[str, object]:
         "title": section.title,
         "why": section.why,
         "lines": [line for part in section.parts for line in part_lines(part)],
-        "findings": [
-            asdict(replace(finding, phrase=None)) | {"phrase": finding.phrase and finding.phrase.document()}
-            for finding in section.findings
-        ],
+        "findings": [_finding_members(finding) for finding in section.findings],
     }
+
+
+def _finding_members(finding: Finding) -> dict[str, object]:
+    members = asdict(replace(finding, phrase=None))
+    del members["phrase"]
+    code, fields = (finding.phrase.code, finding.phrase.fields) if finding.phrase else ("", {})
+    return members | {"code": code, "fields": fields}
 
 
 def _section(number: int, section: Section) -> page.Section:

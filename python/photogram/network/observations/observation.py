@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import argument_error, is_covariance, names, number, shaped
-from photogram.arguments.objects import kind_error, require, require_kind
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.moving_photos import Moment
@@ -75,12 +75,14 @@ class Observation:
     def __post_init__(self) -> None:
         given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
         for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
-            require_kind(f"{name} of the {self.KIND}", value, kind, optional=True)
+            if value is not None and not isinstance(value, kind):
+                raise kind_error(f"{name} of the {self.KIND}", f"{kind.__name__} or None", value)
         if given["clock"] is not None and given["trajectory"] is None:
             raise argument_error(self.KIND, "requires", name="clock", other="trajectory")
         if hasattr(self, "time"):
             time = number(f"time of the {self.KIND}", self.time)
-            require(np.isfinite(time), f"time of the {self.KIND}", "finite", value=time)
+            if not np.isfinite(time):
+                raise argument_error(f"time of the {self.KIND}", "finite", value=time)
             self._set("time", time)
         moment = self.moment
         self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
