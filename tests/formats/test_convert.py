@@ -79,14 +79,14 @@ def test_commands_have_the_example(run, tmp_path, command):
     for words in ((), ("some", "--example")):
         refused = run(command, *words)
         assert refused.exit_code == 2
-        assert "give PATH, or --example" in refused.stderr
+        assert "specify one of PATH, --example" in refused.stderr
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "give IN, or --example"),
-        (("a", "b", "--example"), "give IN, or --example"),
+        ((), "specify one of IN, --example"),
+        (("a", "b", "--example"), "specify one of IN, --example"),
         (("a",), "OUT: must be specified"),
         (("--example",), "OUT: must be specified"),
     ],
