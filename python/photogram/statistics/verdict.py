@@ -16,7 +16,7 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import Findings, Tested, Text
+from photogram.statistics.findings import Findings, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
