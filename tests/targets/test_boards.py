@@ -5,6 +5,7 @@ import pytest
 
 from photogram.targets import Board
 from photogram.targets.board_files import is_board, read_board
+from rejections import rejected
 
 
 def test_points_of_a_chessboard_run_along_x_first():
