@@ -234,7 +234,7 @@ def test_a_datum_of_trajectories_that_have_one(block):
         with pytest.raises(AdjustmentError, match="the block is not free: its datum is given by"):
             ask()
     assert adjust(block, datum=MinimumConstraints(first)).datum.kind == "observations"
-    with pytest.raises(InputError, match=f"fixed photos: the photo {first} is on a trajectory"):
+    with raises(InputError, "block.unsupported.trajectories"):
         block.with_fixed_photos()
 
 

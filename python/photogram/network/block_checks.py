@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -33,9 +33,7 @@ from photogram.network.rigs import checked_mounts
 from photogram.network.tables import checked_cameras, different, numbered, photo_indices
 from photogram.words import Phrase, phrase
 
-if TYPE_CHECKING:
-    from photogram.network.block import Block
-
+Block = Any  # photogram.Block, which imports this file
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
 RULES: dict[str, Callable[[Floats], Bools]] = {
     "finite": np.isfinite,
