@@ -10,8 +10,8 @@ from textwrap import wrap
 import numpy as np
 
 from photogram import comparator
+from photogram.comparator.calibration import adjusted_grid, corrected_grid
 from photogram.comparator.fits import fit_rigid
-from photogram.comparator.gridfile import adjusted_grid, corrected_grid
 from photogram.comparator.listing.parameters import combined_linear_page, tests_page, variance_lines
 from photogram.comparator.simulation import simulated_years
 from photogram.show.cells import written

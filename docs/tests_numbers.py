@@ -8,6 +8,7 @@ import textwrap
 import numpy as np
 
 from photogram import Block, adjust, simulate
+from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.judgement import verdict_table
 from photogram.statistics import (
@@ -92,7 +93,7 @@ def _verdict(block: Block) -> list[str]:
     lines = [
         *told,
         "",
-        *table_text(verdict_table(verdict)),
+        *table_text(written(verdict_table(verdict))),
         "",
         title,
         "-" * len(title),

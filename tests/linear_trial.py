@@ -21,6 +21,35 @@ from photogram.statistics.snooping.suspects import (
 )
 
 
+class LinearSuspects(Suspects):
+    """Groups of numbered rows."""
+
+    names: list[str]
+
+    def loads(self, group):
+        """Return no photos."""
+        return np.empty(0, dtype=np.int64)
+
+    def parts(self, group):
+        """Return None: groups go as a whole."""
+
+    def name(self, group):
+        """Return the name of a group."""
+        return f"observation {self.names[group]}"
+
+    def row_name(self, row):
+        """Return the number of a row in its group."""
+        return str(row - int(self.row_starts[np.searchsorted(self.row_starts, row, "right") - 1]))
+
+    def unit(self, row):
+        """Return no unit."""
+        return ""
+
+    def photo_name(self, photo):
+        """Return the number of a photo."""
+        return str(photo)
+
+
 class LinearTrial:
     """Observations l = A x with standard deviations, in groups.
 
@@ -63,21 +92,16 @@ class LinearTrial:
             raise InputError("groups have as many rows as there are observations")
         called = [str(number) for number in range(len(sizes))] if names is None else list(names)
         none = np.full(len(sizes), -1)
-        self.suspects = Suspects(
+        self.suspects = LinearSuspects(
             row_starts=starts,
             kinds=np.zeros(len(sizes), dtype=np.int64),
             kind_names=["observation"],
             subjects=np.arange(len(sizes)),
             points=none,
             photos=none,
-            loads=lambda group: np.empty(0, dtype=np.int64),
             removable=np.ones(len(sizes), dtype=bool),
-            parts=lambda group: None,
-            name=lambda group: f"observation {called[group]}",
-            row_name=lambda row: str(row - int(starts[np.searchsorted(starts, row, "right") - 1])),
-            unit=lambda row: "",
-            photo_name=str,
         )
+        self.suspects.names = called
         self.whole = True
         self.unknowns: Floats = np.zeros(a.shape[1])
         self.adjust(Out(np.zeros(len(values), dtype=bool)))

@@ -17,8 +17,8 @@ import photogram
 from photogram import simulate as simulate_function
 from photogram.cli import app
 from photogram.cli.commands import application
+from photogram.cli.simulate import MotionOptions
 from photogram.cli.simulate import simulate as simulate_command
-from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
 from photogram.words import Phrase
 
@@ -202,7 +202,7 @@ def test_bad_input_writes_nothing(run, project, tmp_path):
     assert result.exit_code == 1
     assert result.stdout == ""
     assert (
-        f"{project / 'IMAGES'}, record 4: columns 11-20 (F10.3): '       NaN' is not a number"
+        f"{project / 'IMAGES'}, record 4: columns 11-20 (F10.3): must be a number, got '       NaN'"
         in result.stderr
     )
     assert f"|{record[:10]}       NaN{record[20:]}|" in result.stderr
@@ -229,7 +229,7 @@ def test_results_never_go_over_a_project(run, project, tmp_path):
     before = {path.name: path.read_bytes() for path in Path("other").iterdir()}
     result = run("giant", project, "--out", "other")
     assert result.exit_code == 1
-    assert "holds another project (COMMON, CAMERAS, IMAGES); --overwrite allows it" in result.stderr
+    assert "contains another project (COMMON, CAMERAS, IMAGES); --overwrite replaces it" in result.stderr
     assert {path.name: path.read_bytes() for path in Path("other").iterdir()} == before
     assert run("giant", project, "--out", "other", "--overwrite").exit_code == 0
     assert Path("other", "FRAMES").read_bytes() != before["FRAMES"]
@@ -407,5 +407,5 @@ def test_a_package_of_an_extra_that_is_not_there_is_named(
         monkeypatch.delitem(sys.modules, module, raising=False)
     result = run(*command)
     assert result.exit_code == 1
-    assert f"{package} is needed: pip install 'photogram[{extra}]'" in result.stderr
+    assert f"{package} is required; run pip install 'photogram[{extra}]'" in result.stderr
     assert not list(tmp_path.iterdir())

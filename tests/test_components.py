@@ -20,7 +20,7 @@ from photogram import (
 )
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
-from photogram.results.components_table import statement
+from photogram.results.components_document import statement
 from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 
@@ -217,7 +217,9 @@ def test_image_weights_wrong_by_four_are_corrected(simulated):
     images = found["images"]
     assert images.interval[0] < 16 < images.interval[1]
     assert images.worth_changing
-    assert statement(found)[0].startswith("standard deviations of images are too small by a factor of 4.")
+    assert str(statement(found)[0]).startswith(
+        "Standard deviations of images are too small by a factor of 4."
+    )
     assert found.document().table("components").frame().equals(found.table())
     assert (found.verdict.code, found.verdict.exit) == ("weights-of-groups", 4)
     assert "Standard deviations are wrong: those of images by about 4." in found.verdict.headline

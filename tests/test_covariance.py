@@ -115,8 +115,8 @@ def test_what_has_no_covariance_is_refused(small, monkeypatch):
     point = small.block.point_ids[int(np.flatnonzero(small.used_points)[0])]
     covariances = small.covariances()
     for selection, message in (
-        (("points", point), "is no kind"),
-        ("point", "is no kind"),
+        (("points", point), "a selection must be a pair"),
+        ("point", "a selection must be a pair"),
         (("point", "nowhere"), "no point 'nowhere'"),
         (("camera", "nothing"), "no camera 'nothing'"),
         ([("photo", 3)], "names of the kind photo"),

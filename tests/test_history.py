@@ -96,7 +96,7 @@ def test_what_is_no_history_is_refused():
         history([[1.0], [2.0]], np.zeros((2, 1, 1)))
     with pytest.raises(InputError, check=lambda error: error.code == "history.times"):
         history([[1.0], [2.0]], np.ones((2, 1, 1)), times=[1.0, 0.0])
-    with pytest.raises(InputError, check=lambda error: error.code == "history.one-time"):
+    with pytest.raises(InputError, check=lambda error: error.code == "history.equal-times"):
         history([[1.0], [2.0]], np.ones((2, 1, 1)), times=[1.0, 1.0])
     (change,) = history([[0.0], [9.0]], np.ones((2, 1, 1)), freedom=100.0).series[0].changes
     assert (change.kind, change.at) == ("step", 1)

@@ -138,7 +138,7 @@ def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
 def test_what_would_not_fit_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 2**30)
     memory.require(2**30, "a table")
-    with pytest.raises(OutOfMemoryError, match="a table would take 2 GiB of memory, and 1 GiB are free"):
+    with pytest.raises(OutOfMemoryError, match="a table requires 2 GiB of memory, but only 1 GiB are free"):
         memory.require(2**31, "a table")
     monkeypatch.setattr(memory, "available_memory", lambda: None)
     memory.require(2**60, "a table")

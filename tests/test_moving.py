@@ -567,9 +567,9 @@ def test_the_example_of_a_line_scanner(capsys):
     assert [panel.up for panel in result.plot.trajectory().panels] == ["position, m", "rotation, rad"]
     with pytest.raises(InputError, match="no trajectory nowhere"):
         result.plot.trajectory(name="nowhere")
-    with pytest.raises(InputError, match="reaches from"):
+    with pytest.raises(InputError, match="must be in the span"):
         result.trajectories["strip"].poses([1e3])
-    with pytest.raises(InputError, match="on no trajectory"):
+    with pytest.raises(InputError, match="no photo on a trajectory"):
         result.project("none", [[0.0, 0.0, 0.0]])
 
 

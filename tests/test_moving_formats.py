@@ -16,6 +16,7 @@ from photogram.formats.project import Repeated
 from photogram.formats.supplements import repeated_remarks
 from photogram.network import Polynomial, Table, Timed, Trajectory
 from photogram.network.block import of_images_alone
+from refusals import refused
 
 OTHERS = [name for name, each in FORMATS.items() if each.write is not None and name != "plain"]
 
@@ -38,7 +39,7 @@ def project_of(block, path, **more):
 def test_scanners_are_in_no_other_format(name, tmp_path):
     project = project_of(scanned(photos=True), tmp_path)
     for ask in (to_files, cannot_hold):
-        with pytest.raises(InputError, match=r"the photo S1 is of a line scanner"):
+        with refused("format.scanner photo=S1"):
             ask(project, name)
 
 
@@ -69,7 +70,7 @@ def test_millimetres_become_pixels_without_their_shutters(tmp_path):
         timed=[replace(each, shutter=replace(each.shutter, edges=(3.0, -3.0))) for each in block.timed],
     )
     assert in_pixels(project_of(millimetres, tmp_path)).block.timed == ()
-    with pytest.raises(InputError, match="the photo S1 is of a line scanner"):
+    with refused("format.scanner photo=S1"):
         in_pixels(project_of(scanned(), tmp_path))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from typing import Any
 
 import numpy as np
@@ -73,14 +72,16 @@ def test_outliers_of_every_kind_are_named():
     observed[7, 0] += 2.0
     result = adjust(block.replace(image_xy=xy, point_positions=positions, photo_positions_observed=observed))
     point, photo = block.point_ids[block.image_points[image]], block.photo_ids[block.image_photos[image]]
-    lines = [line for line in problems(result) if "beyond" in line]
-    assert lines == remarks(result)[1 : 1 + len(lines)]
-    assert [line.split(" have ")[0].split(" ", 3)[3] for line in lines] == [
-        "images", "control points", "positions of photos"
+    outliers = result.verdict.outliers
+    assert remarks(result)[1 : 1 + len(outliers)] == [*map(str, outliers)]
+    assert [line.fields["kind"].code for line in outliers] == [
+        "test.images", "test.control", "test.positions"
     ]  # fmt: skip
-    assert lines[0].endswith(f"is that of image of point {point} on photo {photo}")
-    assert lines[1].endswith(f"is that of control point {block.point_ids[control]}")
-    assert lines[2].endswith(f"is that of position of photo {block.photo_ids[7]}")
+    assert [line.fields["name"].fields for line in outliers] == [
+        {"point": point, "photo": photo},
+        {"point": block.point_ids[control]},
+        {"photo": block.photo_ids[7]},
+    ]
     # The tests are those of the verdict, whose limits consider the common factor of the standard deviations.
     tests = {test.kind: test for test in result.verdict.tests}
     for line in result.verdict.outliers:
@@ -125,8 +126,9 @@ def test_collections_name_their_outliers():
     xy[50] += 30 * collection.image_sd[50]
     result = adjust_collection(collection.replace(image_xy=xy))
     point, photo = collection.image_points[50], collection.image_photos[50]
-    [line] = [line for line in remarks(result) if "beyond" in line]
-    assert re.search(rf"is that of image of point {point} on photo {photo}$", line)
+    [line] = result.verdict.outliers
+    assert line.fields["name"].fields == {"point": str(point), "photo": str(photo)}
+    assert str(line) in remarks(result)
     wrong = adjust_collection(collection.replace(image_sd=collection.image_sd / 20))
     assert remarks(wrong)[0].startswith("the global test fails")
 

@@ -83,8 +83,8 @@ def test_documents_take_arrays_however_they_lie_and_data_classes():
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (KeyError("scale"), "holds no camera: 'scale' is missing"),
-        (TypeError("not so"), "holds no camera: not so"),
+        (KeyError("scale"), "the document must describe a camera: 'scale' is missing"),
+        (TypeError("not so"), "the document must describe a camera: not so"),
         (InputError("is withheld"), "is withheld"),
     ],
 )

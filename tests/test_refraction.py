@@ -424,7 +424,7 @@ def test_options_apply_refraction_that_common_does_not_ask_for(run):
     assert json.loads(Path("r.json").read_bytes())["refraction"]["air"] == "standard"
     refused = run("giant", "block", "--water-index", "1.33")
     assert refused.exit_code == 2
-    assert "no refraction in water" in refused.output
+    assert "requires --water-refraction" in refused.output
 
 
 # The documentation

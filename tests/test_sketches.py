@@ -13,11 +13,10 @@ from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
 from photogram.lazy_dataclasses import fields
-from photogram.show.sketch.colours import rgb
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import width, wrapped
-from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts
+from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts, rgb
 from photogram.show.sketch.svg import svg_of
 from photogram.show.sketch.svg_marks import svg
 from photogram.show.sketch.ticks import ticks

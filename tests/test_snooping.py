@@ -344,7 +344,7 @@ def test_the_log_in_every_form():
     assert len(table) == sum(len(entry.rows) for entry in found.log)
     document = json.loads(found.to_json())["snooping"]
     assert [own["name"] for own in document["log"]] == [entry.name for entry in found.log]
-    assert found.rivals == [
+    assert [*map(str, found.rivals)] == [
         "image of point 021 on photo S2P1 or image of point 021 on photo S2P2 (odds 1 : 1)"
     ]
 

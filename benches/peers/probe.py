@@ -43,7 +43,6 @@ class Clock:
 
 def watched() -> Clock:
     """Put the clock on the phases of the command."""
-    from photogram import Result
     from photogram.cli.job import Job
     from photogram.diagnosis import after_adjustment
     from photogram.show.methods import Judged
@@ -58,7 +57,7 @@ def watched() -> Clock:
     clock.watch(vars(Judged)["verdict"], "func", "verdict")
     clock.watch(command, "_files", "tables")
     clock.watch(Job, "write", "tables")
-    clock.watch(Result, "report", "report")
+    clock.watch(import_module("photogram.show.forms"), "text", "report")
     clock.watch(import_module("photogram.cli.documents"), "html_files", "page with pictures")
     return clock
 

@@ -84,13 +84,19 @@ class InputError(PhotogramError, ValueError):
         self.text = text
 
 
+def message_of(error: Exception) -> str | Phrase:
+    """Return the message of an error without its place, as a code with fields if it has one."""
+    message: str | Phrase = getattr(error, "phrase", None) or getattr(error, "message", "") or str(error)
+    return message
+
+
 class ContradictionError(InputError):
     """Input that can be read and contradicts itself: what would be made of it could not be used."""
 
     @classmethod
     def of(cls, error: InputError) -> Self:
         """Return it at the place of another error, with its message."""
-        return cls(error.phrase or error.message, file=error.file, record=error.record, text=error.text)
+        return cls(message_of(error), file=error.file, record=error.record, text=error.text)
 
 
 class AdjustmentError(PhotogramError):

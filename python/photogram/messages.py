@@ -14,6 +14,9 @@ __all__ = ["Message", "Undetermined", "quoted"]
 MOST_NAMES = 12
 """Names that a message lists at most."""
 
+MANY = 2_000
+"""Names among which no nearest one is looked for."""
+
 MOST_CHARACTERS = 200
 """Characters of a record that a message shows at most; the cards of all programs have fewer."""
 
@@ -56,6 +59,8 @@ def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
     import difflib  # a wrong name is rare
 
     known = list(names)
+    if len(known) > MANY:
+        return Phrase("error.absent", {"kind": kind, "name": name})
     if close := difflib.get_close_matches(name, known, 1, 0.5):
         return Phrase("error.unknown.close", {"kind": kind, "name": name, "close": close[0]})
     return Phrase("error.unknown", {"kind": kind, "name": name, "names": known})

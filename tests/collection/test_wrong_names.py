@@ -42,7 +42,7 @@ def test_wrong_names_are_found_and_nothing_else(seed, share):
     assert snooped.result.converged
     assert out_of(collection, snooped) == bad
     assert 0.8 < snooped.result.variance_of_unit_weight < 1.2
-    assert any("a robust adjustment of the given values" in each for each in snooped.outcome.remarks)
+    assert any("a robust adjustment of the given values" in str(each) for each in snooped.outcome.remarks)
 
 
 def test_without_wrong_names_nothing_starts_anew():

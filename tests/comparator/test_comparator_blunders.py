@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from plates import QUICK, case_2_session, noisy
 
+from described import described, refusal
 from photogram import InputError
 from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv
 from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.outliers import far_pointings, pointing_tests, screen
 from photogram.comparator.reduction import Reduction
+from photogram.words import phrase
 
 
 def refused(result, code=1):
@@ -39,8 +41,8 @@ def exchanged_labels(session, case=2, first=7, second=8):
     return changed(session, case, points=points)
 
 
-def texts(calibration):
-    return [message.text for message in calibration.messages]
+def phrases(calibration):
+    return [message.phrase for message in calibration.messages]
 
 
 def test_good_measurements_have_no_problems():
@@ -51,12 +53,11 @@ def test_good_measurements_have_no_problems():
 def test_exchanged_labels_are_named_and_withhold_the_correction():
     calibration = calibrate(exchanged_labels(noisy(4)), QUICK)
     assert not calibration.usable
-    first, *named = texts(calibration)[:3]
-    assert first.startswith("outliers change corrected coordinates by")
-    assert first.endswith("the correction is unusable")
-    assert [text.split(": ")[0] for text in named] == ["case 3, point 7", "case 3, point 8"]
-    assert "it lies where point 8 is expected: are labels exchanged?" in named[0]
-    assert "it lies where point 7 is expected" in named[1]
+    first, *named = phrases(calibration)[:3]
+    assert first.code == "comparators.harm"
+    assert {each.code for each in named} == {"comparators.outlier-exchanged"}
+    fields = [[each.fields[name] for name in ("case", "point", "instead")] for each in named]
+    assert fields == [[3, 7, 8], [3, 8, 7]]
     for outlier in calibration.screening.outliers:
         assert outlier.distance_um == pytest.approx(50_000, abs=5)
     # Without them the measurements are as good as they were.
@@ -74,7 +75,8 @@ def test_a_blunder_is_named_with_its_place_and_size():
     # A twelfth of it is in the correction: less than a coordinate is uncertain.
     assert calibration.usable
     assert 0.05 < calibration.screening.change_um < calibration.screening.sigma_um
-    assert texts(calibration)[0].startswith("case 3, point 9: a residual of")
+    first = phrases(calibration)[0]
+    assert (first.code, first.fields["case"], first.fields["point"]) == ("comparators.outlier", 3, 9)
 
 
 def test_several_blunders_do_not_hide_each_other():
@@ -90,20 +92,20 @@ def test_a_point_that_is_off_everywhere_is_one_of_the_grid():
     xy = session.grids[1].xy_um.copy()
     xy[12] += [20.0, 0.0]
     calibration = calibrate(replace(session, grids={1: replace(session.grids[1], xy_um=xy)}))
-    assert any(text.startswith("plate 1, point 13: off in every case") for text in texts(calibration))
-    assert not any("point 13: a residual" in text for text in texts(calibration))
+    of_point = [each.code for each in phrases(calibration) if each.fields.get("point") == 13]
+    assert of_point == ["comparators.wrong-point"]
 
 
 def test_labels_exchanged_in_every_case_are_exchanged_labels():
     session = noisy(4)
     for case in range(4):
         session = exchanged_labels(session, case, 12, 14)
-    first, *named = texts(calibrate(session, QUICK))[:3]
-    assert first.startswith("outliers change")
-    head = "plate 1, point {}: off in every case in which it was measured: it lies where point {} is expected"
-    assert named[0].startswith(head.format(12, 14))
-    assert named[1].startswith(head.format(14, 12))
-    assert all(text.endswith("are labels exchanged?") for text in named)
+    first, *named = phrases(calibrate(session, QUICK))[:3]
+    assert first.code == "comparators.harm"
+    assert [described(each) for each in named] == [
+        "comparators.exchanged plate=1 point=12 instead=14",
+        "comparators.exchanged plate=1 point=14 instead=12",
+    ]
 
 
 def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
@@ -116,15 +118,18 @@ def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
     result = run("comparator", path, "--grid", tmp_path / "1.csv", "--no-plots")
     assert result.exit_code == 0
     point = session.cases[1].points[37]
-    verdict = calibrate(changed(session, 1, xy_um=xy), QUICK).verdict
+    calibration = calibrate(changed(session, 1, xy_um=xy), QUICK)
+    (message,) = (each for each in calibration.messages if each.code == "comparators.far-pointing")
+    assert (message.phrase.fields["case"], message.phrase.fields["point"]) == (2, point)
+    verdict = calibration.verdict
     assert verdict.code == "look-at"
     (test,) = (test for test in verdict.tests if test.name.startswith("pointings"))
     assert not test.accepted
     assert f"limit {test.limits[1]:.2f}" in result.output
-    assert f"case 2, point {point}: a pointing is" in result.output
+    assert str(message.text) in result.output
     record = path.read_text().splitlines().index("plate,case,operator,leg,point,x_um,y_um") + 2 + 128 + 37
     listing = (tmp_path / "m-calibrated" / "listing.txt").read_text()
-    assert f"m.csv, record {record}: case 2, point {point}: a pointing is" in listing.split("PROBLEMS")[1]
+    assert f"m.csv, record {record}: {message.text}" in listing.split("PROBLEMS")[1]
 
 
 def test_the_limit_of_pointings_holds_its_level():
@@ -194,7 +199,6 @@ def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):
     out = tmp_path / "out"
     result = run(*exchanged, "--out", out, "--json", document)
     assert refused(result, 4)
-    assert "are labels exchanged?" in result.output
     assert "the correction is withheld: Gross errors: outliers change corrected coordinates" in result.output
     assert [path.name for path in out.iterdir()] == ["listing.txt"]
     made = json.loads(document.read_bytes())
@@ -204,7 +208,7 @@ def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):
     table.write_text("x_um,y_um\n1,2\n")
     result = run("comparator", "correct", document, table)
     assert refused(result)
-    assert "whose correction is withheld" in result.output
+    assert str(phrase("comparators.withheld")) in result.output
 
 
 def test_files_of_an_earlier_run_are_named(run, tmp_path, exchanged):
@@ -223,10 +227,9 @@ def test_a_grid_that_is_worse_than_it_should_be_comes_first():
     calibration = calibrate(moved(noisy(4, grid_um=1.2), 2, 9, [15.0, 0.0]))
     test = calibration.joint.plates[1].test
     assert test.rejected_high
-    assert texts(calibration)[0].startswith(
-        "plate 1, corrections against 0.300 um a priori: the global test fails"
-    )
-    assert texts(calibration)[1].startswith("case 3, point 9")
+    first, second = phrases(calibration)[:2]
+    assert (first.code, first.fields["plate"], first.fields["sd"]) == ("comparators.grid-test", 1, 0.3)
+    assert (second.code, second.fields["point"]) == ("comparators.outlier", 9)
     assert json.loads(calibration.to_json())["joint"]["plates"][0]["test"]["probability_above"] < 1e-6
 
 
@@ -251,17 +254,17 @@ def test_no_test_where_the_grid_is_estimated_or_fixed():
 @pytest.mark.parametrize(
     ("member", "value", "words"),
     [
-        ("scale_x", 0, "scale_x is 0.0: a scale is a positive number"),
-        ("scale_y", -1, "scale_y is -1.0"),
-        ("scale_x", None, "'None' is not a number"),
-        ("scale_x", "1", "'1' is not a number"),
-        ("scale_x", True, "'True' is not a number"),
-        ("scale_x", [1, 2], "'\\[1, 2\\]' is not a number"),
-        ("nonorthogonality_rad", 2, "the axes must differ"),
-        ("covariance", [[0]], "is not 21 x 21 numbers"),
-        ("covariance", [[-1.0] * 21] * 21, "covariance is no covariance matrix"),
+        ("scale_x", 0, "error.at what=scale_x message=error.positive value=0.0"),
+        ("scale_y", -1, "error.at what=scale_y message=error.positive value=-1.0"),
+        ("scale_x", None, "error.numbers count=1 value=None"),
+        ("scale_x", "1", "error.numbers count=1 value=1"),
+        ("scale_x", True, "error.numbers count=1 value=True"),
+        ("scale_x", [1, 2], "error.numbers count=1 value=[1, 2]"),
+        ("nonorthogonality_rad", 2, "error.at what=nonorthogonality_rad message=error.range"),
+        ("covariance", [[0]], "error.numbers count=21 x 21 value=[[0]]"),
+        ("covariance", [[-1.0] * 21] * 21, "error.covariance-singular"),
         ("polynomial", {}, "'centre_um' is missing"),
-        ("polynomial", 5, "holds no correction"),
+        ("polynomial", 5, "the document must describe a correction"),
     ],
 )
 def test_correction_files_are_checked(run, tmp_path, member, value, words):
@@ -271,7 +274,7 @@ def test_correction_files_are_checked(run, tmp_path, member, value, words):
     assert Correction.read(path).to_json() == calibrate(noisy(4), QUICK).correction.to_json()
     document[member] = value
     path.write_text(json.dumps(document))
-    with pytest.raises(InputError, match=words) as caught:
+    with refusal(words) as caught:
         Correction.read(path)
     assert caught.value.file == path
     table = tmp_path / "t.csv"
@@ -289,7 +292,7 @@ def test_missing_members_and_other_documents(tmp_path):
         Correction.read(path)
     for text in ("", "[]", "3", '{"scale_x": NaN}', '{"correction": 5}', "[" * 100_000):
         path.write_text(text)
-        with pytest.raises(InputError, match="holds no correction"):
+        with pytest.raises(InputError, match="the document must describe a correction"):
             Correction.read(path)
 
 
@@ -314,10 +317,10 @@ def test_coordinates_beyond_every_comparator(run, tmp_path):
     table.write_text("x_um,y_um\n1,2\n1e300,2\n")
     result = run("comparator", "correct", path, table)
     assert refused(result)
-    assert "record 3: a coordinate is beyond every comparator" in result.output
+    assert "record 3: x, y: " in result.output
     session = noisy(4)
     xy = session.cases[0].xy_um * 1e200
-    with pytest.raises(InputError, match="beyond every comparator"):
+    with refusal("case=1 point=1 message=error.most"):
         calibrate(changed(session, 0, xy_um=xy))
 
 

@@ -7,7 +7,8 @@ import pytest
 from plates import QUICK, STRAIGHT, bent, noisy
 
 from photogram.comparator import Grid, Options, calibrate, simulate_calibration
-from photogram.comparator.gridfile import adjusted_grid, corrected_grid
+from photogram.comparator.calibration import adjusted_grid, corrected_grid
+from photogram.comparator.correction import partials_of
 
 RUNS = 240
 LINEAR = Options(joint=False, polynomial=False)
@@ -117,7 +118,7 @@ def test_joint_covariances_of_corrected_coordinates_and_grid(full_runs):
     for calibration in full_runs:
         correction = calibration.joint.correction
         found = correction.apply(ends)
-        by_parameters, _ = correction._partials(ends)
+        by_parameters, _ = partials_of(correction, ends)
         for i, j in ((0, 1), (2, 3)):
             along = (true[j] - true[i]) / np.hypot(*(true[j] - true[i]))
             error = along @ ((found[j] - found[i]) - (true[j] - true[i]))

@@ -9,7 +9,7 @@ from plates import QUICK, STRAIGHT, noisy
 
 from photogram import OutOfMemoryError
 from photogram.comparator import Grid, calibrate, listing, simulate_calibration
-from photogram.comparator.averages import unbiased_grid_sigma
+from photogram.comparator.averages import GridSigma
 from photogram.comparator.calibration import needed_memory
 from photogram.comparator.case import locations
 from photogram.comparator.pointing import group_as_listed, read_points, rows_by_point
@@ -63,7 +63,7 @@ def test_what_memory_does_not_hold_is_refused(monkeypatch):
 
 
 def dense_grid_sigma(grid_rows, cases, stage):
-    """Return what :func:`unbiased_grid_sigma` returns, with matrices of all readings, for one plate."""
+    """Return the standard deviations of a :class:`GridSigma` with matrices of all readings, for one plate."""
     places = [fit.residuals.xy_um for fit in stage.cases]
     rows = 2 * sum(len(own) for own in places)
     everywhere = np.vstack(places)
@@ -112,9 +112,9 @@ def test_the_sigma_of_the_grid_is_that_of_dense_matrices(left_handed):
     calibration = calibrate(session, QUICK)
     placed = [case.placed for case in calibration.cases]
     grid_rows = [session.grids[1].rows_of(case.points) for case in placed]
-    grid, random = unbiased_grid_sigma(grid_rows, placed, calibration.nonlinear)
+    sigma = GridSigma(session.grids, placed, calibration.nonlinear)
     expected = dense_grid_sigma(grid_rows, placed, calibration.nonlinear)
-    assert [grid[1], random] == pytest.approx(expected, rel=1e-9)
+    assert [sigma.by_plate[1], sigma.random] == pytest.approx(expected, rel=1e-9)
 
 
 def swapped(points):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from message_codes import coded
 from photogram import AdjustmentError
 from photogram.film import Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.distances import _angle, _crossing, _distance
@@ -111,5 +112,5 @@ def test_standard_deviations_are_those_of_repeated_measurements():
 
 def test_distances_that_no_figure_has():
     apart = [MarkDistance("ll", "ur", 1.0, 1e-9), MarkDistance("ur", "ul", 1e9, 1e-9)]
-    with pytest.raises(AdjustmentError, match="do not fit their design places"):
+    with pytest.raises(AdjustmentError, check=coded("films.distances-not-converged")):
         adjust_distances(MARKS[:3], place(7)[:3], apart, design_sd=np.full(3, 1e-9))

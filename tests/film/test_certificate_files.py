@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from message_codes import as_check, coded, codes, has_code
 from photogram import Camera, InputError
 from photogram.film import Certificate
 
@@ -86,44 +87,62 @@ def test_numbers_and_letters_of_reports_are_sides(written, names):
 
 
 WRONG = {
-    "no table": ("[camera]\nc = 1\n", "no table camera"),
-    "unknown key": (HEAD + "focal = 152\n", "has no focal"),
-    "unit": (HEAD + 'unit = "in"\n', "read in mm"),
-    "strip": (HEAD + 'data_strip = "right"\n', "not one of left, top"),
-    "date": (HEAD + 'date = "11.5.1983"\n', "not a day"),
-    "c": (HEAD + "c = 0\n", "c is zero"),
-    "reference": (HEAD + 'principal_point = "centre"\n', "not one of fiducial-centre"),
-    "place": (HEAD + "[certificate.fiducials]\nll = [1, 2, 3]\n", "has 3 values, not 2"),
-    "infinite": (HEAD + "[certificate.fiducials]\nll = [inf, 2]\n", "not a finite number"),
-    "twice": (HEAD + "[certificate.fiducials]\nll = [1, 2]\n1 = [1, 2]\n", "is the mark ll, which is there"),
-    "pair": (HEAD + "[certificate.distances]\nml = 220\n", "no pair of marks"),
-    "pair twice": (HEAD + "[certificate.distances]\nml-mr = 220\nmr-ml = 220\n", "there already"),
-    "length": (HEAD + "[certificate.distances]\nml-mr = 0\n", "is 0"),
-    "radial without c": (HEAD + "[certificate.radial]\nangle = [1]\ndistortion = [1]\n", "needs c"),
-    "angles": (HEAD + "c = 150\n[certificate.radial]\nangle = [95]\ndistortion = [1]\n", "90 degrees"),
-    "both": (HEAD + "c = 150\n[certificate.radial]\nangle = [9]\nradius = [9]\ndistortion = [1]\n", "one of"),
+    "no table": ("[camera]\nc = 1\n", coded("error.unknown", kind="table", name="camera")),
+    "unknown key": (HEAD + "focal = 152\n", coded("error.unknown.close", kind="key", name="focal")),
+    "unit": (HEAD + 'unit = "in"\n', coded("error.choice", value="in", names=["mm"])),
+    "strip": (HEAD + 'data_strip = "right"\n', coded("error.choice", names=["left", "top"])),
+    "date": (HEAD + 'date = "11.5.1983"\n', coded("error.day")),
+    "c": (HEAD + "c = 0\n", coded("error.key", key="c", message="error.positive")),
+    "reference": (HEAD + 'principal_point = "centre"\n', coded("error.choice", value="centre")),
+    "place": (HEAD + "[certificate.fiducials]\nll = [1, 2, 3]\n", coded("error.key", key="ll")),
+    "infinite": (HEAD + "[certificate.fiducials]\nll = [inf, 2]\n", coded("error.finite")),
+    "twice": (
+        HEAD + "[certificate.fiducials]\nll = [1, 2]\n1 = [1, 2]\n",
+        coded("error.repeated", kind="mark", name="ll"),
+    ),
+    "pair": (HEAD + "[certificate.distances]\nml = 220\n", coded("films.pair-of-marks")),
+    "pair twice": (HEAD + "[certificate.distances]\nml-mr = 220\nmr-ml = 220\n", coded("error.repeated")),
+    "length": (HEAD + "[certificate.distances]\nml-mr = 0\n", coded("error.key", key="ml-mr")),
+    "radial without c": (
+        HEAD + "[certificate.radial]\nangle = [1]\ndistortion = [1]\n",
+        coded("error.requires", other="c"),
+    ),
+    "angles": (
+        HEAD + "c = 150\n[certificate.radial]\nangle = [95]\ndistortion = [1]\n",
+        coded("films.angles"),
+    ),
+    "both": (
+        HEAD + "c = 150\n[certificate.radial]\nangle = [9]\nradius = [9]\ndistortion = [1]\n",
+        coded("error.exclusive"),
+    ),
     "lengths": (
         HEAD + "c = 150\n[certificate.radial]\nangle = [9, 8]\ndistortion = [1]\n",
-        "has 1 values, not 2",
+        coded("error.key", key="distortion"),
     ),
-    "sign": (HEAD + "c = 150\n[certificate.tangential]\nJ1 = 1e-8\nphi0 = 3\n", "must say 1 or -1"),
-    "lines": (HEAD + '[[certificate.lines]]\nmarks = ["ml", "mr"]\nsd_place = 1\n', "are four"),
-    "idle lines": (HEAD + '[[certificate.lines]]\nmarks = ["ml", "mr", "mb", "mt"]\n', "say nothing"),
-    "origin": (HEAD + 'principal_point = "symmetry"\nsymmetry = [0.1, 0]\n', "is then the origin"),
+    "sign": (HEAD + "c = 150\n[certificate.tangential]\nJ1 = 1e-8\nphi0 = 3\n", coded("films.sign")),
+    "lines": (
+        HEAD + '[[certificate.lines]]\nmarks = ["ml", "mr"]\nsd_place = 1\n',
+        coded("films.four-marks"),
+    ),
+    "idle lines": (
+        HEAD + '[[certificate.lines]]\nmarks = ["ml", "mr", "mb", "mt"]\n',
+        coded("films.line-without-sd"),
+    ),
+    "origin": (HEAD + 'principal_point = "symmetry"\nsymmetry = [0.1, 0]\n', coded("films.origin")),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
 def test_what_cannot_be_used_is_refused_by_name(written, case):
     text, message = WRONG[case]
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, check=as_check(message)) as caught:
         written(text)
     assert caught.value.file.name == "certificate.toml"
 
 
 def test_distances_alone_need_places_to_start_from(written):
     text = HEAD + "[certificate.distances]\nml-mr = 220\n"
-    with pytest.raises(InputError, match="nothing says where about ml, mr are"):
+    with pytest.raises(InputError, check=coded("films.no-design", certificate="a", marks=["ml", "mr"])):
         written(text).fiducials()
     designed = written(f"{text}[certificate.design]\nml = [-110, 0]\nmr = [110, 0]\n")
     # Two marks have one distance: their figure is free.
@@ -146,7 +165,7 @@ def test_the_principal_point_is_where_it_is_in_the_frame_of_the_marks(written):
     assert camera.deviations[camera.names.index("xp")] == pytest.approx(0.003)
     own = written(HEAD + "c = 150\n")
     assert own.principal_point == ((0.0, 0.0), 0.02, "fiducial-centre")
-    assert "nothing says where the principal point is" in own.told()[0]
+    assert has_code(own.told()[0], "films.unknown-point", sd=0.02)
     moved = written(
         HEAD + 'c = 150\nprincipal_point = "autocollimation"\n[certificate.fiducials]\nll = [-1, -1]\n'
     )
@@ -166,7 +185,7 @@ def test_a_tangential_profile_is_largest_along_its_axis(written):
         sizes.append(bent @ [-math.sin(azimuth), math.cos(azimuth)])
     assert np.argmax(sizes) * 5 == 30
     assert max(sizes) == pytest.approx(certificate.tangential.j1 * r**2, rel=1e-3)
-    with pytest.raises(InputError, match="brown_forward only"):
+    with pytest.raises(InputError, check=coded("films.decentring")):
         certificate.camera("brown")
 
 
@@ -177,7 +196,8 @@ def test_four_semi_diagonals_give_their_own_standard_deviation(written):
     left = [(a + c - b - d) / 2 for a, b, c, d in zip(*rows.values(), strict=True)]
     assert certificate.radial.sd == pytest.approx(1e-3 * math.sqrt(np.mean(np.square(left))) / 2)
     assert certificate.radial.distortion == pytest.approx(1e-3 * np.mean([*rows.values()], axis=0))
-    assert "opposite semi-diagonals show decentring of up to 3" in certificate.told()[0]
+    assert has_code(certificate.told()[0], "films.decentring-of-diagonals")
+    assert certificate.told()[0].fields["size"] == pytest.approx(3, abs=0.5)
 
 
 def test_radii_about_the_indicated_point_are_told_from_decentring(written):
@@ -193,9 +213,10 @@ def test_radii_about_the_indicated_point_are_told_from_decentring(written):
     text = HEAD + "c = 152\n[certificate.radial]\nangle = [10, 20, 30, 40]\n"
     certificate = written(text + "".join(f"{name} = {own.tolist()}\n" for name, own in rows.items()))
     away, decentring = certificate.told()[:2]
-    assert "is at (0.012, -0.014) mm" in away
-    assert "the indicated principal point, and not the calibrated one?" in away
-    assert decentring.startswith("opposite semi-diagonals show decentring of up to 0.7")
+    assert has_code(away, "films.symmetry-elsewhere")
+    assert (away.fields["x"], away.fields["y"]) == pytest.approx((0.012, -0.014), abs=5e-4)
+    assert decentring.code == "films.decentring-of-diagonals"
+    assert decentring.fields["size"] == pytest.approx(0.75, abs=0.05)
     assert certificate.radial.distortion == pytest.approx(1e-3 * common)
 
 
@@ -203,7 +224,7 @@ def test_a_table_that_counts_inwards_says_so(written):
     turned = EXAMPLE.replace("distortion = [-4, -9, -11, -7, -1, 7]", "distortion = [4, 9, 11, 7, 1, -7]")
     given = written(turned.replace("[certificate.radial]", "[certificate.radial]\nsign = -1"))
     assert given.camera().parameters == written(EXAMPLE).camera().parameters
-    with pytest.raises(InputError, match="sign must say 1 or -1"):
+    with pytest.raises(InputError, check=coded("error.key", key="sign", message="films.sign")):
         written(turned.replace("[certificate.radial]", "[certificate.radial]\nsign = 0"))
 
 
@@ -212,27 +233,27 @@ def test_printed_coefficients_are_compared_with_the_table(written):
     curve = certificate.curve()
     right = ", ".join(repr(float(each)) for each in curve.coefficients)
     text = EXAMPLE.replace("sd_c =", "radial_coefficients = [{}]\nsd_c =")
-    assert not any("printed" in each for each in written(text.format(right)).told())
+    assert not {"films.printed", "films.printed-other-sign"} & set(codes(written(text.format(right)).told()))
     wrong = ", ".join(repr(-float(each)) for each in curve.coefficients)
-    told = written(text.format(wrong)).told()
-    assert any("they are those of the table with the other sign" in each for each in told)
+    assert "films.printed-other-sign" in codes(written(text.format(wrong)).told())
 
 
 def test_tables_of_several_cameras_with_covariances(tmp_path):
     (tmp_path / "fiducials.csv").write_text(
         "camera,fiducial,x,y,sd_x,sd_y,use\na,1,-106.0,-105.99,0.003,,\na,2,106,106,,,off\nb,ll,1,2,,,\n"
     )
-    with pytest.raises(InputError, match="has marks of a, b: choose one"):
+    with pytest.raises(InputError, check=coded("films.choose-camera", cameras=["a", "b"])):
         Certificate.read(tmp_path / "fiducials.csv")
     own = Certificate.read(tmp_path / "fiducials.csv", "a")
-    assert own.told() == ["marks that are off: ur"]
+    (remark,) = own.told()
+    assert has_code(remark, "films.marks-off", marks=["ur"])
     assert np.sqrt(np.diag(own.fiducials().covariance)) == pytest.approx([0.003, 0.002])
     (tmp_path / "covariances.csv").write_text(
         "kind,name,first,second,covariance\nfiducials,a,ll.x,ll.y,2e-6\ncamera,a,c,c,1\n"
     )
     assert Certificate.read(tmp_path / "fiducials.csv", "a").fiducials().covariance[0, 1] == 2e-6
     (tmp_path / "covariances.csv").write_text("kind,name,first,second,covariance\nfiducials,a,ll.x,ll.y,1\n")
-    with pytest.raises(InputError, match="no covariance matrix"):
+    with pytest.raises(InputError, check=coded("error.covariance-singular")):
         Certificate.read(tmp_path / "fiducials.csv", "a")
 
 
@@ -240,13 +261,13 @@ def test_tables_of_several_cameras_with_covariances(tmp_path):
     ("text", "message"),
     [
         ("camera,fiducial,x\na,1,2\n", "column y is missing"),
-        ("camera,fiducial,x,y\na,1,2,\n", "is empty"),
-        ("camera,fiducial,x,y\na,1,2,3\na,ll,2,3\n", "is there twice"),
-        ("camera,fiducial,x,y,sd_x,sd_y\na,1,2,3,0,1\n", "is not positive"),
-        ("camera,fiducial,x,y,use\na,1,2,3,maybe\n", "neither on nor off"),
-        ("camera,fiducial,x,y,colour\na,1,2,3,red\n", "no column colour"),
+        ("camera,fiducial,x,y\na,1,2,\n", coded("error.column", column="y", message="error.empty")),
+        ("camera,fiducial,x,y\na,1,2,3\na,ll,2,3\n", coded("error.repeated")),
+        ("camera,fiducial,x,y,sd_x,sd_y\na,1,2,3,0,1\n", coded("error.positive")),
+        ("camera,fiducial,x,y,use\na,1,2,3,maybe\n", coded("error.choice", names=["on", "off"])),
+        ("camera,fiducial,x,y,colour\na,1,2,3,red\n", coded("error.unknown", kind="column", name="colour")),
     ],
 )
 def test_tables_that_cannot_be_used(written, text, message):
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError, check=as_check(message)):
         written(text, "fiducials.csv")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden
+from message_codes import coded
 from photogram import InputError, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_marks import mark_hints
@@ -51,10 +52,10 @@ def test_two_steps_have_smaller_standard_deviations(tmp_path: Path) -> None:
     assert document["sums"]["inside"]["degrees_of_freedom"] == 131
     assert document["sums"]["before"]["degrees_of_freedom"] == 59
     assert [each["axis"] for each in document["axes"]] == [*"XYZ"]
-    with pytest.raises(InputError, match='are not such of interior = "inside"'):
+    with pytest.raises(InputError, check=coded("films.other-interior", interior="inside")):
         compare_steps(before, inside)
     other = before.block.replace(point_ids=[f"q{k}" for k in before.block.point_ids])
-    with pytest.raises(InputError, match="different points"):
+    with pytest.raises(InputError, check=coded("films.different-points")):
         compare_steps(inside, adjust(other))
 
 

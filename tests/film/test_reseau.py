@@ -145,7 +145,7 @@ def test_one_step_and_two_are_the_same_where_marks_alone_tell(tmp_path: Path) ->
 def test_a_local_reseau_needs_its_grid(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"films.csv, record 2: .*must be at most 200"):
         archive(tmp_path, WHOLE.removesuffix("6,6") + "11,11")
-    with pytest.raises(InputError, match=r"column grid_rows: is empty, and the pattern local needs it"):
+    with pytest.raises(InputError, match=r"column grid_rows: the pattern local requires values"):
         archive(tmp_path, WHOLE.removesuffix("6"))
-    with pytest.raises(InputError, match=r"columns sd_w1, sd_w2: the pattern local needs them"):
+    with pytest.raises(InputError, match=r"column sd_w1, sd_w2: the pattern local requires values"):
         archive(tmp_path, WHOLE.replace("local,0.006", "local,"))

@@ -11,6 +11,7 @@ from photogram.formats.column_words import column_of, role_of, units_of
 from photogram.formats.columns import columns_given, degrees
 from photogram.formats.supplements import with_control
 from photogram.io.numbers import marks_of
+from rejections import rejected
 
 LISTS = Path(__file__).parents[1] / "data" / "control_lists"
 CHECKS = {"102", "103", "105"}
@@ -170,7 +171,7 @@ def table(head, cells):
 def test_a_column_of_roles_is_read_whatever_it_is_called(tmp_path, head, cells, checks):
     project = given(tmp_path / "list.csv", table(head, cells))
     assert [project.block.point_ids[row] for row in project.checks] == checks
-    assert bool(checks) == any("who is check" in str(each) for each in project.messages)
+    assert bool(checks) == any(each.code == "columns.roles-read" for each in project.messages)
 
 
 @pytest.mark.parametrize(
@@ -179,11 +180,15 @@ def test_a_column_of_roles_is_read_whatever_it_is_called(tmp_path, head, cells, 
         ("Type", ["CP", "CP", "CP"], '--roles "CP=check"'),
         ("Type", ["GCP", "Check", "PB"], '--roles "PB=check"'),
         ("role", ["one", "two", "one"], '--roles "one=check"'),
-        ("Quality", ["0.01", "0.02", "0.01"], "--columns sd_x=quality (a guess), or --columns -=quality"),
+        (
+            "Quality",
+            ["0.01", "0.02", "0.01"],
+            "--columns sd_x=quality (a guess), or ignore them (--columns -=quality)",
+        ),
         (
             "Easting",
             ["1", "2", "3"],
-            "the column 'x' is there twice: x, easting: --columns x=x, or x=easting,",
+            "the columns x, easting both provide 'x'; choose one with --columns x=x",
         ),
     ],
 )
@@ -206,16 +211,16 @@ def test_options_say_what_columns_and_words_are(tmp_path):
     place = project.block.point_ids.index("103")
     np.testing.assert_allclose(project.block.point_positions[place], [38.9226 * 0.3048, 90.3168, 5.1614])
     for bad, say in (("point=Nummer", "'Nummer'"), ("east=x", "'east'"), ("point,x,y=Y", "either")):
-        with pytest.raises(InputError, match=say):
+        with rejected(say):
             given(path, turned, columns=bad)
 
 
 def test_two_columns_that_may_be_heights_are_settled_by_the_option_of_the_message(tmp_path):
     # H is Hochwert beside R, and a height elsewhere.
     path, text = tmp_path / "list.csv", table("d", ["a", "b", "c"]).replace("point,x,y,z", "Nr,R,H,Z")
-    with pytest.raises(InputError, match=r"'z' is there twice: h, z: --columns z=h, or z=z, says"):
+    with rejected("table.same-columns z h,z h"):
         given(path, text)
-    with pytest.raises(InputError, match=r"--columns x=r,y=h \(a guess\)"):
+    with rejected(r"--columns x=r,y=h \(a guess\)"):
         given(path, text, columns="z=z")
     project = given(path, text, columns="z=z,x=r,y=h")
     place = project.block.point_ids.index("103")
@@ -245,7 +250,7 @@ def test_units_in_headings_count(tmp_path):
 def test_what_is_not_understood_ends_with_the_guess(tmp_path):
     path = tmp_path / "list.csv"
     for text, say in (
-        ("Sted;Bredde;Lengde\nA;1,5;2,5\nB;3,5;4,5\n", "--columns point=Sted,x=Bredde,y=Lengde (a guess)"),
+        ("Sted;Bredde;Lengde\nA;1,5;2,5\nB;3,5;4,5\n", "--columns point=Sted,x=Bredde,y=Lengde"),
         ("Sted;x;y\nA;1,5;2,5\nB;3,5;4,5\n", "--columns point=sted (a guess)"),
         ("A 1.0 2.0 3.0\n", "--columns PNEZ "),
     ):
@@ -259,7 +264,7 @@ def test_columns_of_a_plain_project_are_said_in_its_settings(tmp_path):
         (tmp_path / each.name).write_bytes(each.read_bytes())
     (tmp_path / "control.csv").write_text(table("Q", ["ZZ", "PB", "PB"]).replace("point,", "Sted,"))
     settings = (tmp_path / "project.toml").read_text()
-    with pytest.raises(InputError, match="columns point=sted"):
+    with rejected("columns point=sted"):
         formats.read(tmp_path)
     own = '[control]\ncolumns = "point=Sted,use=Q"\nroles = "ZZ=check,PB=control"\n[sd]\ncontrol = 0.01\n'
     (tmp_path / "project.toml").write_text(settings + own)
@@ -285,7 +290,7 @@ def test_marks_of_decimals_and_thousands(cells, delimiter, numbers):
 
 @pytest.mark.parametrize("cells", [["4.567", "1,25"], ["4,567", "1.25"], ["1,234", "1.234"]])
 def test_a_mark_that_may_divide_decimals_or_thousands_is_refused(cells):
-    with pytest.raises(ValueError, match="divides decimals elsewhere"):
+    with rejected("cells.marks"):
         [marks_of(cells, ";").plain(cell) for cell in cells]
 
 
@@ -324,7 +329,7 @@ def test_an_excel_sheet_is_a_table(tmp_path):
         project.block.point_positions[project.block.point_ids.index("103")], ROWS[2][1:]
     )
     (tmp_path / "damaged.xlsx").write_bytes((tmp_path / "list.xlsx").read_bytes()[:200])
-    with pytest.raises(InputError, match="cannot be read as a workbook"):
+    with rejected("file.workbook BadZipFile: File is not a zip file"):
         with_control(block(), tmp_path / "damaged.xlsx", {}, None)
 
 

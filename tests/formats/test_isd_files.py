@@ -9,6 +9,7 @@ from support_data import RADIUS, START, along_minus_z, document, unmirrored, wri
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.network import Polynomial, projected
+from rejections import rejected
 
 PLACES = np.array([[10.0, 20.0], [150.0, 200.5], [290.0, 399.0], [0.5, 0.5]])
 """Samples and lines."""
@@ -193,56 +194,92 @@ def setting(value, *keys):
 
 
 FAULTS = [
-    (without("name_model"), "name_model is missing"),
-    (setting("USGS_ASTRO_SAR_SENSOR_MODEL", "name_model"), "name_model: the sensor model .*SAR"),
-    (without("image_lines"), "image_lines is missing"),
-    (setting(0, "image_samples"), "image_samples: is no whole number from 1"),
-    (setting("x", "focal_length_model", "focal_length"), "focal_length_model/focal_length: is no number"),
-    (setting(0, "focal_length_model", "focal_length"), "focal_length: is zero"),
-    (without("detector_center", "line"), "detector_center: line is missing"),
+    (without("name_model"), "error.at: error.document: error.missing name_model"),
+    (
+        setting("USGS_ASTRO_SAR_SENSOR_MODEL", "name_model"),
+        "error.at /name_model: error.unknown.close the sensor model",
+    ),
+    (without("image_lines"), "error.at: error.document: error.missing image_lines"),
+    (setting(0, "image_samples"), "error.at /image_samples: error.whole-range 0 1 2147483648"),
+    (
+        setting("x", "focal_length_model", "focal_length"),
+        "error.at /focal_length_model/focal_length: error.number x",
+    ),
+    (setting(0, "focal_length_model", "focal_length"), "error.at /focal_length_model/focal_length is zero"),
+    (without("detector_center", "line"), "error.at /detector_center: error.missing line"),
     (
         setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
-        "focal2pixel_samples: has no inverse, together with /focal2pixel_lines",
+        "error.at /focal2pixel_samples has no inverse, together with",
     ),
-    (setting(None, "detector_center", "line"), "/detector_center/line: is null, .* must be the line"),
+    (
+        setting(None, "detector_center", "line"),
+        "error.at /detector_center/line is null, and no other field determines it;",
+    ),
     (
         setting(None, "focal_length_model", "focal_length"),
-        "/focal_length_model/focal_length: is null, .* must",
+        "error.at /focal_length_model/focal_length is null, and no other field",
     ),
-    (setting(None, "focal2pixel_samples"), "/focal2pixel_samples: is null, .* three numbers"),
-    (setting(None, "detector_line_summing"), "/detector_line_summing: is null, .* must be the number"),
-    (setting(None, "center_ephemeris_time"), "/center_ephemeris_time: is null, .* must be the time"),
-    (setting(None, "radii", "semimajor"), "/radii/semimajor: is null and must be a number"),
-    (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
-    (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
+    (
+        setting(None, "focal2pixel_samples"),
+        "error.at /focal2pixel_samples is null, and no other field determines it;",
+    ),
+    (
+        setting(None, "detector_line_summing"),
+        "error.at /detector_line_summing is null, and no other field determines it;",
+    ),
+    (
+        setting(None, "center_ephemeris_time"),
+        "error.at /center_ephemeris_time is null, and no other field determines it;",
+    ),
+    (setting(None, "radii", "semimajor"), "error.at /radii/semimajor: error.number: error.value None"),
+    (setting([0.0, 1.0], "focal2pixel_lines"), "error.at /focal2pixel_lines: error.count 3 2"),
+    (
+        setting(0, "detector_sample_summing"),
+        "error.at /detector_sample_summing is not positive, or that of lines is not",
+    ),
     (
         setting({"fisheye": {}}, "optical_distortion"),
-        "optical_distortion: the lens .?fisheye.? is none of radial",
+        "error.at /optical_distortion: error.unknown the lens fisheye",
     ),
-    (setting({}, "optical_distortion"), "optical_distortion: has 0 models"),
-    (setting([1.0], "optical_distortion", "radial", "coefficients"), "radial: .*has 3 coefficients"),
-    (setting({"lineExposureTimes": [1.0]}, "jitter"), "jitter: is known of frames alone"),
-    (setting([], "line_scan_rate"), "line_scan_rate: is empty"),
-    (setting([[0.5, -2.0, 0.0]], "line_scan_rate"), "line_scan_rate: lines are first line"),
-    (setting([[0.5, -2.0]], "line_scan_rate"), "line_scan_rate/0: has 2 numbers"),
-    (setting("miles", "radii", "unit"), "radii/unit: the unit .?miles.? is none of m, km"),
-    (setting(2e9, "radii", "semiminor"), "radii: are no semi-axes"),
-    (without("instrument_position", "positions"), "instrument_position: positions is missing"),
+    (setting({}, "optical_distortion"), "error.at /optical_distortion has 0 models, not one"),
+    (
+        setting([1.0], "optical_distortion", "radial", "coefficients"),
+        "error.at /optical_distortion/radial the lens radial has 3 coefficients,",
+    ),
+    (setting({"lineExposureTimes": [1.0]}, "jitter"), "error.at /jitter is known of frames alone"),
+    (setting([], "line_scan_rate"), "error.at /line_scan_rate is empty"),
+    (
+        setting([[0.5, -2.0, 0.0]], "line_scan_rate"),
+        "error.at /line_scan_rate lines are first line, time, seconds per line,",
+    ),
+    (setting([[0.5, -2.0]], "line_scan_rate"), "error.at /line_scan_rate/0: error.count 3 2"),
+    (setting("miles", "radii", "unit"), "error.at /radii/unit: error.unknown the unit miles m,km"),
+    (setting(2e9, "radii", "semiminor"), "error.at /radii are no semi-axes with 0 < semiminor <= semimajor:"),
+    (without("instrument_position", "positions"), "error.at /instrument_position: error.missing positions"),
     (
         setting([1.0, 2.0], "instrument_position", "positions", 3),
-        "instrument_position/positions/3: has 2 numbers",
+        "error.at /instrument_position/positions/3: error.count 3 2",
     ),
-    (setting([[0, 0, 0]], "instrument_position", "velocities"), "velocities: has 1 records, positions 21"),
-    (setting(8, "instrument_position", "reference_frame"), "instrument_position: reference_frame .* 1, 8"),
+    (
+        setting([[0, 0, 0]], "instrument_position", "velocities"),
+        "error.at /instrument_position/velocities has 1 records, positions 21",
+    ),
+    (
+        setting(8, "instrument_position", "reference_frame"),
+        "error.at /instrument_position reference_frame of position, pointing and",
+    ),
     (
         setting([0, 0, 0, 2], "instrument_pointing", "quaternions", 1),
-        "quaternions: record 1 has the length 2",
+        "error.at /instrument_pointing/quaternions record 1 has the length 2, not 1",
     ),
     (
         setting([1.0] * 9, "body_rotation", "constant_rotation"),
-        "body_rotation/constant_rotation: .*no rotation",
+        "error.at /body_rotation/constant_rotation constant_rotation[0] is no",
     ),
-    (setting(1e9, "body_rotation", "ephemeris_times", 4), "body_rotation/ephemeris_times: .*do not increase"),
+    (
+        setting(1e9, "body_rotation", "ephemeris_times", 4),
+        "error.at /body_rotation/ephemeris_times ephemeris_times do not increase,",
+    ),
 ]
 
 
@@ -251,7 +288,7 @@ def test_what_is_wrong_is_named(tmp_path, change, said):
     data = json.loads(json.dumps(document()))
     change(data)
     path = written(tmp_path, data)
-    with pytest.raises(InputError, match=said) as caught:
+    with rejected(said) as caught:
         read_support(path)
     assert caught.value.file == path
 
@@ -264,15 +301,15 @@ def test_lines_that_the_tables_do_not_reach_are_named(tmp_path):
         "the 400 lines take 8 s by line_scan_rate, the table of instrument_pointing 4 s: the table is short"
         " by 50.0 %",
     )
-    with pytest.raises(InputError, match=r"line 300 of I is at 1006.0 s, the tables reach from .* to 1004.1"):
+    with rejected(r"line 300 of I is at 1006.0 s, the tables reach from .* to 1004.1"):
         own.to_ground([100.0, 300.0], [1.0, 1.0])
 
 
 def test_ways_to_count_and_to_join_have_names(tmp_path):
     for how in ({"pixels": "corner"}, {"interpolation": "cubic"}):
-        with pytest.raises(InputError, match="is one of isis, csm"):
+        with rejected("is one of isis, csm"):
             image(tmp_path, document(), **how)
-    with pytest.raises(InputError, match="shapes"):
+    with rejected("shapes"):
         image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])
 
 

@@ -100,7 +100,7 @@ def test_section_2_1_real(field, value):
     ],
 )
 def test_illegal_numbers(field):
-    with pytest.raises(ValueError, match="is not a number"):
+    with pytest.raises(ValueError, match="must be a number"):
         parse_real(field, 3)
 
 
@@ -159,7 +159,7 @@ def test_section_2_1_the_package_fortranformat_reads_the_same(
 
 @pytest.mark.parametrize("field", ["1E999", "-1.D309", "1.5+400", "1E-400", "1.-999", "1E99999999"])
 def test_numbers_that_double_precision_does_not_have_are_refused(field):
-    with pytest.raises(ValueError, match="beyond the range of numbers"):
+    with pytest.raises(ValueError, match="within the range of floating"):
         parse_real(field, 3)
 
 
@@ -167,7 +167,7 @@ def test_numbers_that_double_precision_does_not_have_are_refused(field):
 def test_section_2_1_integers():
     assert [parse_integer(field) for field in ("", " ", "7", " 5", "5 ", "-1")] == [0, 0, 7, 5, 5, -1]
     for field in ("x", "1.", "²"):
-        with pytest.raises(ValueError, match="whole number"):
+        with pytest.raises(ValueError, match="must be an integer"):
             parse_integer(field)
 
 
@@ -240,7 +240,7 @@ def test_writing_numbers(value, field):
 
 @pytest.mark.parametrize("value", [1e10, -1e9, math.inf, -math.inf, 1e300])
 def test_numbers_that_do_not_fit(value):
-    with pytest.raises(ValueError, match=r"does not fit|no spelling"):
+    with pytest.raises(ValueError, match=r"does not fit|must be a finite number"):
         format_real(value, 10, 3)
 
 

@@ -66,7 +66,7 @@ def test_things_without_common_names_are_refused(result):
             point_ids=[f"{name}a" for name in BLOCK.point_ids],
         ),
     )
-    with pytest.raises(InputError, match="nothing in common"):
+    with pytest.raises(InputError, match="with the same names"):
         differences(result, renamed)
 
 

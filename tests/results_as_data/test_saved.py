@@ -29,6 +29,7 @@ from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
 from photogram.results.cameras import AdjustedCamera
+from refusals import refused
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -270,21 +271,21 @@ def folder(tmp_path):
 
 
 def test_damaged_folders_are_refused_with_the_file(folder):
-    with pytest.raises(InputError, match=r"nothing/summary\.json: cannot be read"):
+    with pytest.raises(InputError, match=r"nothing/summary\.json: the file cannot be read"):
         read_result(folder / "nothing")
     images = folder / "images.parquet"
     whole = images.read_bytes()
     images.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"images\.parquet: is not the file that was written with summary"):
+    with pytest.raises(InputError, match=r"images\.parquet: the checksum differs from summary"):
         read_result(folder)
     resealed(folder)
-    with pytest.raises(InputError, match=r"images\.parquet: cannot be read as Parquet"):
+    with pytest.raises(InputError, match=r"images\.parquet: the file must be valid Parquet"):
         read_result(folder)
     table = parquet.read_table(folder / "points.parquet")
     images.write_bytes(whole)
     parquet.write_table(table.slice(1), folder / "points.parquet")
     resealed(folder)
-    with pytest.raises(InputError, match=r"images\.parquet: names '.*', which is not in its own table"):
+    with pytest.raises(InputError, match=r"images\.parquet: the name '.*' is missing in the table"):
         read_result(folder)
     parquet.write_table(table.drop_columns(["covariance"]), folder / "points.parquet")
     resealed(folder)
@@ -317,11 +318,11 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
     (folder / f"{table}.parquet").write_bytes((other / f"{table}.parquet").read_bytes())
     same = summary["tables"][table] == others["tables"][table]
     if not same:
-        with pytest.raises(InputError, match=rf"{table}\.parquet: is not the file that was written with"):
+        with pytest.raises(InputError, match=rf"{table}\.parquet: the checksum differs from"):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
-    with pytest.raises(InputError, match=rf"{table}\.parquet: cannot be read"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the file cannot be read"):
         read_result(folder)
 
 
@@ -362,33 +363,39 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
     }[values]
     parquet.write_table(found.set_column(found.schema.get_field_index(column), column, new), path)
     resealed(folder)
-    with pytest.raises(InputError, match=rf"{table}\.parquet: the column {column} does not hold"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the column {column} must contain"):
         read_result(folder)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda document: document.update(format=1), "is of the format 1"),
+        (lambda document: document.update(format=1), "the file has the version '1'"),
         (lambda document: document.update(kind="other"), "of a kind that is not known: 'other'"),
-        (lambda document: document.pop("kept"), "is not the summary of a result"),
+        (lambda document: document.pop("kept"), "must be the summary of a result"),
         (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "no class that this"),
         (lambda document: document["kept"]["block"].update(frame={"was": 1}), "does not say what"),
         (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
         (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
-        (lambda document: document["kept"].update(state={"tuple": []}), "keeps no state"),
+        (
+            lambda document: document["kept"].update(state={"tuple": []}),
+            "must contain the state of an adjustment",
+        ),
         (lambda document: document["kept"]["result"].update(cameras=["x"]), "cameras.0. is 'x', not a Adj"),
         (
             lambda document: document["kept"]["block"].update(point_ids="x"),
             "point_ids is 'x', not a sequence",
         ),
-        (lambda document: document["kept"]["block"].update(other=1), "does not hold together: .*'other'"),
-        (lambda document: document["kept"]["block"].pop("spheroid"), "does not hold together: 'spheroid'"),
+        (lambda document: document["kept"]["block"].update(other=1), "results.contradiction .*'other'"),
+        (
+            lambda document: document["kept"]["block"].pop("spheroid"),
+            "results.contradiction reason='spheroid'",
+        ),
     ],
 )
 def test_damaged_summaries_are_refused(folder, change, message):
     resealed(folder, change)
-    with pytest.raises(InputError, match=rf"summary\.json: .*{message}"):
+    with refused("summary.json", message):
         read_result(folder)
 
 

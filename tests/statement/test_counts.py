@@ -18,10 +18,16 @@ NEVER_ONE = ("asprs.tested.h", "asprs.tested.v", "asprs.tested.3d", "asprs.teste
 """Thirty points or more."""
 
 
+def sentences(language):
+    """Return the sentences of a language, without the families that only English has: errors of input."""
+    families = {key.partition(".")[0] for key in table_of("de")}
+    return {key: text for key, text in table_of(language).items() if key.partition(".")[0] in families}
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_sentence_counts_one_of_several(language):
     texts, tried = Texts(language), 0
-    for key, sentence in table_of(language).items():
+    for key, sentence in sentences(language).items():
         fields = fields_of(sentence)
         counts = sorted(fields & set(COUNTS))
         if key in NEVER_ONE or ".one" in key or not counts:
@@ -36,7 +42,7 @@ def test_no_sentence_counts_one_of_several(language):
 
 
 def test_forms_for_one_have_no_other_fields_than_the_sentence():
-    table = table_of("en")
+    table = sentences("en")
     for key in table:
         if ".one" in key:
             assert fields_of(table[key]) <= fields_of(table[key.partition(".one")[0]]), key

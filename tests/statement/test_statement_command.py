@@ -106,9 +106,9 @@ def test_tables_have_a_row_for_each_point_and_source(run, site):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--class-h", "5"], "a length with its unit"),
+        (["--class-h", "5"], "a length must have a unit"),
         (["--class-h", "5 parsec"], "no unit of length"),
-        (["--area", "5m"], "an area with its unit"),
+        (["--area", "5m"], "an area must have a unit"),
         (["--without", "C07"], "POINT="),
         (["--standard", "din"], "no standard"),
         (["--budget", "point C99 z"], "no point"),

@@ -20,7 +20,7 @@ from photogram.results.features import KINDS as FORMS
 from photogram.results.features_report import through
 from photogram.results.group_sums import observables
 from photogram.results.observation_kinds import named_observation, parts_of
-from photogram.results.result import adjusted
+from photogram.results.selection import adjusted
 from photogram.results.statement import budget
 from photogram.results.statement.quantities import component_of
 from photogram.results.statement.texts import LANGUAGES, Texts
@@ -113,7 +113,7 @@ def test_every_test_of_a_verdict_has_a_name_in_the_language(result):
         (parts_of("XY", Phrase("named.control", {"point": "R, which is held"})),
          "X, Y of control point R, which is held", "X, Y von Passpunkt R, which is held"),
         (Phrase("named.held", {"named": Phrase("named.position", {"photo": "3"})}),
-         "position of photo 3, which is held", "Position von Bild 3, festgehalten"),
+         "position of photo 3 (fixed)", "Position von Bild 3, festgehalten"),
     ],
 )  # fmt: skip
 def test_names_of_observations_are_in_the_language_and_those_of_users_are_not(name, english, german):
@@ -200,7 +200,7 @@ def test_refraction_and_what_is_held_are_assumptions(result):
     }
     assert said["en"]["assume.refraction"] == "Refraction: air: standard atmosphere."
     assert said["de"]["assume.refraction"] == "Refraktion: Luft: Normalatmosphäre."
-    assert said["en"]["assume.held"] == "Taken as errorless: point G01."
+    assert said["en"]["assume.held"] == "Assumed to be free of errors: point G01."
     assert said["de"]["assume.held"] == "Als fehlerfrei angenommen: Punkt G01."
 
 
@@ -273,6 +273,6 @@ def test_no_english_word_is_left_on_a_german_page():
     english = letters(" ".join(table_of("en").values()))
     english |= letters(source(datums))
     # What the survey calls its camera, its lever arm and its files is its own.
-    own = {"drone", "flight", "photogram", "program"}
+    own = {"drone", "flight", "photogram", "program", "cm", "cx", "cy"}
     assert not (letters(page) & english) - known - own
     assert "0.05" not in page

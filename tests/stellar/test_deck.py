@@ -9,6 +9,7 @@ import pytest
 from star_decks import cards, put
 from typer.testing import CliRunner
 
+from message_codes import coded
 from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import calibrate, read_deck, read_plain
@@ -58,13 +59,13 @@ def test_options_without_blanks(example, read):
     [
         (
             lambda d: d.__setitem__(17, d[17].replace("     1 ", "     9 ", 1)),
-            "ERROR 1: star numbers disagree",
+            coded("stars.error-1", star="1"),
             18,
         ),
-        (lambda d: d.__setitem__(3, "X" + d[3][1:]), "is not a number", 4),
-        (lambda d: d.__setitem__(14, "-" + d[14][1:]), "is not positive definite", 15),
-        (lambda d: d.__delitem__(slice(30, None)), "the deck ends where", 31),
-        (lambda d: d.__setitem__(2, "0 0 1 1 0 0 0 1 0 x 0 0 0 0.0"), "options", 3),
+        (lambda d: d.__setitem__(3, "X" + d[3][1:]), coded("error.columns"), 4),
+        (lambda d: d.__setitem__(14, "-" + d[14][1:]), coded("stars.indefinite-card"), 15),
+        (lambda d: d.__delitem__(slice(30, None)), coded("stars.deck-ends"), 31),
+        (lambda d: d.__setitem__(2, "0 0 1 1 0 0 0 1 0 x 0 0 0 0.0"), coded("error.at", what="options"), 3),
     ],
 )
 def test_bad_decks_name_the_card(example, read, change, message, number):
@@ -72,7 +73,7 @@ def test_bad_decks_name_the_card(example, read, change, message, number):
     star = next(i for i, card in enumerate(deck[17:], 17) if card[60:66].strip() == "1")
     assert star == 17
     change(deck)
-    with pytest.raises(InputError, match=message) as raised:
+    with pytest.raises(InputError, check=message) as raised:
         read(deck)
     assert raised.value.record == number
 
@@ -81,7 +82,7 @@ def test_a_rejected_star_that_is_not_there(example, read):
     deck = cards(example)
     deck[2] = deck[2].ljust(76) + "1"
     deck.insert(16, put((1, "  9999"), (18, "1")))
-    with pytest.raises(InputError, match="rejected but not there: 9999"):
+    with pytest.raises(InputError, check=coded("stars.rejected-star", names=["9999"])):
         read(deck)
     deck[16] = put((1, "     2"), (18, "1"))
     assert len(read(deck)[0].star_ids) == 74

@@ -5,6 +5,7 @@ import pytest
 from star_decks import cards, put
 from typer.testing import CliRunner
 
+from message_codes import coded, has_code
 from photogram import AdjustmentError, InputError
 from photogram.cli import app
 from photogram.stellar import calibrate, read_deck
@@ -23,13 +24,13 @@ def deck(plate):
 def refused(tmp_path):
     """Read a deck that cannot be read; return the error."""
 
-    def refused(lines, message, record):
+    def refused(lines, code, record, **fields):
         file = tmp_path / "deck"
         file.write_text("\n".join(lines) + "\n")
         with pytest.raises(InputError) as raised:
             read_deck(file)
         error = raised.value
-        assert error.message == message
+        assert has_code(error, code, **fields), error
         assert (error.file, error.record) == (file, record)
         assert lines[record - 1].rstrip() in str(error)
 
@@ -43,36 +44,42 @@ def replaced(card, column, text):
 
 
 @pytest.mark.parametrize(
-    ("record", "column", "text", "message"),
+    ("record", "column", "text", "message", "fields"),
     [
-        (3, 1, "-1 0 1 1 0 0 0 1 0 0 0 0 0 0.0", "an option cannot be negative"),
-        (3, 1, "x", "options: invalid literal for int() with base 10: 'x'"),
-        (4, 1, "     X    ", "columns 1-10: '     X    ' is not a number"),
-        (4, 21, "   -1.E+00", "the air has -1 K; temperatures in kelvin are between 150 and 350"),
-        (4, 31, "   -1.E+00", "the pressure is -1 mm of mercury; it must be between 0 and 850"),
-        (6, 37, " h ", "columns 37-39: ' h ' is not a number"),
-        (7, 64, "    MANY", "the factor of the movement test is not a number: 'MANY'"),
-        (7, 72, "5X0", "columns 72-74: '5X0' is not a whole number"),
-        (8, 36, "091", "the latitude exceeds 90 degrees"),
-        (14, 2, " 3.0.0        ", "columns 2-15: ' 3.0.0        ' is not a number"),
-        (15, 1, "-", "the weight matrix is not positive definite"),
-        (16, 25, " 2.00000E+00", "the weight matrix is not positive definite"),
-        (17, 69, "  0", "star 1 has no images"),
-        (18, 61, "     9", "ERROR 1: star numbers disagree: the star card has 1"),
-        (19, 80, "1", "the last image of the deck is flagged, but star 1 has 5 images"),
-        (23, 61, "     1", "star 1 is in the deck twice"),
-        (24, 1, "      0.0X  ", "columns 1-12: '      0.0X  ' is not a number"),
+        (
+            3,
+            1,
+            "-1 0 1 1 0 0 0 1 0 0 0 0 0 0.0",
+            "error.at",
+            {"what": "options", "message": "error.not-negative"},
+        ),
+        (3, 1, "x", "error.at", {"what": "options"}),
+        (4, 1, "     X    ", "error.columns", {"first": 1, "last": 10}),
+        (4, 21, "   -1.E+00", "stars.temperature", {"value": -1.0}),
+        (4, 31, "   -1.E+00", "stars.pressure", {"value": -1.0}),
+        (6, 37, " h ", "error.columns", {"first": 37, "last": 39}),
+        (7, 64, "    MANY", "error.number", {"value": "MANY"}),
+        (7, 72, "5X0", "error.columns", {"first": 72, "last": 74}),
+        (8, 36, "091", "error.at", {"what": "latitude", "message": "error.most"}),
+        (14, 2, " 3.0.0        ", "error.columns", {"first": 2, "last": 15}),
+        (15, 1, "-", "stars.indefinite-card", {}),
+        (16, 25, " 2.00000E+00", "stars.indefinite-card", {}),
+        (17, 69, "  0", "stars.no-images", {"star": "1"}),
+        (18, 61, "     9", "stars.error-1", {"star": "1"}),
+        (19, 80, "1", "stars.early-flag", {"star": "1", "images": 5}),
+        (23, 61, "     1", "error.repeated", {"kind": "star", "name": "1"}),
+        (24, 1, "      0.0X  ", "error.columns", {"first": 1, "last": 12}),
     ],
 )
-def test_a_bad_card(deck, refused, record, column, text, message):
+def test_a_bad_card(deck, refused, record, column, text, message, fields):
     deck[record - 1] = replaced(deck[record - 1], column, text)
-    refused(deck, message, record)
+    refused(deck, message, record, **fields)
 
 
 def test_principal_distances_that_are_not_positive(deck, refused):
     """Cards 13 to 18 are the ninth to the fourteenth here; the last of them is named."""
     deck[10] = replaced(deck[10], 2, " 0.0000000E+00")
-    refused(deck, "the principal distances of cards 13 to 18 must be positive", 14)
+    refused(deck, "error.positive", 14, value=0.0)
 
 
 def individual(deck):
@@ -89,13 +96,13 @@ def individual(deck):
 def test_weights_of_a_star_and_of_an_image(deck, refused, record, column):
     deck = individual(deck)
     deck[record - 1] = replaced(deck[record - 1], column, "   20.0000")
-    refused(deck, "the weight matrix is not positive definite", record)
+    refused(deck, "stars.indefinite-card", record)
 
 
 def test_a_weight_of_no_parameter(deck, refused):
     deck[2] = OPTIONS.replace("0 1 0 0 0 0 0 0.0", "0 1 0 1 0 0 0 0.0")
     deck.insert(14, "".join(f"{row:2}{column:2}{1.0:12.4E}" for row, column in ((1, 1), (27, 2))))
-    refused(deck, "there is no weight (27, 2) of 26 parameters", 15)
+    refused(deck, "stars.no-weight", 15, row=27, column=2)
 
 
 def rejecting(deck, numbers):
@@ -108,14 +115,14 @@ def rejecting(deck, numbers):
 
 def test_too_many_rejections(deck, refused):
     """A hundred stars and two hundred plate points at the most; here all are there, but one."""
-    refused(rejecting(deck, range(1, 200)), "too many rejected stars: 100 at the most", FIRST_STAR + 100)
+    refused(rejecting(deck, range(1, 200)), "stars.too-many-rejected", FIRST_STAR + 100)
     points = range(10001, 10400)
-    refused(rejecting(deck, points), "too many rejected plate points: 200 at the most", FIRST_STAR + 200)
+    refused(rejecting(deck, points), "stars.too-many-rejected", FIRST_STAR + 200)
 
 
 def test_rejections_of_what_is_not_there(deck, refused):
-    refused(rejecting(deck, [2, 777]), "rejected but not there: 777", FIRST_STAR + 1)
-    refused(rejecting(deck, [10777]), "rejected but not there: 10777", FIRST_STAR)
+    refused(rejecting(deck, [2, 777]), "stars.rejected-star", FIRST_STAR + 1, names=["777"])
+    refused(rejecting(deck, [10777]), "stars.rejected-point", FIRST_STAR, names=["10777"])
 
 
 def test_a_star_whose_images_are_all_rejected_is_eliminated(deck, tmp_path):
@@ -135,10 +142,10 @@ def minimum(deck, numbers, options="0 0 1 1 0 {} 0 1 0 0 0 0 0 0.0"):
 
 
 def test_stars_of_the_minimum_solution_that_are_not_there(deck, refused):
-    told = "incorrect stars specified for minimum solution: "
-    refused(minimum(deck[:], [3, 999]), told + "999", FIRST_STAR)
-    refused(minimum(deck[:], [3, 0, 5]), told + "0", FIRST_STAR)
-    refused(minimum(deck[:], [*range(1, 22), 500]), told + "500", FIRST_STAR + 1)
+    code = "stars.minimum-unknown"
+    refused(minimum(deck[:], [3, 999]), code, FIRST_STAR, names=["999"])
+    refused(minimum(deck[:], [3, 0, 5]), code, FIRST_STAR, names=["0"])
+    refused(minimum(deck[:], [*range(1, 22), 500]), code, FIRST_STAR + 1, names=["500"])
 
 
 def test_an_unknown_direction_is_no_star_of_the_minimum_solution(deck, tmp_path):
@@ -147,13 +154,13 @@ def test_an_unknown_direction_is_no_star_of_the_minimum_solution(deck, tmp_path)
         deck[i] = replaced(deck[i], 61, "    -1")
     (tmp_path / "deck").write_text("\n".join(deck) + "\n")
     (problem,) = read_deck(tmp_path / "deck")
-    with pytest.raises(InputError, match="incorrect stars specified for minimum solution"):
+    with pytest.raises(InputError, check=coded("stars.minimum-direction")):
         calibrate(problem)
 
 
 def test_a_pre_run_needs_a_minimum_solution(deck, refused):
     deck[2] = OPTIONS.replace("0 0 1 1 0 0 0", "0 0 1 1 0 0 1", 1)
-    refused(deck, "option 7 (pre-run) needs option 6 (minimum solution)", 3)
+    refused(deck, "error.requires", 3, name="pre_run", other="minimum_stars")
 
 
 @pytest.mark.parametrize(
@@ -169,9 +176,8 @@ def test_a_pre_run_needs_a_minimum_solution(deck, refused):
 )
 def test_a_deck_that_ends_early(deck, tmp_path, left, what):
     (tmp_path / "deck").write_text("".join(f"{card}\n" for card in deck[:left]))
-    with pytest.raises(InputError, match="the deck ends where") as raised:
+    with pytest.raises(InputError, check=coded("stars.deck-ends", card=what)) as raised:
         read_deck(tmp_path / "deck")
-    assert raised.value.message == f"the deck ends where {what} is expected"
     assert raised.value.record == left + 1
 
 
@@ -185,7 +191,7 @@ def test_a_deck_that_cannot_be_adjusted(deck, tmp_path):
     few[-1] = replaced(few[-1], 80, "1")
     file.write_text("\n".join(few) + "\n")
     (problem,) = read_deck(file)
-    with pytest.raises(AdjustmentError, match="ERROR 3: not enough observations: 8 for 20 unknowns"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-3", observations=8, unknowns=20)):
         calibrate(problem)
     run = CliRunner().invoke(app, ["stellar-camera", str(file)])
     assert run.exit_code == 3

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from message_codes import coded, has_code
 from photogram import InputError
 from photogram.stellar import BrownCamera, attitude_of, calibrate_night, read_night
 from photogram.stellar.pointing import axis_of, roll_of
@@ -44,39 +45,43 @@ def widened(night, factor):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "hint"),
+    ("spoil", "hint", "fields"),
     [
-        (lambda n: flipped(n, 0), "the images are mirrored: x counts to the left"),
-        (lambda n: flipped(n, 1), "y of the images counts up, not down"),
+        (lambda n: flipped(n, 0), "mirrored-x", {}),
+        (lambda n: flipped(n, 1), "mirrored-y", {}),
         (
             lambda n: pointed(n, lambda a, e, r: (a + np.pi, e, r)),
-            "azimuth_deg counts from north, not from south",
+            "azimuth-from-north",
+            {},
         ),
-        (lambda n: pointed(n, lambda a, e, r: (-a, e, r)), "azimuth_deg counts to the east, not to the west"),
+        (lambda n: pointed(n, lambda a, e, r: (-a, e, r)), "azimuth-east", {}),
         (
             lambda n: pointed(n, lambda a, e, r: (a, e, r + np.pi / 2)),
-            "roll_deg has to be changed by -90 degrees",
+            "roll",
+            {"turn": -90},
         ),
         (
             lambda n: pointed(n, lambda a, e, r: (a, e, r - np.pi / 2)),
-            r"roll_deg has to be changed by \+90 degrees",
+            "roll",
+            {"turn": 90},
         ),
-        (lambda n: widened(n, 1.3), "the horizontal field of view is about 3[67]"),
-        (lambda n: widened(n, 0.7), "the horizontal field of view is about 3[67]"),
+        (lambda n: widened(n, 1.3), "field-of-view", {"field": pytest.approx(36.9, rel=0.03)}),
+        (lambda n: widened(n, 0.7), "field-of-view", {"field": pytest.approx(36.9, rel=0.03)}),
     ],
 )
-def test_each_mistake_gets_its_hint(night, spoil, hint):
-    with pytest.raises(InputError, match=f"as it seems, {hint}.*: stars of exposures 1, 2 are found then"):
+def test_each_mistake_gets_its_hint(night, spoil, hint, fields):
+    check = coded("stars.cause", mistake=f"stars.hint.{hint}", names=("1", "2"))
+    with pytest.raises(InputError, check=check) as raised:
         calibrate_night(spoil(night))
+    assert has_code(raised.value, f"stars.hint.{hint}", **fields)
 
 
 def test_one_mirrored_exposure_is_left_out_with_its_hint():
     night = read_night(EXAMPLE)
     first = flipped(night, 0).exposures[0]
     result = calibrate_night(replace(night, exposures=[first, *night.exposures[1:]]))
-    texts = [str(message) for message in result.messages]
-    assert texts[0].startswith("as it seems, the images are mirrored")
-    assert texts[1].startswith("exposure 1 is left out: only ")
+    assert has_code(result.messages[0], "stars.hint.mirrored-x")
+    assert has_code(result.messages[1], "stars.rejected", name="1", reason="stars.by-chance")
     assert result.usable
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from message_codes import codes, fields_of, has_code
 from photogram.cli import app
 from photogram.statistics.verdict import EXIT_NOT_USABLE
 from photogram.stellar import INDEX, NAMES, calibrate
@@ -28,10 +29,6 @@ def solved(plain):
     return calibrate(plain)
 
 
-def texts(result):
-    return [str(message) for message in result.messages]
-
-
 def spoilt(problem, image, shift):
     xy = problem.image_xy.copy()
     xy[image, 0] += shift
@@ -39,27 +36,30 @@ def spoilt(problem, image, shift):
 
 
 def test_a_good_plate_has_no_outliers(solved):
-    assert not any("outliers" in text for text in texts(solved))
+    assert "stars.outliers" not in codes(solved.messages)
 
 
 def test_a_residual_of_ten_mean_errors_is_a_problem(plain):
-    first = texts(calibrate(spoilt(plain, 7, 30e-6)))[0]
-    assert first.startswith(
-        "outliers (residuals externally studentized, limit 4.05): point 103 of star 2 (10."
-    )
+    result = calibrate(spoilt(plain, 7, 30e-6))
+    first = result.messages[0].phrase.fields
+    assert (first["statistic"], first["limit"]) == ("t", pytest.approx(4.05, abs=0.005))
+    assert has_code(first["names"][0], "stars.plate-coordinate", axis="x", point="103", star="2")
+    assert first["names"][0].fields["value"] == pytest.approx(10.5, abs=0.5)
 
 
 def test_with_a_given_mean_error_residuals_are_over_their_own(plain):
     given = replace(plain, options=replace(plain.options, mean_error=3e-6))
-    found = texts(calibrate(spoilt(given, 7, 30e-6)))
-    assert found[0].startswith("outliers (residuals of their mean errors, limit 4.0")
-    assert "point 103 of star 2" in found[0]
+    first = calibrate(spoilt(given, 7, 30e-6)).messages[0].phrase
+    assert (first.fields["statistic"], first.fields["limit"]) == ("w", pytest.approx(4.05, abs=0.05))
+    assert has_code(first, "stars.plate-coordinate", axis="x", point="103", star="2")
 
 
 def test_a_failed_global_test_comes_first(plain, solved):
     assert solved.test is None
     small = replace(plain, options=replace(plain.options, mean_error=1e-6))
-    assert texts(calibrate(small))[0].startswith("the global test fails: residuals are 3.02 times larger")
+    failed = calibrate(small)
+    assert failed.test.factor == pytest.approx(3.02, abs=0.005)
+    assert str(failed.messages[0]) == str(failed.test.problem())
     right = calibrate(replace(plain, options=replace(plain.options, mean_error=3e-6)))
     assert not right.test.rejected_high
 
@@ -71,8 +71,8 @@ def test_a_blunder_that_bends_the_camera_is_no_calibration(plain, solved):
     assert result.converged
     assert result.verdict.exit == EXIT_NOT_USABLE
     name = solved.problem.image_points[100]
-    assert result.verdict.headline.startswith("Gross errors: outliers change ")
-    assert f"point {name} of star" in result.verdict.headline
+    assert has_code(result.verdict.message, "stars.harm")
+    assert has_code(result.verdict.message, "stars.plate-coordinate", point=name)
     assert calibrate(spoilt(plain, 7, 30e-6)).verdict.exit == 0
 
 
@@ -93,24 +93,24 @@ def test_harm_is_told_against_the_solution_without_outliers(plain, moved):
     change = np.abs(result.solved.parameters - right.solved.parameters)[9:22] / np.where(
         errors > 0, errors, 1
     )
-    assert f"{NAMES[9 + change.argmax()]} by {change.max():.3g} of" in result.spoiled
+    assert result.spoiled.fields["name"] == NAMES[9 + change.argmax()]
+    assert result.spoiled.fields["change"] == pytest.approx(change.max(), rel=1e-6)
 
 
 def test_a_wrong_place_of_a_star_is_a_problem(plain):
     places = plain.star_places.copy()
     places[30, 1] += 60e-6
     # With trails of five images the star can only be moved as a whole, and its weight says how far.
-    found = texts(calibrate(replace(plain, star_places=places)))
-    assert "the place of star 31" in found[0]
+    found = calibrate(replace(plain, star_places=places)).messages
+    assert has_code(found[0], "stars.place", star="31")
 
 
 def test_the_star_that_spoils_the_iteration_is_named(plain):
     result = calibrate(spoilt(plain, 7, 5e-3))
     assert not result.converged
-    found = texts(result)
-    assert found[0].startswith("the solution has not converged")
-    assert "point 103 of star 2 (" in found[1]
-    assert "without star 2 the solution converges: it, or one of its images, is wrong" in found
+    assert result.messages[0].code == "stars.plate-not-converged"
+    assert has_code(result.messages[1], "stars.plate-coordinate", point="103", star="2")
+    assert fields_of(result.messages, "stars.culprit")["star"] == "2"
 
 
 def single(plain, solved, group, factor, seed):
@@ -179,7 +179,7 @@ def test_as_published_from_the_attitude_of_the_event(plain, solved):
     far = calibrate(replace(plain, initial=initial, options=options))
     near = calibrate(replace(plain, options=options))
     assert far.converged
-    assert any("began with those of a damped one" in text for text in texts(far))
+    assert "stars.far-attitudes" in codes(far.messages)
     assert far.computed_mean_error == pytest.approx(near.computed_mean_error, rel=1e-6)
     errors = np.array([near.mean_errors[name] for name in NAMES[:22]])
     off = (far.solved.parameters - near.solved.parameters)[:22]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import star_plates as plates
 
+from message_codes import fields_of, has_code
 from photogram.stellar import ARCSEC, INDEX, NAMES, calibrate, refraction
 from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
 from photogram.stellar.parameters import GROUPS
@@ -174,9 +175,7 @@ def test_distortion_that_does_not_settle_is_told_and_computation_goes_on(truth):
     wild = plates.changed(truth.initial, K1=-5.0)
     options = replace(truth.options, as_published=True, distortion_tolerance=1e-9)
     result = calibrate(replace(plates.seen(truth, wild), options=options))
-    told = [message.text for message in result.messages if "DISTORTION NOT CONVERGING" in message.text]
-    assert told
-    assert "FOR POINT NUMBER 101: last changes" in told[0]
+    assert fields_of(result.messages, "stars.unsettled-distortion")["point"] == "101"
     assert result.parameters["K1"] == pytest.approx(-5.0, abs=0.05)
 
 
@@ -189,14 +188,14 @@ def test_results_name_what_is_doubtful(plate):
     expected = {(NAMES[i], NAMES[j]) for i, j in zip(rows, columns, strict=True)}
     assert {(a, b) for a, b, _ in result.correlated()} == expected
     assert ("K4", "K5") in expected
-    texts = " ".join(message.text for message in result.messages)
-    assert "correlation of K4 and K5: -0.9" in texts
+    (pair,) = (m for m in result.messages if has_code(m, "stars.correlation", first="K4", second="K5"))
+    assert pair.phrase.fields["correlation"] == pytest.approx(-0.97, abs=0.03)
     for name, t in result.significance().items():
         assert t == pytest.approx(abs(result.parameters[name]) / result.mean_errors[name])
     none = plates.seen(plates.quiet(plate), plates.changed(result.solved.parameters, K5=0.0))
     weak = calibrate(plates.noisy(none, np.random.default_rng(57)))
     assert weak.significance()["K5"] < 1.96
-    assert "distortion terms that are not significant: K5 (" in " ".join(m.text for m in weak.messages)
+    assert fields_of(weak.messages, "stars.weak-terms")["terms"][0].fields["name"] == "K5"
 
 
 def test_means_of_a_star_are_radial_and_tangential(plate):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import star_plates as plates
 
+from message_codes import coded
 from photogram import AdjustmentError, InputError
 from photogram.stellar import INDEX, NAMES, calibrate
 
@@ -29,7 +30,7 @@ def only(truth, *free):
 def test_a_direction_of_no_decentering(made, as_published):
     start = plates.changed(made.initial, K4=0.0, K5=0.0)
     fixed = np.isin(NAMES, ["K4", "K5"])
-    with pytest.raises(AdjustmentError, match=r"^ERROR 4: no inverse .* do not determine phi_T$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-4", names=["phi_T"])):
         calibrate(as_(as_published, replace(made, initial=start, fixed=fixed)))
 
 
@@ -37,7 +38,7 @@ def test_a_direction_of_no_decentering(made, as_published):
 def test_the_centre_of_no_distortion(made, as_published):
     terms = ("K1", "K2", "K3", "K4", "K5")
     start = plates.changed(made.initial, **dict.fromkeys(terms, 0.0))
-    with pytest.raises(AdjustmentError, match=r"do not determine dx, dy, phi_T$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-4", names=["dx", "dy", "phi_T"])):
         calibrate(as_(as_published, replace(made, initial=start, fixed=np.isin(NAMES, terms))))
 
 
@@ -53,7 +54,7 @@ def test_radial_terms_of_stars_on_one_circle(truth, as_published):
     made = replace(one, image_xy=ring, initial=undistorted)
     places = made.core(undistorted, made.star_places, np.ones(26, bool)).directions()
     held = ~np.isin(NAMES, [*NAMES[:9], "K1", "K2", "K3"])
-    with pytest.raises(AdjustmentError, match=r"do not determine K1, K2, K3$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-4", names=["K1", "K2", "K3"])):
         calibrate(as_(as_published, replace(made, star_places=places, fixed=held)))
 
 
@@ -75,7 +76,7 @@ def test_a_star_without_weight_of_its_own(made, as_published):
     stars, images = made.star_weights.copy(), made.image_weights.copy()
     stars[3] = 0
     images[made.image_stars == 3] *= 1e-170
-    with pytest.raises(AdjustmentError, match=r"^ERROR 2: no inverse for the submatrix of star 4$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-2", names=["4"])):
         calibrate(as_(as_published, replace(made, star_weights=stars, image_weights=images)))
 
 
@@ -86,7 +87,7 @@ def test_too_few_observations(made, as_published):
     chosen = np.flatnonzero(stars)[[0, 5]]
     few = made.without(np.zeros(75, bool), ~np.isin(np.arange(375), chosen))
     few = replace(few, image_groups=np.full(2, 2), star_weights=few.star_weights)
-    with pytest.raises(AdjustmentError, match=r"^ERROR 3: not enough observations: 8 for 20 unknowns$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.error-3", observations=8, unknowns=20)):
         calibrate(as_(as_published, few))
 
 
@@ -95,29 +96,29 @@ def test_a_group_with_one_known_star(made, as_published):
     of_pre = np.unique(made.image_stars[made.image_groups == 0])
     weights = made.star_weights.copy()
     weights[of_pre[1:]] = 0
-    with pytest.raises(AdjustmentError, match="insufficient type 2 stars for individual orientation: pre"):
+    with pytest.raises(AdjustmentError, check=coded("stars.few-known-stars", group="pre")):
         calibrate(as_(as_published, replace(made, star_weights=weights)))
 
 
 @BOTH
 def test_a_star_out_of_sight(made, as_published):
     start = made.initial + np.eye(26)[INDEX["alpha_pre"]] * np.pi
-    with pytest.raises(AdjustmentError, match=r"behind the camera: star 1, 2, 3, .* and 13 more$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.not-visible")):
         calibrate(as_(as_published, replace(made, initial=start)))
     places = made.star_places.copy()
     places[4, 0] += np.pi
-    with pytest.raises(AdjustmentError, match=r"^below the horizon or behind the camera: star 5$"):
+    with pytest.raises(AdjustmentError, check=coded("stars.not-visible", names=["5"])):
         calibrate(as_(as_published, replace(made, star_places=places)))
 
 
 def test_a_weight_matrix_that_is_none(made):
     images, stars, parameters = made.image_weights.copy(), made.star_weights.copy(), np.zeros((26, 26))
     images[7] = [[1.0, 2.0], [2.0, 1.0]]
-    with pytest.raises(InputError, match="the weight matrix of point 103 of star 2 is not positive definite"):
+    with pytest.raises(InputError, check=coded("stars.point", point="103", star="2")):
         replace(made, image_weights=images)
     stars[5] = [[1.0, 1.0], [1.0, 1.0]]
-    with pytest.raises(InputError, match="the weight matrix of star 6 is not positive definite"):
+    with pytest.raises(InputError, check=coded("stars.star", star="6")):
         replace(made, star_weights=stars)
     parameters[9:11, 9:11] = [[1.0, 2.0], [2.0, 1.0]]
-    with pytest.raises(InputError, match="the weight matrix of epsilon, xp is not positive definite"):
+    with pytest.raises(InputError, check=coded("stars.indefinite", names=["epsilon", "xp"])):
         calibrate(replace(made, parameter_weights=parameters))

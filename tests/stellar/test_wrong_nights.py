@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from message_codes import codes, fields_of, has_code
+from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import Catalogue, attitude_of, calibrate_night, read_night
 from photogram.stellar.hints import _HOUR
 from photogram.stellar.pointing import turn_between
-
-AROUND = "no exposure shows stars of the catalogue where its attitude says they are; "
 
 
 def spoil(folder, old, new, count=0):
@@ -44,8 +44,8 @@ def catalogue(folder, chosen):
     spoil(folder, r"\[catalogue\].*", '[catalogue]\nfile = "stars.csv"')
 
 
-def refused(folder, *said):
-    """Run the command; return the message of its error."""
+def refused(folder, *said, **values):
+    """Run the command; return its error, which is that of the functions with values of the file."""
     before = {path.name for path in folder.iterdir()}
     given = ["stellar-camera", "exposures", str(folder / "night.toml"), "--out", str(folder / "out")]
     done = CliRunner().invoke(app, [*given, "--json", str(folder / "r.json"), *said])
@@ -53,15 +53,19 @@ def refused(folder, *said):
     assert {path.name for path in folder.iterdir()} == before
     assert "Traceback" not in done.output
     (line,) = (each for each in done.output.splitlines() if each.startswith("error:"))
-    return line
+    with pytest.raises(InputError) as raised:
+        calibrate_night(read_night(folder / "night.toml", values))
+    assert raised.value.message in line
+    assert ".toml: " in line or raised.value.file is not None
+    return raised.value
 
 
 def test_a_catalogue_of_the_wrong_sky(folder):
     catalogue(folder, lambda dec: dec < -45)
     error = refused(folder)
-    assert f"night.toml: {AROUND}none of the mistakes that are often made explains it" in error
-    assert "compare attitudes, attitude_error_deg and field of view with the exposures, and the cat" in error
-    assert "exposure 1: the catalogue has 0 stars in its field, of the 3 that are needed" in error
+    assert has_code(error, "stars.no-exposure", cause="stars.unexplained")
+    assert has_code(error, "stars.exposure", name="1", reason="stars.few-stars")
+    assert has_code(error, "stars.few-stars", n=0, least=3)
 
 
 def test_clouds(folder):
@@ -72,48 +76,53 @@ def test_clouds(folder):
 
     images(folder, false)
     error = refused(folder)
-    assert f"night.toml: {AROUND}none of the mistakes" in error
-    assert re.search(r"exposure 1: only \d of 75 images have a star; chance finds as many", error)
+    assert has_code(error, "stars.no-exposure", cause="stars.unexplained")
+    assert has_code(error, "stars.exposure", name="1", reason="stars.by-chance")
+    assert has_code(error, "stars.by-chance", images=75)
 
 
 def test_no_images(folder):
     images(folder, lambda exposure, *rest: None if exposure == "3" else (exposure, *rest))
     result = calibrate_night(read_night(folder / "night.toml"))
-    assert "exposure 3 is left out: it has 0 images of the 3 that are needed" in map(str, result.messages)
+    assert fields_of(result.messages, "stars.rejected")["name"] == "3"
+    assert fields_of(result.messages, "stars.few-images") == {"n": 0, "least": 3}
     images(folder, lambda *_: None)
-    assert "exposure 1: it has 0 images of the 3 that are needed" in refused(folder)
+    assert has_code(refused(folder), "stars.exposure", name="1", reason="stars.few-images")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "hint"),
     [
-        ("T20:", "T21:", "utc has to be changed by -1 h: it is the time of a clock, not UTC"),
-        ("T20:", "T22:", "utc has to be changed by -2 h: it is the time of a clock, not UTC"),
-        ("latitude_deg = 47", "latitude_deg = -47", "the latitude has the other sign"),
+        ("T20:", "T21:", {"hours": -1}),
+        ("T20:", "T22:", {"hours": -2}),
+        ("latitude_deg = 47", "latitude_deg = -47", {}),
     ],
 )
 def test_time_and_place(folder, old, new, hint):
     spoil(folder, old, new)
     error = refused(folder)
-    assert re.search(f"night.toml: {AROUND}as it seems, {hint}: stars of exposures 1, 2, 5 are found", error)
+    code = "stars.hint.utc" if hint else "stars.hint.latitude-sign"
+    assert has_code(error, code, **hint)
+    assert has_code(error, "stars.cause", mistake=code, names=("1", "2", "5"))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "hint"),
     [
-        ("_west_deg = -8", "_west_deg = 8", "the longitude counts to the east, not to the west"),
-        ("T20:", "T19:", r"utc has to be changed by \+1 h: it is the time of a clock, not UTC"),
+        ("_west_deg = -8", "_west_deg = 8", {}),
+        ("T20:", "T19:", {"hours": 1}),
     ],
 )
 def test_time_and_place_where_one_exposure_is_found_all_the_same(folder, old, new, hint):
     """It looks near the pole of the sky; one of five is not enough."""
     spoil(folder, old, new)
     result = calibrate_night(read_night(folder / "night.toml"))
-    texts = [str(message) for message in result.messages]
     assert not result.usable
     assert result.names == ("3",)
-    assert any(re.match(f"as it seems, {hint}: stars of exposures 1, 2, 5 are", text) for text in texts)
-    assert any(re.match(r"exposure 3: its stars are up to \d\.\d degrees from where", text) for text in texts)
+    code = "stars.hint.utc" if hint else "stars.hint.longitude-east"
+    assert fields_of(result.messages, code).items() >= hint.items()
+    assert fields_of(result.messages, "stars.cause")["names"] == ("1", "2", "5")
+    assert fields_of(result.messages, "stars.far")["name"] == "3"
 
 
 def test_one_time_that_is_an_hour_late(folder):
@@ -122,19 +131,18 @@ def test_one_time_that_is_an_hour_late(folder):
     night = read_night(folder / "night.toml")
     result = calibrate_night(night)
     assert result.names == night.names
-    (text,) = (str(each) for each in result.messages if "attitude says" in str(each))
-    assert text.startswith(
-        "exposure 3: its stars are up to 7.5 degrees from where its attitude says, which is"
-    )
-    assert text.endswith("said to be wrong by 1: look at its time, its angles and the station")
-    assert not any("as it seems" in str(each) for each in result.messages), "it is found without a hint"
+    assert codes(result.messages).count("stars.far") == 1
+    far = fields_of(result.messages, "stars.far")
+    assert (far["name"], far["turn"], far["error"]) == ("3", pytest.approx(7.5, abs=0.05), pytest.approx(1.0))
+    assert "stars.cause" not in codes(result.messages), "it is found without a hint"
 
 
 def test_mirrored_images_found_nowhere(folder):
     pytest.importorskip("tetra3rs")
     images(folder, lambda exposure, x, *rest: (exposure, 6000 - float(x), *rest))
-    error = refused(folder, "--blind", "25", "50")
-    assert "night.toml: no exposure is found in the sky: its images are mirrored (x counts right" in error
+    error = refused(folder, "--blind", "25", "50", matching={"blind_field_deg": (25.0, 50.0)})
+    assert has_code(error, "stars.not-located")
+    assert has_code(error, "stars.mirrored")
 
 
 def test_millimetres(folder, result):
@@ -145,8 +153,7 @@ def test_millimetres(folder, result):
     for key in ("start", "prior"):
         spoil(folder, "(field_of_view_deg|start) = .*", f'{key} = "camera.json"')
         error = refused(folder)
-        assert "camera.json: fx is 36.0481 pixels, and the frame is 6000 x 4000 pixels: no lens sees" in error
-        assert error.endswith("the principal distance may be in millimetres")
+        assert has_code(error, "stars.short-distance", f=pytest.approx(36.0481, abs=5e-5), width=6000.0)
 
 
 def test_an_hour_is_a_turn_of_the_earth():

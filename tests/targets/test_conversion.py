@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from described import refusal
 from golden_data import shared
-from photogram import Camera, InputError
+from photogram import Camera
 from photogram.targets import convert_lens
 from photogram.targets.mrcal_model import read_model
 
@@ -103,18 +104,18 @@ def test_a_radius_leaves_out_what_is_beyond_in_fit_and_figures():
 
 def test_what_makes_no_sense_is_refused(source):
     for changes, message in (
-        ({"distances": ()}, "distances are positive, not none"),
-        ({"distances": (-1.0,)}, "distances are positive"),
-        ({"distances": (1.0, np.inf)}, "infinity does not go with finite ones"),
-        ({"radius": 1.0}, "shows nothing of what the camera left shows"),
-        ({"covariance": (["f"], [[1.0]])}, "covariance: opencv has no f"),
-        ({"covariance": (["fx"], [[-1.0]])}, "no covariance matrix of 1"),
+        ({"distances": ()}, "error.at what=distances message=error.positive value=none"),
+        ({"distances": (-1.0,)}, "error.at what=distances message=error.positive value=-1.0"),
+        ({"distances": (1.0, np.inf)}, "targets.infinite"),
+        ({"radius": 1.0}, "targets.shows-nothing model=opencv5 camera=left"),
+        ({"covariance": (["f"], [[1.0]])}, "targets.no-parameters model=opencv names=['f']"),
+        ({"covariance": (["fx"], [[-1.0]])}, "error.covariance-singular"),
     ):
-        with pytest.raises(InputError, match=message):
+        with refusal(message):
             convert_lens(source, "opencv5", SIZE, **changes)
-    with pytest.raises(InputError, match="knots: a spline of order 3 has 4 or more"):
+    with refusal("targets.knots order=3.0 least=4.0"):
         convert_lens(source, "splined_stereographic", SIZE, knots=(3, 9))
-    with pytest.raises(InputError, match="perspective, has no focal length and principal point in pixels"):
+    with refusal("targets.no-focal camera=perspective model=perspective"):
         convert_lens(Camera("perspective", {"c": -50.0}), "opencv5", SIZE)
 
 

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from photogram.cli import app
 from photogram.targets.mrcal_model import read_lens
+from photogram.words import phrase
 
 NAMES = {"lensmodel": "LENSMODEL_OPENCV4", "imagersize": [640, 480]}
 VALUES = [520.0, 521.0, 318.0, 236.0, -0.2, 0.05, 1e-3, -5e-4]
@@ -64,10 +65,10 @@ def test_knots_are_read_again_as_they_were_written(lens, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["--to", "opencv9"], 1, "there is no lens 'opencv9'"),
+        (["--to", "opencv9"], 1, "opencv9"),
         (["--to", "opencv5", "--knots", "9"], 2, "two numbers"),
         (["--to", "opencv5", "--distance", "near"], 2, "commas"),
-        (["--to", "opencv5", "--distance", "1,inf"], 1, "infinity does not go with finite ones"),
+        (["--to", "opencv5", "--distance", "1,inf"], 1, str(phrase("targets.infinite"))),
         (["--to", "opencv5", "--plots"], 2, "--out"),
     ],
 )
@@ -80,9 +81,12 @@ def test_what_makes_no_sense_is_refused(lens, arguments, code, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"lensmodel": "LENSMODEL_LATLON"}, "LENSMODEL_LATLON is none of the lenses that are taken"),
-        ({"intrinsics": VALUES[:5]}, "LENSMODEL_OPENCV4 has 8 values, not 5"),
-        ({"imagersize": None}, "is no camera model"),
+        ({"lensmodel": "LENSMODEL_LATLON"}, "LENSMODEL_LATLON"),
+        (
+            {"intrinsics": VALUES[:5]},
+            "LENSMODEL_OPENCV4: must have 8 values, got 5",
+        ),
+        ({"imagersize": None}, str(phrase("targets.mrcal-no-model", reason=""))),
     ],
 )
 def test_lenses_that_are_not_taken_are_named(tmp_path, changes, message):

@@ -7,6 +7,7 @@ import pytest
 from given_targets import rig_small
 from typer.testing import CliRunner
 
+from described import refusal
 from golden_data import shared
 from photogram import InputError
 from photogram.cli import app
@@ -34,7 +35,7 @@ def test_a_camera_whose_corners_are_worse_is_found(twice_as_bad):
 
 
 def test_what_is_no_group(twice_as_bad):
-    with pytest.raises(InputError, match="groups by level go with those by camera, not by photo"):
+    with refusal("targets.levels others=['photo']"):
         corner_components(twice_as_bad, ["photo", "level"])
     with pytest.raises(InputError, match="is one of kind, camera, level"):
         corner_components(twice_as_bad, ["strip"])

@@ -5,7 +5,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
-from photogram import InputError
+from described import refusal
 from photogram.targets import cross_validate
 from photogram.targets.cross_validation import changes_between, cross_map, parts_agree, splits
 
@@ -71,9 +71,9 @@ def test_folds_and_what_is_refused():
     found = cross_validate(adjusted_rig(), 4)
     assert len(found.tests) == 4
     assert 0.5 < found.factor < 1.6
-    with pytest.raises(InputError, match="too few for cross-validation by 15"):
+    with refusal("targets.few-views views=20 into=15 least=3"):
         cross_validate(adjusted_rig(), 15)
-    with pytest.raises(InputError, match="2 parts or more"):
+    with refusal("error.at what=into message=error.least low=2 value=1"):
         cross_validate(adjusted_rig(), 1)
 
 

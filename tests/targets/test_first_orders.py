@@ -5,21 +5,21 @@ import pytest
 from golden_boards import packaged, rig
 from relisted import relisted
 
+from described import described, refusal
 from photogram import InputError
 from photogram.targets import Board, first_values
 from photogram.targets.sightings import CORNER_ORDERS, Listings
 
 
 def remarks(first):
-    return [str(each) for each in first.remarks]
+    return [described(each) for each in first.remarks]
 
 
 def test_corners_that_stand_column_by_column_are_named_and_numbered_anew():
     board, corners = packaged()
     first = first_values(board, relisted(board, corners, {0: 5, 4: 5}))
-    assert any(
-        "middle01, middle05 were listed in another order: column by column" in each for each in remarks(first)
-    )
+    (remark,) = [each for each in remarks(first) if each.startswith("targets.other-order")]
+    assert "['middle01', 'middle05'] order=column by column" in remark
     others = ~np.isin(corners.picture, [0, 4])
     assert (first.corners.point[others] == corners.point[others]).all()
     turned = 53 - first.corners.point[~others]
@@ -38,7 +38,7 @@ def test_mirrored_corners_are_named_with_their_wrong_order():
 def test_a_board_whose_columns_are_its_rows_is_told():
     _, corners = packaged()
     first = first_values(Board(columns=6, rows=9, spacing=0.03), corners)
-    assert any("are its columns its rows?" in each for each in remarks(first))
+    assert "targets.all-orders" in remarks(first)
     assert first.cameras[0].scale == pytest.approx(1312, abs=5)
 
 
@@ -48,7 +48,7 @@ def test_corners_that_are_no_board_are_named_and_do_no_harm():
     own = np.isin(corners.picture, [1, 4])
     xy[own] = np.random.default_rng(3).uniform(0, 480, (int(own.sum()), 2))
     first = first_values(board, corners.replace(xy=xy))
-    assert any("middle02, middle05 fit the board more than 5 times worse" in each for each in remarks(first))
+    assert "targets.odd-orders names=['middle02', 'middle05'] factor=5.0" in remarks(first)
     assert first.cameras[0].scale == pytest.approx(1312, abs=13)
 
 
@@ -71,7 +71,7 @@ def test_few_pictures_are_enough_to_begin_with(count):
 def test_cameras_without_a_view_in_common_are_named_and_have_references_of_their_own():
     board, corners = rig()
     apart = first_values(board, corners.of_pictures(corners.cameras == corners.views % 2))
-    assert any("camera b has no view in common" in each for each in remarks(apart))
+    assert "targets.alone camera=b" in remarks(apart)
     assert apart.references.tolist() == [0, 1]
     assert np.isfinite(apart.poses).all()
     np.testing.assert_array_equal(apart.sensors[1], np.eye(4))
@@ -79,16 +79,15 @@ def test_cameras_without_a_view_in_common_are_named_and_have_references_of_their
 
 def test_frontal_views_are_named():
     board, corners = rig()
-    assert any(
-        "parallel to the image within 3 degrees" in each for each in remarks(first_values(board, corners))
-    )
+    found = remarks(first_values(board, corners))
+    assert any(each.startswith("targets.frontal") for each in found)
 
 
 def test_what_cannot_be_is_refused_by_name():
     board, corners = packaged()
-    with pytest.raises(InputError, match="corner 40 of middle01: the board has 40 points"):
+    with refusal("targets.corner-beyond corner=corner 40 of middle01 count=40"):
         first_values(Board(columns=8, rows=5, spacing=0.03), corners)
-    with pytest.raises(InputError, match="there is no lens 'opencv_pinhol'; did you mean opencv_pinhole"):
+    with refusal("error.unknown.close kind=lens model name=opencv_pinhol"):
         first_values(board, corners, "opencv_pinhol")
     with pytest.raises(InputError, match="brown has no focal length and principal point in pixels"):
         first_values(board, corners, "brown")

@@ -5,7 +5,7 @@ import pytest
 from golden_calibrations import adjusted_rig, rig_small
 
 from photogram.targets import cross_validate
-from photogram.targets.housings import housing_of
+from photogram.targets.housing import housing_of
 from photogram.targets.vision import sensor_steps
 
 

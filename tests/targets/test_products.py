@@ -9,8 +9,9 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
+from described import refusal
 from golden_data import shared
-from photogram import Camera, InputError, variance_components
+from photogram import Camera, variance_components
 from photogram.targets import (
     difference,
     distance_uncertainty,
@@ -23,7 +24,7 @@ from photogram.targets import (
     uncertainty_map,
 )
 from photogram.targets.drawing import steps_of_125
-from photogram.targets.housings import housing_of
+from photogram.targets.housing import housing_of
 from photogram.targets.projection import datum_rows
 from photogram.targets.suggestions import candidate_views
 from photogram.targets.vision import imaged, rays
@@ -146,18 +147,33 @@ def test_views_to_take_next(calibrated):
 
 def test_what_is_refused(calibrated):
     for refused, words in (
-        (lambda: projection_uncertainty(calibrated, 2, PIXELS), "has the cameras left, right"),
-        (lambda: projection_uncertainty(calibrated, "up", PIXELS), "has the cameras left, right"),
-        (lambda: projection_uncertainty(calibrated, 0, PIXELS, -1.0), "is positive"),
+        (
+            lambda: projection_uncertainty(calibrated, 2, PIXELS),
+            "error.unknown kind=camera name=2 names=['left', 'right']",
+        ),
+        (
+            lambda: projection_uncertainty(calibrated, "up", PIXELS),
+            "error.unknown kind=camera name=up names=['left', 'right']",
+        ),
+        (
+            lambda: projection_uncertainty(calibrated, 0, PIXELS, -1.0),
+            "error.at what=distance message=error.positive value=-1.0",
+        ),
         (lambda: projection_uncertainty(calibrated, 0, PIXELS, datum="board"), "datum"),
-        (lambda: projection_uncertainty(calibrated, 0, [1.0, 2.0]), "pixels has the shape"),
-        (lambda: triangulate(calibrated, (0, 0), [PIXELS], 0.3), "each of them once"),
-        (lambda: triangulate(calibrated, (0, 1), [PIXELS], 0.0), "positive number"),
-        (lambda: difference(Camera("pinhole", {"fx": 1, "fy": 1, "cx": 0, "cy": 0}), calibrated), "its size"),
+        (lambda: projection_uncertainty(calibrated, 0, [1.0, 2.0]), "pixels"),
+        (lambda: triangulate(calibrated, (0, 0), [PIXELS], 0.3), "targets.two-cameras-once"),
+        (
+            lambda: triangulate(calibrated, (0, 1), [PIXELS], 0.0),
+            "error.at what=pixel_sd message=error.positive value=0.0",
+        ),
+        (
+            lambda: difference(Camera("pinhole", {"fx": 1, "fy": 1, "cx": 0, "cy": 0}), calibrated),
+            "error.at what=size message=error.empty",
+        ),
         (lambda: difference(calibrated, 3), "b"),
-        (lambda: difference(calibrated, calibrated, []), "none is given"),
+        (lambda: difference(calibrated, calibrated, []), "error.at what=distance message=error.empty"),
     ):
-        with pytest.raises(InputError, match=words):
+        with refusal(words):
             refused()
 
 

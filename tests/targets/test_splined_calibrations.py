@@ -8,6 +8,7 @@ import pytest
 from given_targets import golden
 from test_splined_adjustment import lens
 
+from described import refusal
 from golden_data import shared
 from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
@@ -137,7 +138,7 @@ def test_mrcal_reads_what_is_written(tmp_path):
 
 
 def test_standard_deviations_of_knots_are_said_once():
-    with pytest.raises(InputError, match="of its own"):
+    with refusal("error.exclusive first=knot_sd second=regularise"):
         with_knot_sd(given().cameras, (1.0, 0.1), "mrcal")
     with pytest.raises(InputError, match="two positive numbers"):
         with_knot_sd(given().cameras, (0.0, 0.1), None)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import InputError
+from described import refusal
 from photogram.cli import app
 from photogram.targets import (
     Board,
@@ -116,23 +116,23 @@ def test_nominal_cameras():
     camera = nominal_camera((1600, 1200), focal=2000.0)
     assert (camera.parameters["fx"], camera.parameters["cx"]) == pytest.approx((2000, 799.5))
     for wrong, said in (
-        ({}, "one of both"),
-        ({"field": 60, "focal": 1.0}, "one of both"),
-        ({"field": 400}, "degrees up to 360"),
-        ({"focal": -1.0}, "positive number of pixels"),
+        ({}, "targets.nominal"),
+        ({"field": 60, "focal": 1.0}, "targets.nominal"),
+        ({"field": 400}, "error.at what=field message=error.range low=0 high=360 value=400.0"),
+        ({"focal": -1.0}, "error.at what=focal message=error.positive value=-1.0"),
     ):
-        with pytest.raises(InputError, match=said):
+        with refusal(said):
             nominal_camera(SIZE, **wrong)
 
 
 def test_what_cannot_be_planned():
     camera = nominal_camera(SIZE, field=60)
     for wrong, said in (
-        ({"views": 3}, "4 views or more"),
-        ({"away": [0.05]}, "fewer than 12 points"),
-        ({"away": [-1.0]}, "a distance from the camera is positive"),
+        ({"views": 3}, "error.at what=views message=error.least low=4 value=3"),
+        ({"away": [0.05]}, "targets.not-shown name=middle of the picture, 0.05 m, tilted 30 degrees"),
+        ({"away": [-1.0]}, "error.at what=distance message=error.positive value=-1.0"),
     ):
-        with pytest.raises(InputError, match=said):
+        with refusal(said):
             plan_views(camera, BOARD, SIZE, **wrong)
 
 
@@ -153,10 +153,10 @@ def test_it_is_an_option_of_the_command(tmp_path):
     names = {each.name for each in (tmp_path / "plan").iterdir()}
     assert {"report.html", "report.txt", "views.csv", "map-camera-infinity.npz"} <= names
     for words, said in (
-        (["corners", "--plan", 5], "give PATH, or --example, or --plan"),
-        (["--plan", 5, *board], "needs --size, and --field or --focal"),
-        (["--plan", 5, "--size", "800x600", "--field", 60], "needs --board"),
-        (["--plan", 5, *board, "--field", 60, "--snoop"], "goes without --plan"),
-        (["--example", "--field", 60], "go with --plan"),
+        (["corners", "--plan", 5], "specify one of PATH, --example, --plan"),
+        (["--plan", 5, *board], "requires --size, and --field or --focal"),
+        (["--plan", 5, "--size", "800x600", "--field", 60], "requires --board"),
+        (["--plan", 5, *board, "--field", 60, "--snoop"], "cannot be combined with --plan"),
+        (["--example", "--field", 60], "requires --plan"),
     ):
         assert said in " ".join(run(*words).output.replace("│", " ").split()), words

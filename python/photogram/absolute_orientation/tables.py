@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.results.iteration_text import iteration_table
+from photogram.results.network_tables import iteration_table
 from photogram.show.quantity import Axis, Quantity, Table, attribute, chosen
 from photogram.statistics.reliability import TESTABLE
 

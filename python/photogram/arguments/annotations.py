@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import is_masked, number, one_of, shown, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.words import phrase
 
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
@@ -206,7 +207,7 @@ def _several(hint: Any) -> Check | None:
 
 
 def _name(name: str, value: Any) -> Any:
-    """Refuse what cannot be a name: text that is none, and what is neither text nor number."""
+    """Reject what cannot be a name: text that is none, and what is neither text nor number."""
     if isinstance(value, str):
         return _text(name, value)
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
@@ -249,13 +250,13 @@ def _text(name: str, value: Any) -> str:
 
 
 def _array(name: str, value: Any) -> Any:
-    """Refuse what is no array of real numbers, and arrays with masked ones."""
+    """Reject what is no array of real numbers, and arrays with masked ones."""
     if value is None:
         raise _refused(name, value, "an array of numbers")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
+        raise InputError(phrase("argument.array", name=name, of="numbers", reason=str(error))) from None
     if array.dtype.kind == "O":
         try:
             value = array = array.astype(float)
@@ -264,7 +265,7 @@ def _array(name: str, value: Any) -> Any:
     if array.dtype.kind not in "biuf":
         raise _refused(name, value, "an array of numbers")
     if is_masked(value):
-        raise InputError(f"{name} has masked values")
+        raise InputError(phrase("argument.masked", name=name))
     return value
 
 
@@ -293,4 +294,4 @@ def _numpy(kind: type[np.generic]) -> Check:
 
 
 def _refused(name: str, value: object, what: str) -> InputError:
-    return InputError(f"{name} is {shown(value)}, not {what}")
+    return InputError(phrase("argument.other", name=name, what=what, value=shown(value)))

@@ -41,7 +41,7 @@ def shaped(
     if array.ndim == 0:
         array = np.broadcast_to(array, shape)
     if array.shape != shape:
-        raise InputError(f"{name} has the shape {array.shape}, not {shape}")
+        raise InputError(phrase("argument.shape", name=name, shape=str(shape), actual=str(array.shape)))
     return frozen(array)
 
 
@@ -52,19 +52,23 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     if kind == "O":
         bad = next((each for each in array.flat if not _is_real(each)), None)
         if bad is not None:
-            raise InputError(f"{name} is not an array of numbers: {shown(bad)} is none")
+            raise _no_array(name, "numbers", phrase("argument.element", value=shown(bad)))
     elif kind not in "fiu":
-        raise InputError(f"{name} is not an array of numbers: its type is {array.dtype}")
+        raise _no_array(name, "numbers", phrase("argument.type", type=str(array.dtype)))
     try:
         with np.errstate(over="ignore"):  # infinite then, which is for the caller to judge
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} is not an array of numbers: {error}") from None
+        raise _no_array(name, "numbers", str(error)) from None
     if is_masked(value):
         if not missing:
-            raise InputError(f"{name} has masked values")
+            raise InputError(phrase("argument.masked", name=name))
         found = np.where(np.ma.getmaskarray(np.ma.asarray(value)), math.nan, found)
     return found
+
+
+def _no_array(name: str, of: str, reason: str | Phrase) -> InputError:
+    return InputError(phrase("argument.array", name=name, of=of, reason=reason))
 
 
 def _is_real(value: object) -> bool:
@@ -88,11 +92,11 @@ def is_masked(value: object) -> bool:
 def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
     """Return what NumPy makes of an argument, whatever its type."""
     if value is None:
-        raise InputError(f"{name} is not an array of {of}: it is None")
+        raise _no_array(name, of, "it is None")
     try:
         return np.asarray(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} is not an array of {of}: {error}") from None
+        raise _no_array(name, of, str(error)) from None
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
@@ -128,7 +132,7 @@ def length(name: str, value: ArrayLike) -> int:
     """Return the number of rows of an array; a single value has none."""
     array = _plain(name, value, "values")
     if array.ndim == 0:
-        raise InputError(f"{name} is not an array: {shown(value)}")
+        raise refused(name, value, "an array")
     return len(array)
 
 
@@ -136,12 +140,14 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
     """Return an array of `length` whole numbers from 0 to `count` - 1, which cannot be written."""
     array = _plain(name, value, f"{length} whole numbers")
     if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
-        raise InputError(f"{name} is not an array of {length} whole numbers")
+        raise InputError(phrase("argument.indices", name=name, length=length))
     if is_masked(value):
-        raise InputError(f"{name} has masked values")
+        raise InputError(phrase("argument.masked", name=name))
     bad = np.flatnonzero((array < 0) | (array >= count))
     if bad.size:
-        raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}, outside 0 to {count - 1}")
+        row = int(bad[0])
+        fields = {"name": f"{name}[{row}]", "value": int(array[row]), "most": count - 1}
+        raise InputError(phrase("argument.index", **fields))
     return frozen(array.astype(np.int64, copy=False))
 
 
@@ -153,14 +159,14 @@ def names(name: str, values: Iterable[object]) -> list[str]:
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
-        raise InputError(f"{name} is not a list of names: {shown(values)}")
+        raise refused(name, values, "a list of names")
     found: list[Any] = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if {str} != set(map(type, found)):
         found = [_name(name, row, value) for row, value in enumerate(found)]
     if not ("".join(found).isprintable() and all(map(str.strip, found))):
         for row, each in enumerate(found):
             if not each.strip():
-                raise InputError(f"{name}[{row}] is an empty name")
+                raise InputError(phrase("argument.empty-name", name=f"{name}[{row}]"))
             text(f"{name}[{row}]", each)
     return found
 
@@ -169,16 +175,16 @@ def _name(name: str, row: int, value: object) -> str:
     if isinstance(value, str) or (isinstance(value, Integral) and not isinstance(value, bool)):
         return str(value)
     if value is None or (isinstance(value, Real) and value != value):
-        raise InputError(f"{name}[{row}] has no name: {shown(value)}")
-    raise InputError(f"{name}[{row}] is not a name: {shown(value)} is neither a string nor a whole number")
+        raise InputError(phrase("argument.no-name", name=f"{name}[{row}]", value=shown(value)))
+    raise InputError(phrase("argument.name", name=f"{name}[{row}]", value=shown(value)))
 
 
 def text(name: str, value: object) -> str:
     """Return a line of text: all of its characters print; line ends and halves of surrogate pairs do not."""
     if not isinstance(value, str):
-        raise InputError(f"{name} is not a string: {shown(value)}")
+        raise refused(name, value, "a string")
     if not value.isprintable():
-        raise InputError(f"{name} has characters that do not print: {shown(value)}")
+        raise InputError(phrase("argument.unprintable", name=name, value=shown(value)))
     return value
 
 
@@ -191,27 +197,32 @@ def number(name: str, value: object) -> float:
             return float(value)  # type: ignore[arg-type]
         except OverflowError:
             pass
-    raise InputError(f"{name} is not a number: {shown(value)}")
+    raise refused(name, value, "a number")
 
 
 def whole_number(name: str, value: object) -> int:
     """Return a whole number of 64 bits."""
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
-        raise InputError(f"{name} is not a whole number of 64 bits: {shown(value)}")
+        raise refused(name, value, "a whole number of 64 bits")
     return int(value)
 
 
 def truth_value(name: str, value: object) -> bool:
     """Return True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} is True or False, not {shown(value)}")
+        raise InputError(phrase("argument.flag", name=name, value=shown(value)))
     return bool(value)
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
-    """Refuse what is not one of some words."""
+    """Reject what is not one of some words."""
     if not (isinstance(value, str) and value in choices):
-        raise InputError(f"{name} is one of {', '.join(choices)}, not {shown(value)}")
+        raise InputError(phrase("argument.choice", name=name, names=list(choices), value=shown(value)))
+
+
+def refused(name: str, value: object, what: str) -> InputError:
+    """Return the error of an argument that is of another kind."""
+    return InputError(phrase("argument.kind", name=name, what=what, value=shown(value)))
 
 
 def value_field(value: object) -> str | float | Phrase:

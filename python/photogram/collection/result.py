@@ -99,10 +99,6 @@ class AdjustedCollection(AdjustedNetwork):
         return collection_members(self)
 
     @property
-    def _what(self) -> str:
-        return "collection"
-
-    @property
     def given(self) -> Collection:
         """What was adjusted: the collection."""
         return self.collection

@@ -13,12 +13,13 @@ from photogram.comparator.csvfile import Table
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
 from photogram.io.rows import cells
-from photogram.messages import Message, counted
+from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
 CORRECTED = ("corrected_x_um", "corrected_y_um", "sd_x_um", "sd_y_um", "in_range")
 READINGS = ("reading_x_um", "reading_y_um", "in_range")
-EDGE = 1.25  # In half ranges from the middle: nearer than this polynomials extrapolate with a remark
-ROUNDING = 1e-6  # Of places on the edge, in half ranges
+EDGE = 1.25  # limit of extrapolation with a remark, in half ranges from the middle
+ROUNDING = 1e-6  # of places on the edge, in half ranges
 
 
 def correct_table(
@@ -26,20 +27,19 @@ def correct_table(
 ) -> tuple[bytes, list[Message]]:
     """Return a table with corrected coordinates and their standard deviations added, and remarks.
 
-    The standard deviations are what the calibration contributes; those of the readings come on top. The
-    column `in_range` says whether the calibration measured there. With `invert` coordinates are corrected
-    ones, and readings are added; `extrapolate` corrects points far outside the calibrated range, too.
+    The standard deviations are those of the correction, without those of the readings. The column `in_range`
+    is yes inside the calibrated range. With `invert` readings are computed from corrected coordinates.
     """
     places = []
     for row in table.records.rows():
         xy = table.coordinates_um(row)
         if xy is None:
-            raise row.place.error("the coordinates are blank")
-        if max(map(abs, xy)) > LARGEST_UM:
-            raise row.place.error(f"a coordinate is beyond every comparator ({LARGEST_UM:g} um)")
+            raise row.place.error(_of_coordinates(phrase("error.empty")))
+        if (largest := max(map(abs, xy))) > LARGEST_UM:
+            raise row.place.error(_of_coordinates(phrase("error.most", value=largest, high=LARGEST_UM)))
         places.append(xy)
     if not places:
-        raise InputError("holds no measurements", file=table.path)
+        raise InputError(phrase("error.empty-file", content="measurements"), file=table.records.path)
     xy_um = np.array(places)
     if invert:
         columns: tuple[str, ...] = READINGS
@@ -52,36 +52,37 @@ def correct_table(
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
     if not np.isfinite(values).all():
         place = table.records.records[int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])]
-        raise place.error("the correction gives no finite coordinates here")
+        raise place.error(phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
-    there = ["" if np.isnan(own) else "yes" if own <= 1 + ROUNDING else "no" for own in reach.tolist()]
+    in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow([*table.columns, *columns])
-    for place, own, within in zip(table.records.records, values.tolist(), there, strict=True):
-        writer.writerow([*cells(place, table.records.delimiter), *(f"{value:.4f}" for value in own), within])
+    writer.writerow([*table.records.columns, *columns])
+    for place, numbers, within in zip(table.records.records, values.tolist(), in_range, strict=True):
+        texts = [f"{number:.4f}" for number in numbers]
+        writer.writerow([*cells(place, table.records.delimiter), *texts, within])
     return buffer.getvalue().encode(), remarks
+
+
+def _of_coordinates(message: Phrase) -> Phrase:
+    return phrase("error.at", what="x, y", message=message)
 
 
 def _outside(
     correction: Correction, table: Table, readings: Floats, reach: Floats, *, extrapolate: bool
 ) -> list[Message]:
-    """Remark on places that were not calibrated; refuse those far away."""
+    """Return a remark on places outside the calibrated range; refuse those far outside."""
     if np.isnan(reach).all():
-        return [Message("the correction does not say where it was calibrated: no range is checked")]
-    outside = reach > 1 + ROUNDING
-    if not outside.any():
+        return [Message(phrase("comparators.unknown-range"))]
+    outside = int((reach > 1 + ROUNDING).sum())
+    if not outside:
         return []
     worst = int(reach.argmax())
     x, y = readings[worst].tolist()
-    identity = correction.identity
-    where = f" ({identity.range_text})" if identity else ""
-    text = (
-        f"{counted(int(outside.sum()), 'point')} of {len(reach)} outside the calibrated range{where}, the"
-        f" furthest here: {x:.0f}, {y:.0f} um is {reach[worst]:.3g} half ranges from its middle"
-    )
-    place = table.records.records[worst]
+    identity, place = correction.identity, table.records.records[worst]
+    farthest = {"x": x, "y": y, "reach": float(reach[worst])}
+    farthest["range"] = f" ({identity.range_text})" if identity else ""
     if reach[worst] > EDGE and not extrapolate:
-        raise place.error(f"{text}; --extrapolate corrects them nevertheless")
-    return [place.message(f"{text}: the correction extrapolates")]
+        raise place.error(phrase("comparators.far-outside", limit=EDGE, **farthest))
+    return [place.message(phrase("comparators.outside", n=outside, count=len(reach), **farthest))]

@@ -66,15 +66,7 @@ class PlateAverages:
 def average_residuals(
     grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
 ) -> PlateAverages:
-    """Average the residuals of all cases of one plate.
-
-    Parameters
-    ----------
-    grid
-        The plate.
-    cases, residuals
-        Its cases, and the residuals of one stage of the adjustment.
-    """
+    """Average the residuals of one stage of the adjustment over all cases of a plate."""
     left_handed = cases[0].orientation.left_handed
     rows = [grid.rows_of(case.points) for case in cases]
     values = [
@@ -126,23 +118,15 @@ def _by_location(
             places = np.full((len(grid.points), 2), np.nan)
             places[rows[k]] = own.xy_um
             together.append(([k], places))
-    return tuple(_averaged(grid, members, cases, rows, residuals) for members, _ in together)
-
-
-def _averaged(
-    grid: Grid,
-    members: list[int],
-    cases: Sequence[PlacedCase],
-    rows: Sequence[Indices],
-    residuals: Sequence[Residuals],
-) -> LocationAverages:
-    own = np.concatenate([rows[k] for k in members])
-    places = _means(own, np.vstack([residuals[k].xy_um for k in members]), len(grid.points))
-    values = _means(own, np.vstack([residuals[k].comparator_um for k in members]), len(grid.points))
-    measured = np.isfinite(values[:, 0])
-    return LocationAverages(
-        tuple(cases[k].number for k in members), grid.points[measured], places[measured], values[measured]
-    )
+    averages = []
+    for members, _ in together:
+        at = np.concatenate([rows[k] for k in members])
+        places = _means(at, np.vstack([residuals[k].xy_um for k in members]), len(grid.points))
+        values = _means(at, np.vstack([residuals[k].comparator_um for k in members]), len(grid.points))
+        measured = np.isfinite(values[:, 0])
+        averaged = tuple(cases[k].number for k in members)
+        averages.append(LocationAverages(averaged, grid.points[measured], places[measured], values[measured]))
+    return tuple(averages)
 
 
 def _means(rows: Indices, values: Floats, count: int) -> Floats:
@@ -171,11 +155,7 @@ class ListedGridSigma:
 
 
 def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
-    """Compute the figures of the listing.
-
-    They divide by 2 N - 1, and pass over what the fitted parameters take: the grid sigma of 25 points comes
-    out 5 percent small.
-    """
+    """Compute the figures of the listing."""
     points, cases = len(averages.points), len(averages.cases)
     squares = (averages.grid_um**2).sum(axis=0)
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))
@@ -211,78 +191,55 @@ def text_grid_sigma(averages: PlateAverages) -> float:
     return math.sqrt(max(0.0, variance))
 
 
-def unbiased_grid_sigma(
-    grid_rows: Sequence[Indices],
-    cases: Sequence[PlacedCase],
-    stage: CombinedLinear | CombinedPolynomial,
-) -> tuple[dict[int, float], float]:
-    """Compute grid and random standard deviations whose squares are unbiased.
+class GridSigma:
+    """Grid and random standard deviations of a stage whose squares are unbiased.
 
     The adjustment is linear in the errors to first order: residuals are W times (grid errors turned into the
     comparator + random errors). The expectations of two sums of squares, of the average residuals and of all
-    residuals, follow from W and are linear in the variances; they are equated with what was found. Rigid,
-    linear and polynomial parameters are thus accounted for, whatever placements and points there are. No
-    matrix of the size of the readings is formed: see :mod:`photogram.comparator.reduction`. `grid_rows` are
-    for each case the rows of its points on its plate.
-
-    Returns the standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where
-    the cases do not separate them, 0 where the estimate of a variance is negative.
+    residuals, follow from W and are linear in the variances; they are equated with the sums. Rigid, linear
+    and polynomial parameters are thus taken into account for any placements and points. No matrix of the size
+    of the readings is formed: see :mod:`photogram.comparator.reduction`.
     """
-    reduction, errors = _effects(grid_rows, cases, stage)
-    plates = list(errors)
-    residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
-    forms = np.empty((len(plates) + 1, len(plates) + 1))
-    found = np.empty(len(plates) + 1)
-    for row, plate in enumerate(plates):
-        own = errors[plate]
-        forms[row, :-1] = [reduction.averages_of_errors(own, errors[other]) for other in plates]
-        forms[row, -1] = reduction.averages_of_units(own)
-        found[row] = float((own.average(residuals) ** 2).sum())
-    forms[-1, :-1] = [reduction.squares_of_errors(errors[plate]) for plate in plates]
-    forms[-1, -1] = reduction.squares_of_units()
-    found[-1] = float((residuals**2).sum())
-    if np.linalg.cond(forms / forms.max(axis=1, keepdims=True)) > 1e8:
-        return dict.fromkeys(plates, math.nan), math.nan
-    variances = np.linalg.solve(forms, found)
-    sigmas = [math.sqrt(max(0.0, float(variance))) for variance in variances]
-    return dict(zip(plates, sigmas, strict=False)), sigmas[-1]
 
+    def __init__(
+        self,
+        grids: Mapping[int, Grid],
+        cases: Sequence[PlacedCase],
+        stage: CombinedLinear | CombinedPolynomial,
+    ) -> None:
+        rows = [grids[case.case.plate].rows_of(case.points) for case in cases]
+        plates = dict.fromkeys(case.case.plate for case in cases)
+        self.reduction = reduction = Reduction.of(stage)
+        self.errors = {plate: GridErrors.of(plate, rows, cases, stage) for plate in plates}
+        residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
+        forms, squares = np.empty((len(plates) + 1, len(plates) + 1)), np.empty(len(plates) + 1)
+        for row, errors in enumerate(self.errors.values()):
+            forms[row, :-1] = [reduction.averages_of_errors(errors, each) for each in self.errors.values()]
+            forms[row, -1] = reduction.averages_of_units(errors)
+            squares[row] = float((errors.average(residuals) ** 2).sum())
+        forms[-1, :-1] = [reduction.squares_of_errors(errors) for errors in self.errors.values()]
+        forms[-1, -1] = reduction.squares_of_units()
+        squares[-1] = float((residuals**2).sum())
+        sigmas = np.full(len(squares), math.nan)
+        if np.linalg.cond(forms / forms.max(axis=1, keepdims=True)) <= 1e8:
+            sigmas = np.sqrt(np.maximum(np.linalg.solve(forms, squares), 0.0))
+        # Of a grid coordinate of each plate, and of a measured coordinate, micrometres; NaN if the cases do
+        # not separate them, 0 if the estimate of a variance is negative
+        self.by_plate = dict(zip(plates, sigmas.tolist(), strict=False))
+        self.random = float(sigmas[-1])
 
-def corrected_grid_sigma(
-    grid_rows: Sequence[Indices],
-    cases: Sequence[PlacedCase],
-    stage: CombinedLinear | CombinedPolynomial,
-    known_um: Mapping[int, float | None],
-) -> dict[int, float]:
-    """Compute the standard deviation of grid coordinates that average residuals have corrected.
+    def corrected(self, plate: int, known_um: Mapping[int, float | None]) -> float:
+        """Return the standard deviation of coordinates of a plate that average residuals have corrected.
 
-    Averages take over a part of the errors of the comparator, and do not show what looks alike in the grid
-    and in the comparator: with few cases corrected coordinates may be worse than good given ones. Where
-    deviations of given coordinates are not known those computed hold. Returns the root mean square over the
-    coordinates of each plate, micrometres; NaN where it cannot be known.
-    """
-    computed, random = unbiased_grid_sigma(grid_rows, cases, stage)
-    reduction, errors = _effects(grid_rows, cases, stage)
-    given = {plate: computed[plate] if known_um[plate] is None else known_um[plate] for plate in errors}
-    return {
-        plate: math.sqrt(
-            (
-                random**2 * reduction.averages_of_units(own)
-                + sum(
-                    (given[other] or 0.0) ** 2
-                    * reduction.averages_of_errors(own, errors[other], lost=other == plate)
-                    for other in errors
-                )
-            )
-            / (2 * len(own.counts))
-        )
-        for plate, own in errors.items()
-    }
-
-
-def _effects(
-    grid_rows: Sequence[Indices], cases: Sequence[PlacedCase], stage: CombinedLinear | CombinedPolynomial
-) -> tuple[Reduction, dict[int, GridErrors]]:
-    """Return what the adjustment leaves of errors, and how those of each plate come in."""
-    plates = dict.fromkeys(case.case.plate for case in cases)
-    return Reduction.of(stage), {plate: GridErrors.of(plate, grid_rows, cases, stage) for plate in plates}
+        Averages contain a part of the errors of the comparator, and do not show errors that are equal in grid
+        and comparator: with few cases corrected coordinates may be worse than good given ones. `known_um` are
+        the standard deviations of given coordinates; None: those computed. The root mean square over the
+        coordinates, micrometres; NaN if it cannot be determined.
+        """
+        errors = self.errors[plate]
+        squares = self.random**2 * self.reduction.averages_of_units(errors)
+        for other, of_other in self.errors.items():
+            sigma = self.by_plate[other] if known_um[other] is None else known_um[other] or 0.0
+            lost = self.reduction.averages_of_errors(errors, of_other, lost=other == plate)
+            squares += sigma**2 * lost
+        return math.sqrt(squares / (2 * len(errors.counts)))

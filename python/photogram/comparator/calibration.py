@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from photogram.comparator.averages import (
+    GridSigma,
     ListedGridSigma,
     PlateAverages,
     average_residuals,
     listed_grid_sigma,
     text_grid_sigma,
-    unbiased_grid_sigma,
 )
-from photogram.comparator.case import PlacedCase, place_case
-from photogram.comparator.closeout import Closeout, close_out
+from photogram.comparator.case import Closeout, PlacedCase, close_out, place_case
 from photogram.comparator.combined_solution import (
     CombinedLinear,
     CombinedPolynomial,
@@ -25,8 +24,9 @@ from photogram.comparator.combined_solution import (
     combine_polynomial,
     single_polynomial,
 )
-from photogram.comparator.correction import Correction, Identity
+from photogram.comparator.correction import Correction, Identity, parameters_of
 from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_affine, fit_rigid
+from photogram.comparator.grid import Grid, with_corrections
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
 from photogram.comparator.outliers import (
@@ -40,7 +40,7 @@ from photogram.comparator.outliers import (
     screen,
 )
 from photogram.comparator.pointing import Precision, pool_points
-from photogram.comparator.readings import Session
+from photogram.comparator.readings import Case, Session
 from photogram.comparator.variance import (
     CaseVarianceTest,
     PolynomialTest,
@@ -57,6 +57,7 @@ from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings
+from photogram.words import phrase
 
 # Bytes that any calibration takes, and what each pointing adds, with listing and document
 BASE, PER_POINTING = 64 << 20, 3500
@@ -220,7 +221,7 @@ class Calibration(Documented, Judged, Brief):
         return calibration_document(self)
 
     def _findings(self) -> Findings:
-        from photogram.comparator.findings import comparator_findings
+        from photogram.comparator.document import comparator_findings
 
         return comparator_findings(self)
 
@@ -235,7 +236,7 @@ def _chosen_sigma(result: PlateResult, options: Options) -> float:
 
 
 def needed_memory(pointings: int) -> int:
-    """Return the bytes that a calibration of so many pointings takes at the most, with some to spare."""
+    """Return the largest number of bytes that a calibration of so many pointings needs."""
     return BASE + PER_POINTING * pointings
 
 
@@ -264,7 +265,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     pointings = sum(len(case.points) for case in session.cases)
     require(needed_memory(pointings), f"a calibration of {pointings} pointings")
     messages = list(session.messages)
-    cases = [_case(session, index, options, messages) for index in range(len(session.cases))]
+    cases = [_case(case, session.grids[case.plate], options, messages) for case in session.cases]
     _check_handedness(session, cases)
     placed = [case.placed for case in cases]
     listed = options.free_residuals == "report"
@@ -274,12 +275,18 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         try:
             nonlinear = combine_polynomial(placed, linear, as_listed=listed)
         except AdjustmentError as error:
-            messages.append(Message(f"no polynomials: {error}"))
+            what = phrase("comparators.combined")
+            messages.append(Message(phrase("comparators.no-polynomials", what=what, reason=error.phrase)))
     pointing = _pointing(cases, options)
     averages = _averages(session, cases, linear, nonlinear)
-    variance = _variance(session, cases, pointing, linear, nonlinear, averages, options, messages)
+    grid_um = _grid_sigma(session, averages["nonlinear" if nonlinear else "linear"], options)
+    free, truncated = [case.free for case in cases], options.nanometres == "truncated"
+    variance = analyse_variance(free, linear, nonlinear, pointing.total, grid_um, as_listed=truncated)
+    messages += [Message(phrase("comparators.negative", name=name)) for name in variance.negative]
     messages += plate_remarks(session, placed)
-    joint = _joint(session, placed, linear, pointing, nonlinear is not None, options, messages)
+    joint = None
+    if options.joint:
+        joint = _joint(session, placed, linear, pointing.total, nonlinear is not None, options, messages)
     tests = pointing_tests(session.cases)
     readings = 2 * sum(len(case.points) for case in placed)
     screening = screen(placed, nonlinear or linear, session.grids, sum(each.ratios.size for each in tests))
@@ -294,7 +301,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         averages=averages,
         variance=variance,
         polynomial_tests=polynomial_tests(linear, nonlinear) if nonlinear else None,
-        case_test=_case_test(cases),
+        case_test=compare_case_variances([case.linear.residuals.comparator_um for case in cases]),
         joint=joint,
         joint_check=_joint_check(session, placed, linear) if options.joint else None,
         screening=screening,
@@ -304,56 +311,48 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     )
 
 
-def _case(session: Session, index: int, options: Options, messages: list[Message]) -> CaseResult:
-    """Take one case through the single-case stages."""
-    case = session.cases[index]
+def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> CaseResult:
+    """Adjust one case alone."""
     closeouts, remarks = close_out(case)
-    placed, more = place_case(case, session.grid_of(case), as_listed=options.order == "listing")
+    placed, more = place_case(case, grid, as_listed=options.order == "listing")
     messages += remarks + more
-    free = fit_rigid(
-        placed.points, placed.means_um, placed.grid_um, as_listed=options.free_residuals == "report"
-    )
+    points = placed.points, placed.means_um, placed.grid_um
+    free = fit_rigid(*points, as_listed=options.free_residuals == "report")
+    name, polynomial = phrase("comparators.case", case=case.number), None
     try:
-        linear = fit_affine(placed.points, placed.means_um, placed.grid_um)
+        linear = fit_affine(*points)
     except AdjustmentError as error:
-        raise case.place.error(f"case {case.number}: {error}") from None
-    polynomial = None
+        raise case.place.error(phrase("error.at", what=name, message=error.phrase)) from None
     if options.polynomial:
+        listed = options.case_polynomial_residuals == "listing"
         try:
-            polynomial = single_polynomial(
-                placed, linear, as_listed=options.case_polynomial_residuals == "listing"
-            )
+            polynomial = single_polynomial(placed, linear, as_listed=listed)
         except AdjustmentError as error:
-            messages.append(Message(f"case {case.number}: no polynomials of its own: {error}"))
+            messages.append(Message(phrase("comparators.no-polynomials", what=name, reason=error.phrase)))
     return CaseResult(placed, closeouts, free, linear, polynomial)
 
 
 def _check_handedness(session: Session, cases: Sequence[CaseResult]) -> None:
-    """Refuse a handedness that no case shares; where only some differ, the plate was turned over."""
-    if session.left_handed is None:
+    """Refuse a handedness that no case has; if only some cases differ, the plate was turned over."""
+    hands, specified = ("right", "left"), session.left_handed
+    if specified is None or any(case.placed.orientation.left_handed == specified for case in cases):
         return
-    if all(case.placed.orientation.left_handed != session.left_handed for case in cases):
-        hands = ("right", "left")
-        raise cases[0].placed.case.place.error(
-            f"case {cases[0].number} was measured in a {hands[not session.left_handed]}-handed system,"
-            f" but the input says {hands[session.left_handed]}-handed"
-        )
+    fields = {"case": cases[0].number, "measured": hands[not specified], "specified": hands[specified]}
+    raise cases[0].placed.case.place.error(phrase("comparators.hand", **fields))
 
 
 def _pointing(cases: Sequence[CaseResult], options: Options) -> Pointing:
-    listed = options.pointing_dof == "listing"
-    by_operator: dict[int, list[CaseResult]] = {}
-    for case in cases:
-        by_operator.setdefault(case.placed.case.operator, []).append(case)
-    points, total = pool_points([case.placed.readings for case in cases], as_listed=listed)
-    return Pointing(
-        {
-            operator: pool_points([case.placed.readings for case in own], as_listed=listed)
-            for operator, own in by_operator.items()
-        },
-        points,
-        total,
-    )
+    def pooled(some: Iterable[CaseResult]) -> tuple[dict[int, Precision], Precision]:
+        return pool_points(
+            [case.placed.readings for case in some], as_listed=options.pointing_dof == "listing"
+        )
+
+    operators = dict.fromkeys(case.placed.case.operator for case in cases)
+    by_operator = {
+        operator: pooled(case for case in cases if case.placed.case.operator == operator)
+        for operator in operators
+    }
+    return Pointing(by_operator, *pooled(cases))
 
 
 def _averages(
@@ -364,92 +363,51 @@ def _averages(
 ) -> dict[str, dict[int, PlateResult]]:
     """Average the residuals of every stage, plate by plate."""
     stages: dict[str, list[Residuals]] = {"case_linear": [case.linear.residuals for case in cases]}
-    own = [case.polynomial.residuals for case in cases if case.polynomial]
-    if len(own) == len(cases):
-        stages["case_nonlinear"] = own
+    polynomials = [case.polynomial.residuals for case in cases if case.polynomial]
+    if len(polynomials) == len(cases):
+        stages["case_nonlinear"] = polynomials
     combined: dict[str, CombinedLinear | CombinedPolynomial] = {"linear": linear}
     if nonlinear:
         combined["nonlinear"] = nonlinear
-    for name, stage in combined.items():
-        stages[name] = [fit.residuals for fit in stage.cases]
+    stages |= {name: [fit.residuals for fit in stage.cases] for name, stage in combined.items()}
     placed = [case.placed for case in cases]
-    rows = [session.grid_of(case.case).rows_of(case.points) for case in placed]
-    result = {}
+    result: dict[str, dict[int, PlateResult]] = {}
     for name, residuals in stages.items():
         # Of single-case stages the report prints the averages only.
-        sigmas = unbiased_grid_sigma(rows, placed, combined[name])[0] if name in combined else {}
-        result[name] = _plates(session, placed, residuals, sigmas)
+        sigmas = GridSigma(session.grids, placed, combined[name]).by_plate if name in combined else {}
+        result[name] = {}
+        for plate in dict.fromkeys(case.case.plate for case in placed):
+            rows = [k for k, case in enumerate(placed) if case.case.plate == plate]
+            averages = average_residuals(
+                session.grids[plate], [placed[k] for k in rows], [residuals[k] for k in rows]
+            )
+            sigma = sigmas.get(plate, math.nan)
+            figures = listed_grid_sigma(averages), text_grid_sigma(averages), sigma
+            result[name][plate] = PlateResult(averages, *figures)
     return result
 
 
-def _plates(
-    session: Session, placed: Sequence[PlacedCase], residuals: Sequence[Residuals], sigmas: dict[int, float]
-) -> dict[int, PlateResult]:
-    plates = {}
-    for plate in dict.fromkeys(case.case.plate for case in placed):
-        own = [k for k, case in enumerate(placed) if case.case.plate == plate]
-        averages = average_residuals(
-            session.grids[plate], [placed[k] for k in own], [residuals[k] for k in own]
-        )
-        plates[plate] = PlateResult(
-            averages, listed_grid_sigma(averages), text_grid_sigma(averages), sigmas.get(plate, math.nan)
-        )
-    return plates
-
-
-def _variance(
-    session: Session,
-    cases: Sequence[CaseResult],
-    pointing: Pointing,
-    linear: CombinedLinear,
-    nonlinear: CombinedPolynomial | None,
-    averages: dict[str, dict[int, PlateResult]],
-    options: Options,
-    messages: list[Message],
-) -> VarianceAnalysis:
+def _grid_sigma(session: Session, plates: Mapping[int, PlateResult], options: Options) -> float:
+    """Return the standard deviation of a grid coordinate for the analysis of variance, of all plates."""
     squares, points = 0.0, 0
-    for plate, result in averages["nonlinear" if nonlinear else "linear"].items():
-        known = session.grids[plate].sigma_um
-        sigma = (
-            _chosen_sigma(result, options) if options.variance_grid == "computed" or known is None else known
-        )
-        squares += len(result.averages.points) * (0.0 if math.isnan(sigma) else sigma) ** 2
+    for plate, result in plates.items():
+        sigma = session.grids[plate].sigma_um
+        if options.variance_grid == "computed" or sigma is None:
+            sigma = np.nan_to_num(_chosen_sigma(result, options))
+        squares += len(result.averages.points) * sigma**2
         points += len(result.averages.points)
-    analysis = analyse_variance(
-        [case.free for case in cases],
-        linear,
-        nonlinear,
-        pointing.total,
-        math.sqrt(squares / points),
-        as_listed=options.nanometres == "truncated",
-    )
-    messages += [
-        Message(f"the variance of the {name} component comes out negative; it is taken as 0")
-        for name in analysis.negative
-    ]
-    return analysis
-
-
-def _case_test(cases: Sequence[CaseResult]) -> CaseVarianceTest | None:
-    """Compare the variances of unit weight of the linear adjustments of the cases."""
-    dof = [2 * len(case.placed.points) - 6 for case in cases]
-    if len(cases) < 2:
-        return None
-    return compare_case_variances([case.linear.residuals.comparator_um for case in cases], dof)
+    return math.sqrt(squares / points)
 
 
 def _joint(
     session: Session,
     placed: Sequence[PlacedCase],
     linear: CombinedLinear,
-    pointing: Pointing,
+    precision: Precision,
     polynomial: bool,
     options: Options,
     messages: list[Message],
 ) -> JointFit | None:
-    if not options.joint:
-        return None
-    precision = pointing.total
     known = precision.sd_um if precision.degrees_of_freedom > 0 else (0.0, 0.0)
     grid = {plate: session.grids[plate].sigma_um for plate in dict.fromkeys(c.case.plate for c in placed)}
     for plate in grid:
@@ -457,27 +415,44 @@ def _joint(
         if options.estimate_grid and len(turns) > 1:
             grid[plate] = None
         elif grid[plate] is None and len(turns) < 2:
-            messages.append(
-                Message(f"plate {plate} has no known accuracy and lies one way only: it is held fixed")
-            )
+            messages.append(Message(phrase("comparators.fixed-grid", plate=plate)))
             grid[plate] = 0.0
     try:
-        found = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
-        identity = Identity.of(session, [case.means_um for case in placed])
-        return replace(found, correction=replace(found.correction, identity=identity))
+        joint = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
     except AdjustmentError as error:
-        messages.append(Message(str(error)))
+        messages.append(Message(error.phrase or str(error)))
         return None
+    identity = Identity.of(session, [case.means_um for case in placed])
+    return replace(joint, correction=replace(joint.correction, identity=identity))
 
 
 def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: CombinedLinear) -> float:
     """Compare the weighted mean with a joint adjustment under the same assumptions."""
     fixed = Weights(dict.fromkeys(session.grids, 0.0), random_um=max(linear.sigma0_um, LEAST_UM))
     joint = adjust_jointly(placed, session.grids, linear, fixed, polynomial=False).correction
-    mean = linear.correction
-    differences = [
-        mean.scale_x - joint.scale_x,
-        mean.scale_y - joint.scale_y,
-        mean.nonorthogonality_rad - joint.nonorthogonality_rad,
-    ]
-    return float((np.abs(differences) / np.sqrt(np.diag(joint.covariance)[:3])).max())
+    differences = np.abs(parameters_of(linear.correction) - parameters_of(joint))[:3]
+    return float((differences / np.sqrt(np.diag(joint.covariance)[:3])).max())
+
+
+def corrected_grid(calibration: Calibration, plate: int) -> Grid:
+    """Return a plate with its final average residuals added; points without measurement are unchanged."""
+    session, averages = calibration.session, calibration.plates[plate].averages
+    placed = [case.placed for case in calibration.cases]
+    known = {number: grid.sigma_um for number, grid in session.grids.items()}
+    stage = calibration.nonlinear or calibration.linear
+    sigma = GridSigma(session.grids, placed, stage).corrected(plate, known)
+    corrections = averages.points, averages.corrections_um
+    return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
+
+
+def adjusted_grid(calibration: Calibration, plate: int) -> Grid:
+    """Return a plate of the joint adjustment, which weighs given coordinates and measurements."""
+    assert calibration.joint is not None
+    session, joint = calibration.session, calibration.joint.plates[plate]
+    sigma = math.sqrt(float(np.diagonal(joint.covariance_um2, axis1=1, axis2=2).mean()))
+    corrections = joint.points, joint.corrections_um
+    return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
+
+
+def _occasion(session: Session) -> str:
+    return f"{session.date or 'undated'} by comparator {session.comparator}"

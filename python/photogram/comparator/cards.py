@@ -14,12 +14,15 @@ import numpy as np
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
 from photogram.errors import InputError
+from photogram.io.places import Failing, Place
 from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
-SPECIAL_GRID = 3
-CASES = 20  # Cases that a header names operators for
+SPECIAL_GRID, MAX_COMPARATOR = 3, 15
+CASES = 20  # with operators in a header
+MAX_LEG = 4
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,6 @@ class Header:
     operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 for none
     date: str  # Columns 72-79
     master: int  # Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow
-
-    @property
-    def special_grid_number(self) -> int:
-        """Number of a special grid: the operators of cases 19 and 20 hold it."""
-        return 1000 * self.operators[18] + self.operators[19]
 
 
 @dataclass(frozen=True)
@@ -72,8 +70,12 @@ def _integer(record: Record, first: int, last: int) -> int:
     """Read an Iw field with blanks as zeros."""
     digits = record.columns(first, last).ljust(last - first + 1).lstrip(" ").replace(" ", "0")
     if digits and not (digits.isascii() and digits.isdigit()):
-        raise record.error(f"columns {first}-{last}: {record.columns(first, last)!r} is not a whole number")
+        raise _refusal(record, first, last, phrase("error.whole", value=record.columns(first, last)))
     return int(digits or 0)
+
+
+def _refusal(record: Record, first: int, last: int, message: Phrase) -> InputError:
+    return record.error(phrase("error.columns", first=first, last=last, message=message))
 
 
 def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> float:
@@ -84,7 +86,7 @@ def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> flo
     whole, point, fraction = digits.partition(".")
     figures = (whole + fraction).replace(" ", "0")
     if figures and not (figures.isascii() and figures.isdigit()):
-        raise record.error(f"columns {first}-{last}: {record.columns(first, last)!r} is not a number")
+        raise _refusal(record, first, last, phrase("error.number", value=record.columns(first, last)))
     places = len(fraction) if point else decimals
     return sign * int(figures or 0) * 1e6 / float(10**places)
 
@@ -106,10 +108,10 @@ def _header(record: Record) -> Header:
         date=record.columns(72, 79).strip(" "),
         master=_integer(record, 80, 80),
     )
-    if header.comparator > 15:
-        raise record.error(f"columns 6-7: there is no comparator {header.comparator}")
+    if header.comparator > MAX_COMPARATOR:
+        raise _refusal(record, 6, 7, phrase("error.most", high=MAX_COMPARATOR, value=header.comparator))
     if header.master > SPECIAL_GRID:
-        raise record.error(f"column 80: there is no master grid {header.master}")
+        raise _refusal(record, 80, 80, phrase("error.most", high=SPECIAL_GRID, value=header.master))
     return header
 
 
@@ -123,10 +125,7 @@ def _format(header: Header) -> _Format:
 
 
 def join_least_count(coarse: int, unit: int) -> int:
-    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON).
-
-    The digit decides; the coarse reading is moved by at most five units to agree with it.
-    """
+    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON)."""
     tens, digit = divmod(coarse, 10)
     if abs(digit - unit) <= 5:
         return 10 * tens + unit
@@ -134,19 +133,21 @@ def join_least_count(coarse: int, unit: int) -> int:
 
 
 def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
-    """Split KASE, 100 x plate + case.
-
-    It may stand to the left of its field; the program then read a zero behind it and printed 20020 for 2002.
-    """
-    first, last = columns
-    digits = record.columns(first, last).strip(" ")
+    """Split KASE, 100 x plate + case."""
+    text = record.columns(*columns)
+    digits = text.strip(" ")
     if len(digits) == 5 and digits.endswith("0"):
         digits = digits[:-1]
     if not (digits.isascii() and digits.isdigit()):
-        raise record.error(
-            f"columns {first}-{last}: {record.columns(first, last)!r} is no plate and case number"
-        )
+        raise _refusal(record, *columns, phrase("comparators.plate-case", value=text))
     return int(digits[:-2] or 0), int(digits[-2:])
+
+
+def check_number(place: Failing, what: str, number: int, low: int, high: int) -> None:
+    """Refuse the number of a case or leg outside its range."""
+    if not low <= number <= high:
+        message = phrase("error.range", value=number, low=low, high=high)
+        raise place.error(phrase("error.at", what=what, message=message))
 
 
 class _Deck:
@@ -158,12 +159,11 @@ class _Deck:
         self.cards = cards
         self.messages: list[Message] = []
         self.centre_um: float | None = None
-        given = list(grids)
-        own = self._special_grid() if header.master == SPECIAL_GRID else None
-        master = own or built_in_grid(BUILT_IN[min(header.master, 2)])
-        self.grids = {grid.number: grid for grid in (given or [master])}
-        if own is not None:
-            self.messages.append(first.message(f"SPECIAL MASTER GRID NO. {own.number} COORDINATES USED"))
+        special = self._special_grid() if header.master == SPECIAL_GRID else None
+        master = special or built_in_grid(BUILT_IN[min(header.master, 2)])
+        self.grids = {grid.number: grid for grid in [*grids] or [master]}
+        if special is not None:
+            self.messages.append(first.message(phrase("comparators.special-grid", plate=special.number)))
 
     def _special_grid(self) -> Grid:
         """Read the cards of a special grid; a mark in column 80 is on the last one."""
@@ -172,8 +172,9 @@ class _Deck:
             points.append(_integer(card, *STANDARD.point))
             xy.append([_micrometres(card, columns, 8) for columns in (STANDARD.x, STANDARD.y)])
             if not card.blank(80, 80):
-                return Grid(self.header.special_grid_number, np.array(points), np.array(xy))
-        raise self.first.error("the special grid has no last card: none is marked in column 80")
+                number = 1000 * self.header.operators[18] + self.header.operators[19]
+                return Grid(number, np.array(points), np.array(xy))
+        raise self.first.error(phrase("comparators.grid-end"))
 
     def session(self) -> Session:
         if self.header.skip_card:
@@ -185,9 +186,7 @@ class _Deck:
                 break
             reading = self._reading(card, layout)
             if reading.xy_um == (0.0, 0.0):
-                self.messages.append(
-                    card.message(f"point {reading.point} is missing: both readings are zero")
-                )
+                self.messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
             else:
                 readings.append(reading)
         session = Session(
@@ -205,7 +204,7 @@ class _Deck:
             messages=self.messages,
         )
         if not session.cases:
-            raise self.first.error("no measurements follow this header")
+            raise self.first.error(phrase("comparators.empty-deck"))
         session.check()
         return session
 
@@ -215,11 +214,9 @@ class _Deck:
         plate, case = _plate_case(card, layout.plate_case)
         if layout.plate is not None:
             plate = _integer(card, *layout.plate)
-        if not 1 <= case <= CASES:
-            raise card.error(f"case {case}: cases are numbered 1 to {CASES}")
+        check_number(card, "case", case, 1, CASES)
         leg = _integer(card, layout.leg, layout.leg)
-        if leg > 4:
-            raise card.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
+        check_number(card, "leg", leg, 0, MAX_LEG)
         xy = [_micrometres(card, columns, layout.decimals) for columns in (layout.x, layout.y)]
         if layout is LEAST_COUNT:
             xy = [float(join_least_count(round(xy[k]), _integer(card, 3 + k, 3 + k))) for k in range(2)]
@@ -234,14 +231,14 @@ class _Deck:
         )
 
     def _plate(self, card: Record, digits: int) -> int:
-        """Return the number of the plate whose last digits a card holds; blank means the only one."""
+        """Return the number of the plate with the last digits of a card; blank: the only plate."""
         if digits == 0 and len(self.grids) == 1:
             return next(iter(self.grids))
-        found = [number for number in self.grids if digits in (number, number % 100)]
-        if len(found) != 1:
-            listed = ", ".join(str(number) for number in self.grids)
-            raise card.error(f"plate {digits:02d} is not that of the header ({listed})")
-        return found[0]
+        plates = [number for number in self.grids if digits in (number, number % 100)]
+        if len(plates) != 1:
+            fields = {"kind": "plate", "name": f"{digits:02d}", "names": [*map(str, self.grids)]}
+            raise card.error(phrase("error.unknown", **fields))
+        return plates[0]
 
 
 def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | None = None) -> list[Session]:
@@ -271,7 +268,7 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
         session = _Deck(cards, header, first, list(grids)).session()
         sessions.append(session if left_handed is None else replace(session, left_handed=left_handed))
     if not sessions:
-        raise InputError("holds no deck: the first card is no header with a comparator number", file=path)
+        raise InputError(phrase("comparators.no-deck"), file=path)
     return sessions
 
 
@@ -285,20 +282,13 @@ def to_cards(session: Session) -> bytes:
     """
     number = next(iter(session.grids))
     if len(session.grids) != 1 or number not in BUILT_IN:
-        raise InputError("a deck holds one of the master grids 773, 1320, 778")
+        raise InputError(phrase("comparators.deck-grid"))
     operators = {case.number: case.operator for case in session.cases}
-    if not all(1 <= case <= CASES for case in operators):
-        raise InputError(f"a deck holds cases 1 to {CASES}")
-    flags = "".join(
-        str(int(bool(flag)))
-        for flag in (
-            session.left_handed,
-            session.sorted_input,
-            not session.least_count_one_micrometre,
-            False,
-            session.plot_each_case,
-        )
-    )
+    for case_number in operators:
+        check_number(Place(), "case", case_number, 1, CASES)
+    least_count = not session.least_count_one_micrometre
+    options = session.left_handed, session.sorted_input, least_count, False, session.plot_each_case
+    flags = "".join(str(int(bool(option))) for option in options)
     named = "".join(f"{operators.get(case, 0):3d}" for case in range(1, CASES + 1))
     stage = "R" if session.secondary else " "
     lines = [f"{flags}{session.comparator:2d}{stage} {named}  {session.date:8.8}{BUILT_IN.index(number)}"]

@@ -1,12 +1,14 @@
-"""One case ready for adjustment: how its plate lies, intersections of legs, means in order of the points."""
+"""One case before its adjustment: orientation of its plate, intersections of legs, means, close-out."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.comparator.fits import LEAST_POINTS
 from photogram.comparator.grid import Grid
 from photogram.comparator.pointing import (
     PointReadings,
@@ -22,6 +24,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.neighbours import mutually_nearest
+from photogram.words import Phrase, phrase
 
 # Quarter turns that bring a corner of the plate to the place of its first corner (least X and Y), with the
 # listing's KROTC.
@@ -33,22 +36,13 @@ _SQUARED = 1e150  # Micrometres beyond which squares leave the range of double p
 
 @dataclass(frozen=True)
 class Orientation:
-    """How a plate lies on the comparator.
+    """How a plate lies on the comparator."""
 
-    Attributes
-    ----------
-    corner
-        1 to 4, the listing's KROTC: the corner nearest the comparator's zero is that with least X and Y (1),
-        least X and greatest Y (2), greatest X and Y (3), greatest X and least Y (4).
-    nearest_point
-        The point of the plate in that corner.
-    left_handed
-        Whether the axes of the comparator are left-handed against those of the plate.
-    """
-
+    # 1 to 4, the listing's KROTC: the corner nearest the comparator's zero is that with least X and Y
+    # (1), least X and greatest Y (2), greatest X and Y (3), greatest X and least Y (4)
     corner: int
-    nearest_point: int
-    left_handed: bool
+    nearest_point: int  # The point of the plate in that corner
+    left_handed: bool  # Whether the axes of the comparator are left-handed against those of the plate
 
 
 def exchanged(xy: Floats, left_handed: bool) -> Floats:
@@ -67,11 +61,12 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
     plate = grid.xy_um[grid.rows_of(points)]
     largest = np.abs([plate, xy_um]).max(initial=0.0)
     if not largest < _SQUARED:
-        raise InputError(f"coordinates of points are too large to compute with: {largest:g} um")
+        too_large = phrase("error.less", value=float(largest), high=_SQUARED)
+        raise InputError(phrase("error.at", what="x, y", message=too_large))
     centred = plate - plate.mean(axis=0)
     matrix, _, rank, _ = np.linalg.lstsq(centred, xy_um - xy_um.mean(axis=0), rcond=1e-6)
     if rank < 2:
-        raise InputError("the points measured lie in one line")
+        raise InputError(phrase("comparators.collinear"))
     low, high = grid.xy_um.min(axis=0), grid.xy_um.max(axis=0)
     middle, quarter = (low + high) / 2, (high - low) / 4
 
@@ -120,91 +115,74 @@ LEGS = (1, 2, 3, 4)
 PARALLEL = 1e-3
 
 
-@dataclass(frozen=True)
-class LegPoint:
-    """A point that its legs determine: its number and how many readings each leg has."""
-
-    point: int
-    readings: tuple[int, int, int, int]
-
-
 def intersect_legs(legs_um: Floats) -> Floats:
-    """Return where the line through legs 1 and 3 meets the one through legs 2 and 4.
-
-    Parameters
-    ----------
-    legs_um
-        (4, 2) mean coordinates of the legs.
-    """
+    """Return the intersection of the lines through legs 1 and 3, and 2 and 4; (4, 2) mean coordinates."""
     first, second, third, fourth = legs_um
     along, across = third - first, fourth - second
     # Solve first + s along = second + t across for s (Cramer).
     determinant = along[1] * across[0] - along[0] * across[1]
     if abs(determinant) <= PARALLEL * float(np.hypot(*along) * np.hypot(*across)):
-        raise InputError("NO INTERSECTION FOR PARALLEL LINES")
+        raise InputError(phrase("comparators.parallel"))
     gap = second - first
     meeting: Floats = first + (gap[1] * across[0] - gap[0] * across[1]) / determinant * along
     return meeting
 
 
-def reduce_legs(case: Case) -> tuple[Case, list[LegPoint], list[Message]]:
-    """Put one intersection in the place of the leg readings of each point.
+def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
+    """Replace the leg readings of each point by one intersection; return the points as well, and remarks.
 
     The readings of each leg are averaged first. A point with fewer than four legs is left out, with a remark.
     """
     if not case.legs.any():
-        return case, [], []
+        return case, frozenset(), []
     keep = case.legs == 0
     xy_um = case.xy_um.copy()
-    reduced, messages = [], []
+    reduced, messages = set(), []
     on_legs = np.flatnonzero(case.legs > 0)
     on_intersections = set(case.points[keep].tolist())
     for point, own_rows in rows_by_point(case.points[on_legs]):
         rows = on_legs[own_rows]
         place = case.places[rows[0]]
         if point in on_intersections:
-            raise place.error(f"point {point} is measured both on its intersection and on its legs")
-        own = [rows[case.legs[rows] == leg] for leg in LEGS]
-        present = sum(len(leg) > 0 for leg in own)
+            raise place.error(phrase("comparators.legs-mixed", point=point))
+        legs = [rows[case.legs[rows] == leg] for leg in LEGS]
+        present = sum(len(leg) > 0 for leg in legs)
         if present < len(LEGS):
-            messages.append(
-                place.message(f"POINT NUMBER {point} IS REJECTED BECAUSE ONLY {present} LEGS WERE READ.")
-            )
+            messages.append(place.message(phrase("comparators.legs", point=point, present=present)))
             continue
         try:
-            xy_um[rows[0]] = intersect_legs(np.array([case.xy_um[leg].mean(axis=0) for leg in own]))
+            xy_um[rows[0]] = intersect_legs(np.array([case.xy_um[leg].mean(axis=0) for leg in legs]))
         except InputError as error:
-            raise place.error(f"case {case.number}, point {point}: {error.message}") from None
+            name = phrase("comparators.point", case=case.number, point=point)
+            raise place.error(phrase("error.at", what=name, message=error.phrase)) from None
         keep[rows[0]] = True
-        counts = [len(leg) for leg in own]
-        reduced.append(LegPoint(point, (counts[0], counts[1], counts[2], counts[3])))
-    kept = np.flatnonzero(keep)
+        reduced.add(point)
+    rows = np.flatnonzero(keep)
     without = replace(
         case,
-        points=case.points[kept],
-        legs=np.zeros(len(kept), dtype=np.int64),
-        xy_um=xy_um[kept],
-        places=tuple(case.places[row] for row in kept),
+        points=case.points[rows],
+        legs=np.zeros(len(rows), dtype=np.int64),
+        xy_um=xy_um[rows],
+        places=tuple(case.places[row] for row in rows),
     )
-    return without, reduced, messages
+    return without, frozenset(reduced), messages
 
 
-SCALES = (0.5, 2.0)  # A scale beyond these means that measurements and grid are in different units
+SCALES = (0.5, 2.0)  # outside measurements and grid have different units
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCase:
     """A case with its means."""
 
-    case: Case  # The case as it was measured
-    # Its points with their means and sums of squares, in the order of the grouping
-    readings: list[PointReadings]
+    case: Case
+    readings: list[PointReadings]  # in the order of the grouping
     points: Indices  # (n,) their numbers, and how often each was read
     counts: Indices
     means_um: Floats  # (n, 2) mean comparator coordinates
-    grid_um: Floats  # (n, 2) grid coordinates, X and Y exchanged where the comparator is left-handed
-    orientation: Orientation  # How the plate lies
-    from_legs: frozenset[int]  # Points that were measured on their legs
+    grid_um: Floats  # (n, 2) grid coordinates, X and Y exchanged if the comparator is left-handed
+    orientation: Orientation
+    from_legs: frozenset[int]  # points that were measured on their legs
 
     @property
     def number(self) -> int:
@@ -218,17 +196,12 @@ class PlacedCase:
 
 
 def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[PlacedCase, list[Message]]:
-    """Reduce legs, group readings (as the listing does if asked), form means, and detect how the plate lies.
-
-    Raises InputError: parallel legs; two points read at one place; points in one line; measurements in
-    another unit.
-    """
-    reduced, legs, messages = reduce_legs(case)
-    if len(np.unique(reduced.points)) < 3:
-        raise case.place.error(
-            f"case {case.number} has {len(np.unique(reduced.points))} points;"
-            " a linear adjustment needs at least 4"
-        )
+    """Reduce legs, group readings (as the listing if `as_listed`), form means, and detect the orientation."""
+    name = phrase("comparators.case", case=case.number)
+    reduced, from_legs, messages = reduce_legs(case)
+    if (count := len(np.unique(reduced.points))) < 3:
+        too_few = phrase("comparators.few-points", count=count, least=LEAST_POINTS)
+        raise case.place.error(phrase("error.at", what=name, message=too_few))
     order = (group_as_listed if as_listed else group)(reduced.points)
     readings = read_points(reduced.points[order], reduced.xy_um[order])
     points = np.array([reading.point for reading in readings])
@@ -238,7 +211,7 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
     try:
         orientation = detect_orientation(grid, points, means)
     except InputError as error:
-        raise case.place.error(f"case {case.number}: {error.message}") from None
+        raise case.place.error(phrase("error.at", what=name, message=error.phrase)) from None
     placed = PlacedCase(
         case=case,
         readings=readings,
@@ -247,9 +220,12 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
         means_um=means,
         grid_um=exchanged(grid.xy_um[grid.rows_of(points)], orientation.left_handed),
         orientation=orientation,
-        from_legs=frozenset(leg.point for leg in legs),
+        from_legs=from_legs,
     )
-    _refuse_other_unit(placed)
+    spread, extent = (np.linalg.norm(xy - xy.mean(axis=0)) for xy in (means, placed.grid_um))
+    if not SCALES[0] < extent / spread < SCALES[1]:
+        scale = float(extent / spread)
+        raise case.place.error(phrase("comparators.scale", case=case.number, scale=scale))
     return placed, messages
 
 
@@ -259,24 +235,86 @@ def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
     if not points:
         return []
     place = case.places[int(np.flatnonzero(case.points == points[0])[0])]
-    listed = ", ".join(str(point) for point in points)
-    return [place.message(f"case {case.number}: ALL READINGS FOR POINT NO {listed} ARE IDENTICAL")]
+    names = ", ".join(map(str, points))
+    return [place.message(phrase("comparators.identical", case=case.number, points=names))]
 
 
 def _refuse_equal_places(case: Case, points: Indices, means: Floats) -> None:
-    """Two points of a plate are never at one place: one of them has the wrong number, or was not measured."""
     _, first, counts = np.unique(means, axis=0, return_index=True, return_counts=True)
     if (counts > 1).any():
         at = means[first[counts > 1][0]]
         equal = points[(means == at).all(axis=1)].tolist()
         place = case.places[int(np.flatnonzero(case.points == equal[1])[0])]
-        raise place.error(f"case {case.number}: points {equal[0]} and {equal[1]} have identical readings")
+        fields = {"case": case.number, "first": equal[0], "second": equal[1]}
+        raise place.error(phrase("comparators.equal-points", **fields))
 
 
-def _refuse_other_unit(placed: PlacedCase) -> None:
-    spread = np.linalg.norm(placed.means_um - placed.means_um.mean(axis=0))
-    scale = float(np.linalg.norm(placed.grid_um - placed.grid_um.mean(axis=0)) / spread)
-    if not SCALES[0] < scale < SCALES[1]:
-        raise placed.case.place.error(
-            f"case {placed.number}: the grid is {scale:.4g} times the measured size: are the units mixed?"
-        )
+SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: close on the second point too, measure the case again
+FEW_READINGS = 9  # a case with so few readings must be closed
+ENOUGH = 3  # pointings of a close-out
+
+
+@dataclass(frozen=True, eq=False)
+class Closeout:
+    """Returns to a point: how many pointings each visit has, and their means (visits, 2)."""
+
+    point: int
+    counts: tuple[int, ...]
+    means_um: Floats
+
+    @property
+    def sequential_shifts_um(self) -> Floats:
+        """(visits - 1, 2) mean of each return less that of the visit before."""
+        return np.diff(self.means_um, axis=0)
+
+    @property
+    def total_shift_um(self) -> Floats | None:
+        """(2,) mean of the last visit less that of the first; None where there was no return."""
+        if len(self.counts) < 2:
+            return None
+        shift: Floats = self.means_um[-1] - self.means_um[0]
+        return shift
+
+    @property
+    def verdict(self) -> str:
+        """`none` (no return), `good`, `suspect` (more than 2 um) or `remeasure` (4 um or more)."""
+        if self.total_shift_um is None:
+            return "none"
+        largest = float(np.abs(self.sequential_shifts_um).max(initial=np.abs(self.total_shift_um).max()))
+        if largest >= REMEASURE_UM:
+            return "remeasure"
+        return "suspect" if largest > SUSPECT_UM else "good"
+
+
+def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
+    """Check the returns to the first point of a case and, if it was visited again, to the second."""
+    first, *others = dict.fromkeys(case.points.tolist())
+    closeouts = [_visits(case, first)]
+    if others and len((second := _visits(case, others[0])).counts) > 1:
+        closeouts.append(second)
+    if len(closeouts[0].counts) < 2 and len(case.points) <= FEW_READINGS:
+        fields = {"case": case.number, "count": len(case.points), "point": first}
+        raise case.place.error(phrase("comparators.not-closed", **fields))
+    return closeouts, [case.place.message(remark) for remark in _remarks(case.number, closeouts)]
+
+
+def _visits(case: Case, point: int) -> Closeout:
+    rows = np.flatnonzero(case.points == point)
+    visits = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    means = np.array([case.xy_um[visit].mean(axis=0) for visit in visits])
+    return Closeout(point, tuple(len(visit) for visit in visits), means)
+
+
+def _remarks(case: int, closeouts: list[Closeout]) -> Iterator[Phrase]:
+    first = closeouts[0]
+    if first.verdict == "none":
+        yield phrase("comparators.no-closeout", case=case, point=first.point)
+    elif (count := first.counts[-1]) < ENOUGH:
+        fields = {"case": case, "point": first.point, "count": count}
+        yield phrase("comparators.short-closeout", least=ENOUGH, **fields)
+    suspect = "comparators.shifted" if len(closeouts) > 1 else "comparators.shifted-first"
+    codes = {"remeasure": "comparators.moved", "suspect": suspect}
+    for closeout in closeouts:
+        if closeout.verdict in codes:
+            shift = float(np.abs(closeout.means_um - closeout.means_um[0]).max())
+            yield phrase(codes[closeout.verdict], case=case, point=closeout.point, shift=shift)

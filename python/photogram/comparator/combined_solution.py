@@ -68,12 +68,8 @@ def combine_linear(
     With P_j the inverse cofactors of case j: mean = (sum P)^-1 sum P x, and its sum of squares adds to those
     of the cases.
     """
-    values = np.array(
-        [
-            [fit.parameters.scale_x, fit.parameters.scale_y, fit.parameters.nonorthogonality_rad]
-            for fit in fits
-        ]
-    )
+    linear = [fit.parameters for fit in fits]
+    values = np.array([[each.scale_x, each.scale_y, each.nonorthogonality_rad] for each in linear])
     weights = [np.linalg.inv(fit.cofactors[:3, :3]) for fit in fits]
     total = np.sum(weights, axis=0)
     # Deviations from the first case: scales near one would lose digits.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.arrays import is_covariance
+from photogram.arguments.arrays import argument_error, is_covariance
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.comparator.readings import Session
@@ -18,8 +18,8 @@ from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import quoted
 from photogram.network.cameras import Camera
+from photogram.words import phrase
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Identity:
         """
         numbers = np.array([document["low_um"], document["high_um"]], dtype=float)
         if numbers.shape != (2, 2) or not (numbers[0] < numbers[1]).all():
-            raise InputError("low_um and high_um are no range of readings")
+            raise InputError(phrase("comparators.range"))
         low, high = ((float(x), float(y)) for x, y in numbers)
         temperature = document["temperature_c"]
         return cls(
@@ -104,11 +104,11 @@ class Identity:
         )
 
 
-PARAMETERS = 21  # Scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y
-# What the model of cameras calls them; scales less 1, coefficients in mm
+PARAMETERS = 21  # scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y
+# Their names in models of cameras; scales less 1, coefficients in mm
 MODEL = ("mx", "my", "lean", *(f"{axis}{term}" for axis in "xy" for term in "ABCDEFGHJ"))
-MM = 1000.0  # In micrometres
-STEPS = 20
+MM = 1000.0  # in micrometres
+MAX_STEPS = 20  # of Newton's iteration
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,21 +139,21 @@ class Correction:
     identity: Identity | None = None
 
     def __post_init__(self) -> None:
-        """Refuse parameters by which nothing can be corrected or turned back."""
         for name in ("scale_x", "scale_y"):
-            value = getattr(self, name)
-            if not 0 < value < math.inf:
-                raise InputError(f"{name} is {value}: a scale is a positive number")
+            if not 0 < (value := getattr(self, name)) < math.inf:
+                raise argument_error(name, "positive", value=value)
         if not abs(self.nonorthogonality_rad) < math.pi / 2:
-            raise InputError(f"nonorthogonality_rad is {self.nonorthogonality_rad}: the axes must differ")
+            angles = {"low": -math.pi / 2, "high": math.pi / 2}
+            raise argument_error("nonorthogonality_rad", "range", value=self.nonorthogonality_rad, **angles)
         if self.polynomial is not None:
-            values = (*self.polynomial.frame.centre_um, *self.polynomial.scaled_um.ravel())
-            if not np.isfinite(values).all():
-                raise InputError("the polynomial has coefficients or a centre that are not finite")
-            if not all(0 < half < math.inf for half in self.polynomial.frame.half_range_um):
-                raise InputError("half_range_um must be positive numbers")
+            for value in (*self.polynomial.frame.centre_um, *self.polynomial.scaled_um.ravel().tolist()):
+                if not math.isfinite(value):
+                    raise argument_error("polynomial", "finite", value=value)
+            for half in self.polynomial.frame.half_range_um:
+                if not 0 < half < math.inf:
+                    raise argument_error("half_range_um", "positive", value=half)
         if self.covariance.shape != 2 * (PARAMETERS,) or not is_covariance(self.covariance, singular=True):
-            raise InputError("covariance is no covariance matrix")
+            raise InputError(phrase("error.covariance-singular"))
 
     @property
     def matrix(self) -> Floats:
@@ -206,13 +206,13 @@ class Correction:
                     linear = self._before_polynomial(self.polynomial, linear)
                 readings = np.linalg.solve(self.matrix, linear.T).T
         except np.linalg.LinAlgError:
-            raise InputError("the correction cannot be inverted: its derivatives are singular") from None
+            raise InputError(phrase("comparators.singular")) from None
         return np.asarray(readings)
 
     @staticmethod
     def _before_polynomial(polynomial: Polynomial, corrected: Floats) -> Floats:
         place = corrected.copy()
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             excess = place + polynomial.evaluate(place) - corrected
             jacobian = np.eye(2) + polynomial.jacobian(place)
             step = np.linalg.solve(jacobian, excess[..., np.newaxis])[..., 0]
@@ -220,7 +220,7 @@ class Correction:
             # Rounding of coordinates of a metre is 1e-10 um.
             if np.abs(step).max(initial=0.0) < 1e-8:
                 return place
-        raise InputError("the correction cannot be inverted so far outside the calibrated range")
+        raise InputError(phrase("comparators.no-inverse"))
 
     def covariance_of(self, xy_um: Floats, measured_um2: Floats | None = None) -> Floats:
         """Return the covariance of corrected readings (n, 2, 2) in um^2.
@@ -235,31 +235,11 @@ class Correction:
         measured_um2
             (2, 2) or (n, 2, 2) covariance of the readings themselves; None for that of the correction alone.
         """
-        by_parameters, by_reading = self._partials(np.asarray(xy_um, dtype=float))
+        by_parameters, by_reading = partials_of(self, np.asarray(xy_um, dtype=float))
         covariance = by_parameters @ self.covariance @ by_parameters.transpose(0, 2, 1)
         if measured_um2 is not None:
             covariance = covariance + by_reading @ np.asarray(measured_um2) @ by_reading.transpose(0, 2, 1)
         return np.asarray(covariance)
-
-    def _partials(self, xy_um: Floats) -> tuple[Floats, Floats]:
-        """Return partials of corrected readings by parameters (n, 2, 21) and by readings (n, 2, 2)."""
-        linear = self.linear(xy_um)
-        frame = self.polynomial.frame if self.polynomial else Frame.metres()
-        inner = np.eye(2) + (
-            self.polynomial.jacobian(linear) if self.polynomial else np.zeros((len(linear), 2, 2))
-        )
-        # Counted from the reading at the centre of the frame: a shift is not part of the correction.
-        x, y = (xy_um - np.linalg.solve(self.matrix, frame.centre_um)).T
-        s, c = math.sin(self.nonorthogonality_rad), math.cos(self.nonorthogonality_rad)
-        zero = np.zeros_like(x)
-        by_linear = np.array([[x, s * y, self.scale_y * c * y], [zero, c * y, -self.scale_y * s * y]])
-        by_parameters = np.zeros((len(x), 2, PARAMETERS))
-        by_parameters[:, :, :3] = inner @ by_linear.transpose(2, 0, 1)
-        if self.polynomial is not None:
-            functions = design(frame, linear)
-            by_parameters[:, 0, 3:12] = functions
-            by_parameters[:, 1, 12:] = functions
-        return by_parameters, inner @ self.matrix
 
     def as_camera(self, camera: Camera, *, weighted: bool = True) -> Camera:
         """Return a camera whose plates are measured on this comparator and not corrected: `on_comparator`.
@@ -281,27 +261,27 @@ class Correction:
         InputError
             Another camera.
         """
-        kept = _beneath(camera)
+        deviations = _deviations(camera)
         frame = self.polynomial.frame if self.polynomial else Frame.metres()
         x0, y0 = np.linalg.solve(self.matrix, frame.centre_um) / MM
         half_x, half_y = frame.half_range_um
-        coefficients = np.zeros(18) if self.polynomial is None else self.polynomial.scaled_um.ravel() / MM
-        values = [self.scale_x - 1.0, self.scale_y - 1.0, self.nonorthogonality_rad, *coefficients.tolist()]
         unit = np.array([1.0] * 3 + [MM] * 18)
-        known = np.flatnonzero(np.diag(self.covariance) > 0) if weighted else np.zeros(0, int)
-        names = [MODEL[row] for row in known]
-        blocks = [(self.covariance / np.outer(unit, unit))[np.ix_(known, known)]]
+        values = (parameters_of(self) - np.repeat([1.0, 0.0], [2, 19])) / unit
+        observed = np.flatnonzero(np.diag(self.covariance) > 0) if weighted else np.zeros(0, int)
+        names = [MODEL[row] for row in observed]
+        covariance = (self.covariance / np.outer(unit, unit))[np.ix_(observed, observed)]
         if camera.covariance is not None:
+            apart = np.zeros((len(observed), len(camera.covariance[0])))
+            covariance = np.block([[covariance, apart], [apart.T, np.asarray(camera.covariance[1])]])
             names += list(camera.covariance[0])
-            blocks.append(np.asarray(camera.covariance[1]))
         constants = {"x0": float(x0), "y0": float(y0), "hx": half_x / MM, "hy": half_y / MM}
         return Camera(
             "on_comparator",
-            {name: camera.parameters[name] for name in kept}
-            | dict(zip(MODEL, values, strict=True))
+            {name: camera.parameters[name] for name in deviations}
+            | dict(zip(MODEL, values.tolist(), strict=True))
             | constants,
-            sd=kept,
-            covariance=(names, _diagonal(blocks)) if names else None,
+            sd=deviations,
+            covariance=(names, covariance) if names else None,
             name=camera.name,
             weights=camera.weights,
         )
@@ -365,38 +345,50 @@ class Correction:
         with json.holding("correction of a comparator", path):
             document = orjson.loads(read_bytes(path))
             if document.get("usable") is False:
-                raise InputError("holds a calibration whose correction is withheld: see its messages")
+                raise InputError(phrase("comparators.withheld"))
             return cls.from_document(document.get("correction", document))
 
 
-def _beneath(camera: Camera) -> dict[str, float]:
-    """Return the standard deviations of what a camera keeps that is measured on a comparator."""
+def parameters_of(correction: Correction) -> Floats:
+    """Return (21,) the parameters in the order of the covariance."""
+    polynomial = correction.polynomial
+    coefficients = np.zeros(18) if polynomial is None else polynomial.scaled_um.ravel()
+    linear = correction.scale_x, correction.scale_y, correction.nonorthogonality_rad
+    return np.concatenate([linear, coefficients])
+
+
+def partials_of(correction: Correction, xy_um: Floats) -> tuple[Floats, Floats]:
+    """Return partials of corrected readings by parameters (n, 2, 21) and by readings (n, 2, 2)."""
+    polynomial, linear = correction.polynomial, correction.linear(xy_um)
+    frame = polynomial.frame if polynomial else Frame.metres()
+    inner = np.eye(2) + (polynomial.jacobian(linear) if polynomial else np.zeros((len(linear), 2, 2)))
+    # Counted from the reading at the centre of the frame: a shift is not part of the correction.
+    x, y = (xy_um - np.linalg.solve(correction.matrix, frame.centre_um)).T
+    lean, scale_y = correction.nonorthogonality_rad, correction.scale_y
+    s, c = math.sin(lean), math.cos(lean)
+    by_linear = np.array([[x, s * y, scale_y * c * y], [np.zeros_like(x), c * y, -scale_y * s * y]])
+    by_parameters = np.zeros((len(x), 2, PARAMETERS))
+    by_parameters[:, :, :3] = inner @ by_linear.transpose(2, 0, 1)
+    if polynomial is not None:
+        by_parameters[:, 0, 3:12] = by_parameters[:, 1, 12:] = design(frame, linear)
+    return by_parameters, inner @ correction.matrix
+
+
+def _deviations(camera: Camera) -> dict[str, float]:
+    """Return the standard deviations of the parameters of a camera that has a comparator of its own."""
     deviations = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    own = ("b1", "b2", "r0")
-    if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in own):
-        raise InputError(
-            f"the camera {camera.title} on a comparator must be of the model brown, in mm, with b1, b2 and"
-            " r0 zero"
-        )
+    affine = ("b1", "b2", "r0")
+    if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in affine):
+        raise InputError(phrase("comparators.camera", camera=camera.title))
     if deviations["b1"] or deviations["b2"]:
-        raise InputError(f"b1, b2 of the camera {camera.title} are those of the comparator: they are held")
-    return {name: deviations[name] for name in camera.names if name not in own}
-
-
-def _diagonal(blocks: list[Floats]) -> Floats:
-    """Return the matrix that has the blocks along its diagonal."""
-    whole = np.zeros((sum(map(len, blocks)),) * 2)
-    first = 0
-    for block in blocks:
-        whole[first : first + len(block), first : first + len(block)] = block
-        first += len(block)
-    return whole
+        raise InputError(phrase("comparators.camera-free", camera=camera.title))
+    return {name: deviations[name] for name in camera.names if name not in affine}
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:
-    """Take numbers from a document; words, switches and lists of other lengths are none."""
+    """Return numbers of a document."""
     array = np.array(value)
     if array.shape != shape or array.dtype.kind not in "iuf":
-        what = "a number" if not shape else f"{' x '.join(str(size) for size in shape)} numbers"
-        raise ValueError(f"{quoted(str(value))} is not {what}")
+        size = " x ".join(map(str, shape)) or "1"
+        raise InputError(phrase("error.numbers", count=size, value=str(value)))
     return array.astype(float)

@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +64,11 @@ class Decomposition:
     Attributes
     ----------
     scale_x, scale_y
-        Multiply the readings.
+        Factors of the readings.
     nonorthogonality_rad
-        Angle between the y axis and the normal to the x axis; positive when the y axis leans toward +x.
+        Angle between the y axis and the normal to the x axis; positive if the y axis leans toward +x.
     rotation_rad
-        Of the plate against the comparator.
+        Rotation of the plate against the comparator.
     """
 
     scale_x: float
@@ -185,29 +186,20 @@ class AffineFit:
 def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
     """Fit two scales, lack of orthogonality, rotation and translation; the grid is without error.
 
-    The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of
-    the normal equations.
-
-    Parameters
-    ----------
-    points
-        (n,) numbers, four at least.
-    xy_um, grid_um
-        (n, 2) measured and grid coordinates in micrometres, of the same handedness.
+    The form x + v = A X + T is linear; QR on centred coordinates replaces the listing's adjugate of the
+    normal equations. Measured and grid coordinates (n, 2) have the same handedness.
     """
     if len(points) < LEAST_POINTS:
-        raise AdjustmentError(
-            f"{len(points)} points were measured; the linear adjustment needs {LEAST_POINTS} at least"
-        )
+        raise AdjustmentError(phrase("comparators.few-points", count=len(points), least=LEAST_POINTS))
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     centred = grid_um - grid_middle
     q, r = np.linalg.qr(centred)
     if np.abs(np.diag(r)).min() <= 1e-6 * np.abs(r).max():
-        raise AdjustmentError("the points measured lie in one line")
+        raise AdjustmentError(phrase("comparators.collinear"))
     inverse = np.linalg.inv(r)
     coefficients = (inverse @ (q.T @ (xy_um - middle))).T
     if np.linalg.det(coefficients) <= 0:
-        raise AdjustmentError("the comparator is of the other handedness than the grid")
+        raise AdjustmentError(phrase("comparators.handedness"))
     computed = centred @ coefficients.T + middle
     comparator = computed - xy_um
     # Grid residuals V = -A^-1 v.

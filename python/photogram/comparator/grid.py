@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -12,14 +14,17 @@ from photogram.arguments.annotations import path
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
-from photogram.io.numbers import is_whole_number, whole_number
+from photogram.io.numbers import is_whole_number
+from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import unknown_name
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 BUILT_IN = (773, 1320, 778)  # The master grids of the program, in the order of its option MASTER (0, 1, 2)
-# What lines above the coordinates of a plate may set
+# Settings above the coordinates of a plate
 KEYS = ("grid", "owner", "adopted", "sigma_um", "temperature_c", "expansion_per_k")
-MOST_EXPANSION = 1e-3  # A kelvin; steel has 1.2e-5, glass 8e-6
+MOST_EXPANSION = 1e-3  # per kelvin; steel has 1.2e-5, glass 8e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,18 +60,21 @@ class Grid(Brief):
     expansion_per_k: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse plates that cannot be."""
         values, counts = np.unique(self.points, return_counts=True)
         if (counts > 1).any():
-            raise InputError(f"plate {self.number} has point {values[counts > 1][0]} twice")
+            self._refuse("points", "error.repeated", kind="point", name=str(values[counts > 1][0]))
         if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
-            raise InputError(f"plate {self.number} needs two coordinates for each of its points")
+            self._refuse("xy_um", "comparators.grid-shape")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
-            raise InputError(f"plate {self.number}: {self.sigma_um} um is no standard deviation")
+            self._refuse("sigma_um", "error.not-negative", value=self.sigma_um)
         if self.expansion_per_k is not None and not abs(self.expansion_per_k) < MOST_EXPANSION:
-            raise InputError(
-                f"plate {self.number}: no material expands by {self.expansion_per_k:g} of itself a kelvin"
-            )
+            limits = {"low": -MOST_EXPANSION, "high": MOST_EXPANSION}
+            self._refuse("expansion_per_k", "error.range", value=self.expansion_per_k, **limits)
+
+    def _refuse(self, field: str, code: str, **fields: object) -> NoReturn:
+        message = phrase("error.at", what=field, message=phrase(code, **fields))
+        plate = phrase("comparators.plate", plate=self.number)
+        raise InputError(phrase("error.at", what=plate, message=message), file=self.source)
 
     @classmethod
     def square(
@@ -88,7 +96,7 @@ class Grid(Brief):
             Its temperature or its expansion is not known.
         """
         if self.temperature_c is None or self.expansion_per_k is None:
-            raise InputError(f"plate {self.number} has no temperature_c or no expansion_per_k")
+            self._refuse("temperature_c, expansion_per_k", "error.empty")
         growth = 1.0 + self.expansion_per_k * (temperature_c - self.temperature_c)
         return replace(self, xy_um=self.xy_um * growth, temperature_c=temperature_c)
 
@@ -113,15 +121,13 @@ class Grid(Brief):
 def read_grid(path: Path) -> Grid:
     """Read a plate: columns point, x_um, y_um (or x_mm, y_mm); `# grid = number`, `# sigma_um = ...` above.
 
-    Above may stand, too, `# adopted = date`, `# owner = ...`, `# temperature_c = 20`, `# expansion_per_k =
-    8.5e-6`, `# note = ...`.
-
-    Points with a blank coordinate are left out.
+    Further settings above the table: `# adopted = date`, `# owner = ...`, `# temperature_c = 20`,
+    `# expansion_per_k = 8.5e-6`, `# note = ...`. Points with blank coordinates are left out.
 
     Raises
     ------
     InputError
-        The file cannot be read or is not such a table, or sets what nothing reads.
+        The file cannot be read, is not such a table, or has an unknown setting.
     """
     table = read_table(path, "point", keys=KEYS)
     points, xy = [], []
@@ -131,23 +137,31 @@ def read_grid(path: Path) -> Grid:
             points.append(row.integer("point"))
             xy.append(coordinates)
     number = table.settings.get("grid")
-    sigma, temperature, expansion = (
-        table.settings[key].number() if key in table.settings else None
+    numbers = {
+        key: table.settings[key].number()
         for key in ("sigma_um", "temperature_c", "expansion_per_k")
+        if key in table.settings
+    }
+    return Grid(
+        0 if number is None else number.integer(),
+        np.array(points, dtype=np.int64),
+        np.array(xy, dtype=float).reshape(-1, 2),
+        adopted=table.text("adopted"),
+        source=path,
+        **numbers,
     )
-    try:
-        return Grid(
-            0 if number is None else number.integer(),
-            np.array(points, dtype=np.int64),
-            np.array(xy, dtype=float).reshape(-1, 2),
-            sigma,
-            table.text("adopted"),
-            path,
-            temperature,
-            expansion,
-        )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
+
+
+def with_corrections(grid: Grid, points: Indices, corrections_um: Floats, sigma_um: float, when: str) -> Grid:
+    """Return a plate with corrections of some points, their standard deviation, and their origin."""
+    xy_um = grid.xy_um.copy()
+    xy_um[grid.rows_of(points)] += corrections_um
+    return replace(
+        grid,
+        xy_um=np.round(xy_um, 4),
+        sigma_um=None if math.isnan(sigma_um) else sigma_um,
+        adopted=f"{when}, from the values of {grid.adopted or 'an unknown date'}",
+    )
 
 
 @cache
@@ -162,25 +176,20 @@ def built_in_grid(number: int) -> Grid:
         There is no such plate.
     """
     if number not in BUILT_IN:
-        listed = ", ".join(str(known) for known in BUILT_IN)
-        raise InputError(f"there is no built-in grid {number}; there are {listed}")
+        raise InputError(unknown_name("built-in grid", str(number), map(str, BUILT_IN)))
     with as_file(files("photogram.comparator") / "grids" / f"{number}.csv") as path:
         return read_grid(path)
 
 
 def find_grid(name: str) -> Grid:
-    """Return the plate that a word of the command line means: a built-in number, or a file.
+    """Return a built-in plate by its number, or the plate of a file.
 
     Raises
     ------
     InputError
-        It is neither.
+        The name is neither a built-in number nor a file of a plate.
     """
     file = path("name", name)
     if is_whole_number(name) and not file.exists():
-        try:
-            number = whole_number(name)
-        except ValueError as error:
-            raise InputError(f"grid {error}") from None
-        return built_in_grid(number)
+        return built_in_grid(Place().whole(name, "grid"))
     return read_grid(file)

@@ -24,31 +24,23 @@ from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
 DEGREE = 4
 OWN_TERMS = 6  # Terms of the polynomials that the linear parameters do not repeat: the first six
-ROUNDS = 100
-SETTLED = 1e-6
+MAX_ROUNDS = 100
+SETTLED = 1e-6  # relative change of standard deviations
 LEAST_UM = 1e-3  # Standard deviations are not estimated below a nanometre
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What the weights come from.
+    """What the weights come from."""
 
-    Attributes
-    ----------
-    grid_um
-        Standard deviation of a grid coordinate, by plate: zero holds the grid fixed; None estimates it.
-    pointing_um
-        Standard deviations of a single pointing in x and in y.
-    random_um
-        Standard deviation of the comparator itself; None estimates it.
-    """
-
+    # Standard deviation of a grid coordinate, by plate: zero holds the grid fixed; None estimates it
     grid_um: Mapping[int, float | None]
-    pointing_um: tuple[float, float] = (0.0, 0.0)
-    random_um: float | None = None
+    pointing_um: tuple[float, float] = (0.0, 0.0)  # Standard deviations of a single pointing in x and in y
+    random_um: float | None = None  # Standard deviation of the comparator itself; None estimates it
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,22 +94,6 @@ class JointFit:
         return self.correction.covariance[:3, :3]
 
 
-@dataclass(frozen=True, eq=False)
-class _Arrays:
-    """The problem as the extension module takes it."""
-
-    grid_xy: Floats
-    plate_of: Indices
-    measured_cases: Indices
-    measured_points: Indices
-    measured_xy: Floats
-    counts: Indices
-    placements: Floats
-    left_handed: list[bool]
-    frame: Frame
-    coefficient_sd: list[float]
-
-
 def adjust_jointly(
     cases: Sequence[PlacedCase],
     grids: Mapping[int, Grid],
@@ -127,220 +103,175 @@ def adjust_jointly(
     polynomial: bool = True,
 ) -> JointFit:
     """Adjust everything together, from the combined linear adjustment, with or without polynomials."""
-    arrays, points_of = _arrays(cases, grids, linear, polynomial)
+    problem = _Problem(cases, grids, linear, weights, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
     grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}
-    for _ in range(ROUNDS):
-        variance, solution = _solve(arrays, grid, weights.pointing_um, random)
-        known = (random, dict(grid))
+    for _ in range(MAX_ROUNDS):
+        problem.solve(grid, random)
+        before, grid_before = random, dict(grid)
         if weights.random_um is None:
-            random = _random(arrays, solution, variance, weights.pointing_um)
+            random = problem.random()
         for plate in grid:
             if weights.grid_um[plate] is None:
-                grid[plate] *= math.sqrt(max(_grid_ratio(arrays, solution, plate, grid[plate]), 0.01))
+                grid[plate] *= math.sqrt(max(problem.grid_ratio(plate, grid[plate]), 0.01))
                 grid[plate] = max(grid[plate], LEAST_UM)
-        changes = [abs(random - known[0]), *(abs(grid[plate] - known[1][plate]) for plate in grid)]
-        if max(changes) <= SETTLED * max(known[0], LEAST_UM):
+        changes = [abs(random - before), *(abs(grid[plate] - grid_before[plate]) for plate in grid)]
+        if max(changes) <= SETTLED * max(before, LEAST_UM):
             break
-    return _result(cases, arrays, points_of, solution, variance, known[0], known[1], weights)
+    return problem.fit(before, grid_before)
 
 
-def _arrays(
-    cases: Sequence[PlacedCase], grids: Mapping[int, Grid], linear: CombinedLinear, polynomial: bool
-) -> tuple[_Arrays, dict[int, Indices]]:
-    """Return the problem: points numbered through, placements counted from the middle of the range."""
-    plates = list(dict.fromkeys(case.case.plate for case in cases))
-    points_of = {
-        plate: np.unique(np.concatenate([case.points for case in cases if case.case.plate == plate]))
-        for plate in plates
-    }
-    first = dict(zip(plates, np.cumsum([0, *(len(points) for points in points_of.values())]), strict=False))
-    frame = Frame.of(np.vstack([fit.residuals.xy_um for fit in linear.cases]))
-    placements = [
-        [fit.rotation_rad, *(rotation_matrix(fit.rotation_rad) @ frame.centre_um + fit.translation_um)]
-        for fit in linear.cases
-    ]
-    arrays = _Arrays(
-        grid_xy=np.vstack([grids[plate].xy_um[grids[plate].rows_of(points_of[plate])] for plate in plates]),
-        plate_of=np.repeat(plates, [len(points_of[plate]) for plate in plates]),
-        measured_cases=np.repeat(np.arange(len(cases)), [len(case.points) for case in cases]),
-        measured_points=np.concatenate(
-            [
-                first[case.case.plate] + np.searchsorted(points_of[case.case.plate], case.points)
-                for case in cases
-            ]
-        ),
-        measured_xy=np.vstack([case.means_um for case in cases]),
-        counts=np.concatenate([case.counts for case in cases]),
-        placements=np.array(placements),
-        left_handed=[case.orientation.left_handed for case in cases],
-        frame=frame,
-        coefficient_sd=[math.inf if polynomial else 0.0] * OWN_TERMS,
-    )
-    return arrays, points_of
+class _Problem:
+    """The problem of the extension module, and its last solution.
 
-
-def _solve(
-    arrays: _Arrays, grid: Mapping[int, float], pointing: tuple[float, float], random: float
-) -> tuple[Floats, _photocore.ComparatorSolution]:
-    """Adjust with given standard deviations; return the variances of the means (m, 2) and the solution."""
-    variance = random**2 + np.array(pointing) ** 2 / arrays.counts[:, np.newaxis]
-    sd = np.array([grid[plate] for plate in arrays.plate_of.tolist()])
-    try:
-        solution = _photocore.adjust_comparator(
-            arrays.grid_xy,
-            np.column_stack([sd, sd]),
-            arrays.placements,
-            arrays.left_handed,
-            arrays.measured_cases,
-            arrays.measured_points,
-            arrays.measured_xy,
-            np.sqrt(variance),
-            ([0.0] * OWN_TERMS, [0.0] * OWN_TERMS),
-            (arrays.coefficient_sd, arrays.coefficient_sd),
-            degree=DEGREE,
-            centre=arrays.frame.centre_um,
-            half_range=arrays.frame.half_range_um,
-            limit=1e-5,
-            max_iterations=50,
-        )
-    except _photocore.ComparatorError as error:
-        raise AdjustmentError(f"joint adjustment: {error.args[0]}") from None
-    if not solution.converged:
-        raise AdjustmentError("the joint adjustment does not converge")
-    return variance, solution
-
-
-def _random(
-    arrays: _Arrays,
-    solution: _photocore.ComparatorSolution,
-    variance: Floats,
-    pointing: tuple[float, float],
-) -> float:
-    """Estimate the comparator: weighted squares of residuals must equal their redundancy."""
-    ratio = float((solution.residuals**2 / variance).sum() / solution.redundancy.sum())
-    known = np.array(pointing) ** 2 / arrays.counts[:, np.newaxis]
-    return math.sqrt(max(ratio * float(variance.mean()) - float(known.mean()), LEAST_UM**2))
-
-
-def _grid_ratio(
-    arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
-) -> float:
-    """Weighted squares of the corrections of a plate over their redundancy."""
-    squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
-    return squares / float(redundancy.sum()) if redundancy.sum() > 1e-9 else 1.0
-
-
-def _grid_test(
-    arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
-) -> GlobalTest | None:
-    """Test the corrections of a plate against their standard deviation.
-
-    Their weighted squares are nearly c times chi-square with g degrees of freedom, of the same mean and
-    variance (Satterthwaite): c = sum r^2 / sum r, g = sum r / c.
+    Points are numbered through all plates; placements are counted from the middle of the range.
     """
-    squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
-    if redundancy.sum() <= 1e-9:
-        return None
-    part = float((redundancy**2).sum() / redundancy.sum())
-    return global_test(squares / part, float(redundancy.sum()) / part)
 
+    solution: _photocore.ComparatorSolution
+    variance: Floats  # (m, 2) of the means
 
-def _grid_squares(
-    arrays: _Arrays, solution: _photocore.ComparatorSolution, plate: int, sigma_um: float
-) -> tuple[float, Floats]:
-    """Return the weighted squares of the corrections of a plate, and their redundancy numbers."""
-    own = arrays.plate_of == plate
-    corrections = solution.grid_xy[own] - arrays.grid_xy[own]
-    return float((corrections**2).sum()) / sigma_um**2, solution.grid_redundancy[own]
+    def __init__(
+        self,
+        cases: Sequence[PlacedCase],
+        grids: Mapping[int, Grid],
+        linear: CombinedLinear,
+        weights: Weights,
+        polynomial: bool,
+    ) -> None:
+        self.cases, self.weights = cases, weights
+        plates = list(dict.fromkeys(case.case.plate for case in cases))
+        self.points_of = points_of = {
+            plate: np.unique(np.concatenate([case.points for case in cases if case.case.plate == plate]))
+            for plate in plates
+        }
+        counts = [len(points) for points in points_of.values()]
+        first = dict(zip(plates, np.cumsum([0, *counts]), strict=False))
+        self.grid_xy = np.vstack(
+            [grids[plate].xy_um[grids[plate].rows_of(points)] for plate, points in points_of.items()]
+        )
+        self.plate_of = np.repeat(plates, counts)
+        self.measured_cases = np.repeat(np.arange(len(cases)), [len(case.points) for case in cases])
+        numbers = [(case.case.plate, case.points) for case in cases]
+        self.measured_points = np.concatenate(
+            [first[plate] + np.searchsorted(points_of[plate], points) for plate, points in numbers]
+        )
+        self.counts = np.concatenate([case.counts for case in cases])
+        self.frame = frame = Frame.of(np.vstack([fit.residuals.xy_um for fit in linear.cases]))
+        self.placements = [
+            [fit.rotation_rad, *(rotation_matrix(fit.rotation_rad) @ frame.centre_um + fit.translation_um)]
+            for fit in linear.cases
+        ]
+        self.coefficient_sd = [math.inf if polynomial else 0.0] * OWN_TERMS
 
+    def _pointing(self) -> Floats:
+        """Return (m, 2) variances of the means by the errors of pointings."""
+        return np.asarray(np.array(self.weights.pointing_um) ** 2 / self.counts[:, np.newaxis])
 
-def _result(
-    cases: Sequence[PlacedCase],
-    arrays: _Arrays,
-    points_of: Mapping[int, Indices],
-    solution: _photocore.ComparatorSolution,
-    variance: Floats,
-    random: float,
-    grid: Mapping[int, float],
-    weights: Weights,
-) -> JointFit:
-    dof = solution.degrees_of_freedom
-    scale = solution.sum_of_squares / dof if dof > 0 else 1.0
-    correction = _correction(arrays.frame, solution, scale)
-    return JointFit(
-        correction=correction,
-        sigma0=math.sqrt(scale),
-        degrees_of_freedom=dof,
-        iterations=solution.iterations,
-        random_um=random,
-        cases=tuple(
-            _case(k, case, arrays, correction, solution, variance, scale) for k, case in enumerate(cases)
-        ),
-        plates={
-            plate: _plate(arrays, points, solution, plate, grid[plate], weights, scale)
-            for plate, points in points_of.items()
-        },
-    )
+    def solve(self, grid: Mapping[int, float], random: float) -> None:
+        """Adjust with given standard deviations of grid coordinates and of the comparator."""
+        self.variance = random**2 + self._pointing()
+        sd = np.array([grid[plate] for plate in self.plate_of.tolist()])
+        try:
+            self.solution = _photocore.adjust_comparator(
+                self.grid_xy,
+                np.column_stack([sd, sd]),
+                np.array(self.placements),
+                [case.orientation.left_handed for case in self.cases],
+                self.measured_cases,
+                self.measured_points,
+                np.vstack([case.means_um for case in self.cases]),
+                np.sqrt(self.variance),
+                ([0.0] * OWN_TERMS, [0.0] * OWN_TERMS),
+                (self.coefficient_sd, self.coefficient_sd),
+                degree=DEGREE,
+                centre=self.frame.centre_um,
+                half_range=self.frame.half_range_um,
+                limit=1e-5,
+                max_iterations=50,
+            )
+        except _photocore.ComparatorError as error:
+            raise AdjustmentError(phrase("comparators.joint", reason=error.args[0])) from None
+        if not self.solution.converged:
+            raise AdjustmentError(phrase("comparators.not-converged"))
 
+    def random(self) -> float:
+        """Estimate the standard deviation of the comparator: weighted squares equal their redundancy."""
+        squares = float((self.solution.residuals**2 / self.variance).sum())
+        ratio = squares / float(self.solution.redundancy.sum())
+        variance = ratio * float(self.variance.mean()) - float(self._pointing().mean())
+        return math.sqrt(max(variance, LEAST_UM**2))
 
-def _correction(frame: Frame, solution: _photocore.ComparatorSolution, scale: float) -> Correction:
-    """Put the parameters among the 21 of a correction: terms of degree 1 and 0 are zero in this frame."""
-    place = np.concatenate([np.arange(3 + OWN_TERMS), 3 + COUNT + np.arange(OWN_TERMS)])
-    values, covariance = np.zeros(PARAMETERS), np.zeros((PARAMETERS, PARAMETERS))
-    values[place] = solution.comparator
-    covariance[np.ix_(place, place)] = scale * solution.comparator_cofactors
-    polynomial = Polynomial(frame, values[3:].reshape(2, COUNT), covariance[3:, 3:] / scale)
-    scale_x, scale_y, lean = values[:3].tolist()
-    return Correction(scale_x, scale_y, lean, polynomial, covariance)
+    def grid_ratio(self, plate: int, sigma_um: float) -> float:
+        """Return the weighted squares of the corrections of a plate over their redundancy."""
+        squares, redundancy = self._grid_squares(plate, sigma_um)
+        return squares / float(redundancy.sum()) if redundancy.sum() > 1e-9 else 1.0
 
+    def _grid_test(self, plate: int, sigma_um: float) -> GlobalTest | None:
+        """Test the corrections of a plate against their standard deviation.
 
-def _case(
-    k: int,
-    case: PlacedCase,
-    arrays: _Arrays,
-    correction: Correction,
-    solution: _photocore.ComparatorSolution,
-    variance: Floats,
-    scale: float,
-) -> JointCase:
-    own = arrays.measured_cases == k
-    rotation, *centre = solution.case_placements[k].tolist()
-    matrix = rotation_matrix(rotation)
-    observed = solution.residuals[own]
-    deviation = np.sqrt(scale * variance[own] * solution.redundancy[own])
-    residuals = Residuals(
-        case.points, correction.apply(case.means_um), -observed, np.asarray(observed @ matrix.T), math.nan
-    )
-    return JointCase(
-        number=case.number,
-        rotation_rad=rotation,
-        translation_um=np.asarray(centre - matrix @ arrays.frame.centre_um),
-        covariance=scale * solution.case_cofactors[k],
-        residuals=residuals,
-        standardized=np.divide(
-            -observed, deviation, out=np.full(observed.shape, np.nan), where=solution.redundancy[own] > 1e-6
-        ),
-    )
+        Their weighted squares are nearly c times chi-square with g degrees of freedom, of the same mean and
+        variance (Satterthwaite): c = sum r^2 / sum r, g = sum r / c.
+        """
+        squares, redundancy = self._grid_squares(plate, sigma_um)
+        if redundancy.sum() <= 1e-9:
+            return None
+        part = float((redundancy**2).sum() / redundancy.sum())
+        return global_test(squares / part, float(redundancy.sum()) / part)
 
+    def _grid_squares(self, plate: int, sigma_um: float) -> tuple[float, Floats]:
+        """Return the weighted squares of the corrections of a plate, and their redundancy numbers."""
+        rows = self.plate_of == plate
+        corrections = self.solution.grid_xy[rows] - self.grid_xy[rows]
+        return float((corrections**2).sum()) / sigma_um**2, self.solution.grid_redundancy[rows]
 
-def _plate(
-    arrays: _Arrays,
-    points: Indices,
-    solution: _photocore.ComparatorSolution,
-    plate: int,
-    sigma_um: float,
-    weights: Weights,
-    scale: float,
-) -> JointPlate:
-    own = arrays.plate_of == plate
-    estimated = weights.grid_um[plate] is None
-    return JointPlate(
-        points=points,
-        corrections_um=np.asarray(solution.grid_xy[own] - arrays.grid_xy[own]),
-        covariance_um2=scale * solution.grid_cofactors[own],
-        sigma_um=sigma_um,
-        estimated=estimated,
-        variance_ratio=_grid_ratio(arrays, solution, plate, sigma_um) if sigma_um > 0 else None,
-        test=_grid_test(arrays, solution, plate, sigma_um) if sigma_um > 0 and not estimated else None,
-    )
+    def fit(self, random: float, grid: Mapping[int, float]) -> JointFit:
+        """Return the last solution, and the standard deviations that it was weighted with."""
+        solution, dof = self.solution, self.solution.degrees_of_freedom
+        scale = solution.sum_of_squares / dof if dof > 0 else 1.0
+        # Among the 21 parameters of a correction terms of degree 1 and 0 are zero in this frame.
+        place = np.concatenate([np.arange(3 + OWN_TERMS), 3 + COUNT + np.arange(OWN_TERMS)])
+        values, covariance = np.zeros(PARAMETERS), np.zeros((PARAMETERS, PARAMETERS))
+        values[place] = solution.comparator
+        covariance[np.ix_(place, place)] = scale * solution.comparator_cofactors
+        polynomial = Polynomial(self.frame, values[3:].reshape(2, COUNT), covariance[3:, 3:] / scale)
+        scale_x, scale_y, lean = values[:3].tolist()
+        correction = Correction(scale_x, scale_y, lean, polynomial, covariance)
+        return JointFit(
+            correction=correction,
+            sigma0=math.sqrt(scale),
+            degrees_of_freedom=dof,
+            iterations=solution.iterations,
+            random_um=random,
+            cases=tuple(self._case(k, correction, scale) for k in range(len(self.cases))),
+            plates={plate: self._plate(plate, grid[plate], scale) for plate in self.points_of},
+        )
+
+    def _case(self, k: int, correction: Correction, scale: float) -> JointCase:
+        case, solution, rows = self.cases[k], self.solution, self.measured_cases == k
+        rotation, *centre = solution.case_placements[k].tolist()
+        matrix, observed = rotation_matrix(rotation), solution.residuals[rows]
+        redundancy = solution.redundancy[rows]
+        deviation = np.sqrt(scale * self.variance[rows] * redundancy)
+        corrected = correction.apply(case.means_um)
+        return JointCase(
+            number=case.number,
+            rotation_rad=rotation,
+            translation_um=np.asarray(centre - matrix @ self.frame.centre_um),
+            covariance=scale * solution.case_cofactors[k],
+            residuals=Residuals(case.points, corrected, -observed, np.asarray(observed @ matrix.T), math.nan),
+            standardized=np.divide(
+                -observed, deviation, out=np.full(observed.shape, np.nan), where=redundancy > 1e-6
+            ),
+        )
+
+    def _plate(self, plate: int, sigma_um: float, scale: float) -> JointPlate:
+        rows, estimated = self.plate_of == plate, self.weights.grid_um[plate] is None
+        return JointPlate(
+            points=self.points_of[plate],
+            corrections_um=np.asarray(self.solution.grid_xy[rows] - self.grid_xy[rows]),
+            covariance_um2=scale * self.solution.grid_cofactors[rows],
+            sigma_um=sigma_um,
+            estimated=estimated,
+            variance_ratio=self.grid_ratio(plate, sigma_um) if sigma_um > 0 else None,
+            test=self._grid_test(plate, sigma_um) if sigma_um > 0 and not estimated else None,
+        )

@@ -9,18 +9,18 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from photogram.comparator.cards import read_cards
+from photogram.comparator.cards import MAX_LEG, check_number, read_cards
 from photogram.comparator.csvfile import Setting, Table, read_table
 from photogram.comparator.grid import Grid, find_grid
-from photogram.comparator.readings import LARGEST_UM, Case, Reading, Session, collect_cases
+from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number
 from photogram.io.rows import Row
-from photogram.messages import quoted
+from photogram.words import phrase
 
 T = TypeVar("T")
 
-# What lines above the table may set
+# Settings above the table
 KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")
 
 
@@ -45,13 +45,13 @@ def read(
     """
     files = [Path(path) for path in paths]
     if not files:
-        raise InputError("there is no file to read")
+        raise InputError(phrase("comparators.files"))
     tables = [path for path in files if path.suffix.lower() == ".csv"]
     plates = list(grids)
     if not tables:
         return [session for path in files for session in read_cards(path, plates, left_handed=left_handed)]
     if len(tables) < len(files):
-        raise InputError("tables and decks of cards cannot make one calibration", file=tables[0])
+        raise InputError(phrase("comparators.mixed-files"), file=tables[0])
     return [read_csv(tables, plates, left_handed=left_handed)]
 
 
@@ -83,14 +83,20 @@ def read_csv(
         set one thing differently.
     """
     if not paths:
-        raise InputError("there is no table to read")
+        raise InputError(phrase("comparators.files"))
     tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
     if not plates:
-        raise InputError("names no grid plate: '# grid = 1320', or --grid", file=paths[0])
-    cases = collect_cases(reading for table in tables for reading in _readings(table, plates))
+        raise InputError(phrase("comparators.no-grid"), file=paths[0])
+    only_plate = next(iter(plates)) if len(plates) == 1 else 0
+    cases = collect_cases(
+        _reading(row, xy, only_plate)
+        for table in tables
+        for row in table.records.rows()
+        if (xy := table.coordinates_um(row)) is not None
+    )
     session = Session(
         cases=cases,
         grids=plates,
@@ -106,40 +112,34 @@ def read_csv(
 
 
 def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
-    """Return what the tables of a calibration set, None where none does; they may not contradict."""
+    """Return a setting of the tables of a calibration, None if no table has it."""
     settings = [table.settings[key] for table in tables if key in table.settings]
     values = [value_of(setting) for setting in settings]
     for setting, value in zip(settings, values, strict=True):
         if value != values[0]:
-            raise setting.place.error(f"{key} = {quoted(setting.text)}, but another table says {values[0]}")
+            fields = {"key": key, "value": setting.text, "other": settings[0].text}
+            raise setting.place.error(phrase("comparators.contradiction", **fields))
     return values[0] if values else None
 
 
 def _range_centre_um(setting: Setting) -> float:
     value = setting.number()
     if abs(value) > LARGEST_UM:
-        raise setting.place.error(f"{setting.key} = {value:g} is beyond every comparator ({LARGEST_UM:g} um)")
+        limit = phrase("error.most", value=value, high=LARGEST_UM)
+        raise setting.place.error(phrase("error.at", what=setting.key, message=limit))
     return value
 
 
 def _named_grids(table: Table) -> list[Grid]:
     """Return the plates that a table names: built in, or files beside it."""
     names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
-    return [find_grid(name if is_whole_number(name) else str(table.path.parent / name)) for name in names]
-
-
-def _readings(table: Table, plates: dict[int, Grid]) -> list[Reading]:
-    return [
-        _reading(row, xy, next(iter(plates)) if len(plates) == 1 else 0)
-        for row in table.records.rows()
-        if (xy := table.coordinates_um(row)) is not None
-    ]
+    folder = table.records.path.parent
+    return [find_grid(name if is_whole_number(name) else str(folder / name)) for name in names]
 
 
 def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
     leg = row.integer("leg", 0)
-    if leg > 4:
-        raise row.place.error(f"leg {leg}: legs are numbered 1 to 4, and 0 is the intersection")
+    check_number(row.place, "leg", leg, 0, MAX_LEG)
     return Reading(
         plate=row.integer("plate", only_plate),
         case=row.integer("case"),
@@ -164,11 +164,7 @@ def to_csv(session: Session) -> bytes:
         lines.append(f"# left_handed = {'yes' if session.left_handed else 'no'}")
     lines.append("plate,case,operator,leg,point,x_um,y_um")
     for case in session.cases:
-        lines += _lines(case)
+        rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
+        head = f"{case.plate},{case.number},{case.operator}"
+        lines += [f"{head},{leg},{point},{x:.3f},{y:.3f}" for leg, point, (x, y) in rows]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _lines(case: Case) -> list[str]:
-    rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
-    head = f"{case.plate},{case.number},{case.operator}"
-    return [f"{head},{leg},{point},{x:.3f},{y:.3f}" for leg, point, (x, y) in rows]

@@ -1,9 +1,8 @@
-"""Measurements that do not agree with the others: pointings, means of points after the adjustment, remarks.
+"""Outliers among pointings and among means of points after the adjustment, and remarks on them.
 
-Standard deviations are not known beforehand, so that residuals are judged against those of the other
-measurements (externally studentized, :mod:`photogram.statistics`). Outliers of the adjustment are taken out
-and the rest adjusted anew until none is left: what the correction is then tells how much harm they do. What a
-reader should know before the values: problems, the gravest first, and remarks.
+Standard deviations are not known beforehand: residuals are compared with those of the other measurements
+(externally studentized, :mod:`photogram.statistics`). Outliers of the adjustment are removed and the rest is
+adjusted again until none is left; the difference of the corrections is the effect of the outliers.
 """
 
 from __future__ import annotations
@@ -31,10 +30,12 @@ from photogram.errors import AdjustmentError
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
+from photogram.show.quantity import members
 from photogram.statistics.limits import externally_studentized, studentized_limit
+from photogram.words import phrase
 
-ROUNDS = 30  # Adjustments at most; each takes out what is at least half as far off as the farthest
-LEAST_POINTS = 6  # A case keeps so many points, or it is not screened any further
+MAX_ROUNDS = 30  # of removal: each removes residuals of at least half the largest
+LEAST_POINTS = 6  # of a case; the search ends before a case has fewer
 # Nothing below a nanometre is an outlier: residuals of measurements without error are rounding
 LEAST_UM = 1e-3
 MATCH = 0.1  # A point measured where another is expected is within this part of their distance of it
@@ -100,11 +101,7 @@ class PointingTests:
 
 
 def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
-    """Test pointings against the others of their case.
-
-    Each deviates from the mean of its point (of its leg, where legs were measured); deviations in x and in y
-    of a case have one standard deviation each.
-    """
+    """Test pointings against the others of their case."""
     tests = []
     for case in cases:
         _, group, counts = np.unique(
@@ -127,18 +124,18 @@ def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
 
 
 def far_pointings(tests: Sequence[PointingTests], others: int = 0) -> list[FarPointing]:
-    """Find pointings that do not agree; `others` are tests that share the level with these."""
-    found = []
-    number = sum(each.ratios.size for each in tests) + others
-    for each in tests:
-        limit = studentized_limit(each.freedom, number)
-        worst = np.abs(each.ratios).argmax(axis=1)
+    """Return outlying pointings; `others` is the number of tests that share the level with these."""
+    outlying = []
+    number = sum(test.ratios.size for test in tests) + others
+    for test in tests:
+        limit = studentized_limit(test.freedom, number)
+        worst = np.abs(test.ratios).argmax(axis=1)
         rows = np.arange(len(worst))
-        for row in np.flatnonzero(np.abs(each.ratios[rows, worst]) > limit).tolist():
-            deviation, ratio = (float(own[row, worst[row]]) for own in (each.deviations, each.ratios))
-            point = int(each.case.points[row])
-            found.append(FarPointing(each.case.number, point, row, deviation, abs(ratio), limit))
-    return found
+        for row in np.flatnonzero(np.abs(test.ratios[rows, worst]) > limit).tolist():
+            deviation, ratio = (float(values[row, worst[row]]) for values in (test.deviations, test.ratios))
+            point = int(test.case.points[row])
+            outlying.append(FarPointing(test.case.number, point, row, deviation, abs(ratio), limit))
+    return outlying
 
 
 def screen(
@@ -147,38 +144,46 @@ def screen(
     grids: Mapping[int, Grid],
     others: int = 0,
 ) -> Screening:
-    """Find measured points that do not agree with the adjustment of the others, in the last stage.
+    """Return measured points that are outliers of the last stage.
 
-    `others` are tests that share the level with these.
+    `others` is the number of tests that share the level with these.
     """
-    kept = list(cases)
+    remaining = list(cases)
     removed: list[tuple[int, int, float]] = []
     clean, limit = stage, math.inf
     first: tuple[tuple[Floats, ...], float] | None = None
-    for _ in range(ROUNDS):
-        tests, freedom = _ratios(kept, clean)
+    for _ in range(MAX_ROUNDS):
+        tests, freedom = _ratios(remaining, clean)
         first = first or (tuple(tests), freedom)
-        ratios = [own.max(axis=1) for own in tests]
-        limit = studentized_limit(freedom, 2 * sum(len(own) for own in ratios) + others)
-        worst = max(float(own.max()) for own in ratios)
+        ratios = [values.max(axis=1) for values in tests]
+        limit = studentized_limit(freedom, 2 * sum(map(len, ratios)) + others)
+        worst = max(float(values.max()) for values in ratios)
         if not worst > limit:
             break
-        chosen = [own >= max(limit, worst / 2) for own in ratios]
-        remaining = [_without(case, out) for case, out in zip(kept, chosen, strict=True)]
-        if min(len(case.points) for case in remaining) < LEAST_POINTS:
+        outlying = [values >= max(limit, worst / 2) for values in ratios]
+        rest = [_without(case, out) for case, out in zip(remaining, outlying, strict=True)]
+        if min(len(case.points) for case in rest) < LEAST_POINTS:
             break
         try:
-            clean = _adjust(remaining, with_polynomial=isinstance(stage, CombinedPolynomial))
+            fits = [fit_affine(case.points, case.means_um, case.grid_um) for case in rest]
+            linear = combine_linear(rest, fits)
+            curved = isinstance(stage, CombinedPolynomial)
+            clean = combine_polynomial(rest, linear) if curved else linear
         except AdjustmentError:
             break
-        for k, (case, own, out) in enumerate(zip(kept, ratios, chosen, strict=True)):
-            removed += [(k, int(case.points[row]), float(own[row])) for row in np.flatnonzero(out)]
-        kept = remaining
+        for k, (case, values, out) in enumerate(zip(remaining, ratios, outlying, strict=True)):
+            removed += [(k, int(case.points[row]), float(values[row])) for row in np.flatnonzero(out)]
+        remaining = rest
     outliers = tuple(
         _outlier(cases[k], grids[cases[k].case.plate], clean, k, point, ratio)
         for k, point, ratio in sorted(removed)
     )
-    change = _change(stage, clean, cases) if outliers else 0.0
+    change = 0.0
+    if outliers:  # root mean square at the measured places, without rotation and shift
+        places = np.vstack([case.means_um for case in cases])
+        corrected = stage.correction.apply(places), clean.correction.apply(places)
+        residuals = fit_rigid(np.arange(len(places)), *corrected).residuals.grid_um
+        change = math.sqrt(float((residuals**2).mean()))
     assert first is not None
     return Screening(outliers, limit, change, clean.sigma0_um, *first)
 
@@ -214,12 +219,6 @@ def _without(case: PlacedCase, out: Bools) -> PlacedCase:
     )
 
 
-def _adjust(cases: Sequence[PlacedCase], *, with_polynomial: bool) -> CombinedLinear | CombinedPolynomial:
-    fits = [fit_affine(case.points, case.means_um, case.grid_um) for case in cases]
-    linear = combine_linear(cases, fits)
-    return combine_polynomial(cases, linear) if with_polynomial else linear
-
-
 def _outlier(
     case: PlacedCase,
     grid: Grid,
@@ -231,38 +230,19 @@ def _outlier(
     """Compare a measured point with where the adjustment of the others expects it and its neighbours."""
     fit = stage.cases[index]
     row = int(np.flatnonzero(case.points == point)[0])
-    found = stage.correction.apply(case.means_um[row : row + 1])[0]
+    measured = stage.correction.apply(case.means_um[row : row + 1])[0]
     plate = exchanged(grid.xy_um, case.orientation.left_handed)
-    expected = (plate - fit.translation_um) @ rotation_matrix(fit.rotation_rad)
-    own = expected[int(np.flatnonzero(grid.points == point)[0])]
-    nearest = int(np.hypot(*(expected - found).T).argmin())
-    near = math.dist(expected[nearest], found) < MATCH * math.dist(expected[nearest], own)
-    off = found - own
-    return Outlier(
-        case.number,
-        point,
-        (float(off[0]), float(off[1])),
-        ratio,
-        int(grid.points[nearest]) if near else None,
-    )
-
-
-def _change(
-    stage: CombinedLinear | CombinedPolynomial,
-    clean: CombinedLinear | CombinedPolynomial,
-    cases: Sequence[PlacedCase],
-) -> float:
-    """Root mean square by which two corrections differ at the measured places, rotation and shift apart."""
-    places = np.vstack([case.means_um for case in cases])
-    numbers = np.arange(len(places))
-    with_them, without = stage.correction.apply(places), clean.correction.apply(places)
-    residuals = fit_rigid(numbers, with_them, without).residuals.grid_um
-    return math.sqrt(float((residuals**2).mean()))
+    places = (plate - fit.translation_um) @ rotation_matrix(fit.rotation_rad)
+    expected = places[int(np.flatnonzero(grid.points == point)[0])]
+    nearest = int(np.hypot(*(places - measured).T).argmin())
+    near = math.dist(places[nearest], measured) < MATCH * math.dist(places[nearest], expected)
+    x, y = (measured - expected).tolist()
+    return Outlier(case.number, point, (x, y), ratio, int(grid.points[nearest]) if near else None)
 
 
 Found = TypeVar("Found", FarPointing, Outlier)
 
-MOST = 40  # Outliers of either kind that are named; the largest ones
+MAX_NAMED = 40  # outliers of each kind, the largest ones
 
 
 def problems(
@@ -272,108 +252,79 @@ def problems(
     far: Sequence[FarPointing],
     joint: JointFit | None,
 ) -> list[Message]:
-    """Return what keeps a reader from using the values, or should make them careful.
-
-    A correction that outliers spoil, then grids that are worse than their standard deviations, then outliers
-    one by one.
-    """
-    found = []
+    """Return problems: an unusable correction, grids worse than their standard deviations, outliers."""
+    messages = []
     if screening.harmful:
-        found.append(
-            Message(
-                f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
-                f" and a coordinate is uncertain by {screening.sigma_um:.3f} um: the correction is unusable"
-            )
-        )
-    for plate, own in joint.plates.items() if joint else ():
-        if own.test and (failed := own.test.problem()):
-            text = f"plate {plate}, corrections against {own.sigma_um:.3f} um a priori: {failed}"
-            found.append(Message(text))
+        fields = {"change": screening.change_um, "sd": screening.sigma_um}
+        messages.append(Message(phrase("comparators.harm", **fields)))
+    for plate, result in joint.plates.items() if joint else ():
+        if result.test and (reason := result.test.problem()):
+            text = phrase("comparators.grid-test", plate=plate, sd=result.sigma_um, reason=reason)
+            messages.append(Message(text))
     places = {
         (case.number, point): place
         for case in session.cases
         for point, place in zip(reversed(case.points.tolist()), reversed(case.places), strict=True)
     }
-    found += _outliers(screening, cases, places)
+    messages += _outliers(screening, cases, places)
     numbers = {case.number: case for case in session.cases}
     for pointing in _largest(far):
-        found.append(numbers[pointing.case].places[pointing.row].message(_far(pointing)))
-    return found + _more(len(far), "pointings")
+        fields = members(pointing, "case", "point", "ratio", "limit")
+        text = phrase("comparators.far-pointing", distance=abs(pointing.deviation_um), **fields)
+        messages.append(numbers[pointing.case].places[pointing.row].message(text))
+    return messages + _more(len(far), "comparators.more-pointings")
 
 
 def _outliers(
     screening: Screening, cases: Sequence[PlacedCase], places: Mapping[tuple[int, int], Place]
 ) -> list[Message]:
-    """Name the outliers of the adjustment; a point that is off wherever it was measured only once."""
+    """Name the outliers of the adjustment; one message for a point that is an outlier in all its cases."""
     plate_of = {case.number: case.case.plate for case in cases}
     measured: dict[tuple[int, int], list[int]] = {}
     for case in cases:
         for point in case.points.tolist():
             measured.setdefault((case.case.plate, point), []).append(case.number)
-    off: dict[tuple[int, int], list[Outlier]] = {}
+    by_point: dict[tuple[int, int], list[Outlier]] = {}
     for outlier in screening.outliers:
-        off.setdefault((plate_of[outlier.case], outlier.point), []).append(outlier)
-    everywhere = {
-        key: own
-        for key, own in sorted(off.items())
-        if len(own) > 1 and [outlier.case for outlier in own] == measured[key]
-    }
-    found = [Message(_everywhere(plate, point, own)) for (plate, point), own in everywhere.items()]
-    single = [own for own in screening.outliers if (plate_of[own.case], own.point) not in everywhere]
-    found += [
-        places[own.case, own.point].message(_off_once(own, screening.limit)) for own in _largest(single)
-    ]
-    return found + _more(len(single), "points")
+        by_point.setdefault((plate_of[outlier.case], outlier.point), []).append(outlier)
+    messages, single = [], []
+    for (plate, point), outliers in sorted(by_point.items()):
+        if len(outliers) < 2 or [outlier.case for outlier in outliers] != measured[plate, point]:
+            single += outliers
+            continue
+        instead = {outlier.instead for outlier in outliers}
+        code = "wrong-point" if len(instead) > 1 or None in instead else "exchanged"
+        fields = {"plate": plate, "point": point, "instead": instead.pop()}
+        messages.append(Message(phrase(f"comparators.{code}", **fields)))
+    for outlier in _largest(single):
+        code = "outlier" if outlier.instead is None else "outlier-exchanged"
+        fields = members(outlier, "case", "point", "ratio", "instead", distance="distance_um")
+        text = phrase(f"comparators.{code}", limit=screening.limit, **fields)
+        messages.append(places[outlier.case, outlier.point].message(text))
+    return messages + _more(len(single), "comparators.more-outliers")
 
 
-def _largest(found: Sequence[Found]) -> list[Found]:
-    return sorted(found, key=lambda own: own.ratio, reverse=True)[:MOST]
+def _largest(outliers: Sequence[Found]) -> list[Found]:
+    return sorted(outliers, key=lambda outlier: outlier.ratio, reverse=True)[:MAX_NAMED]
 
 
-def _more(count: int, what: str) -> list[Message]:
-    return [Message(f"{count - MOST} more {what} are off")] if count > MOST else []
-
-
-def _everywhere(plate: int, point: int, outliers: Sequence[Outlier]) -> str:
-    head = f"plate {plate}, point {point}: off in every case in which it was measured: "
-    instead = {outlier.instead for outlier in outliers}
-    if len(instead) == 1 and None not in instead:
-        return f"{head}it lies where point {instead.pop()} is expected: are labels exchanged?"
-    return f"{head}are its grid coordinates wrong?"
-
-
-def _off_once(outlier: Outlier, limit: float) -> str:
-    head = (
-        f"case {outlier.case}, point {outlier.point}: a residual of {outlier.distance_um:.1f} um,"
-        f" {outlier.ratio:.3g} times its standard deviation (limit {limit:.2f})"
-    )
-    if outlier.instead is None:
-        return f"{head}: a blunder?"
-    return f"{head}: it lies where point {outlier.instead} is expected: are labels exchanged?"
-
-
-def _far(pointing: FarPointing) -> str:
-    return (
-        f"case {pointing.case}, point {pointing.point}: a pointing is {abs(pointing.deviation_um):.1f} um"
-        f" from the mean, {pointing.ratio:.3g} times its standard deviation (limit"
-        f" {pointing.limit:.2f}): a blunder?"
-    )
+def _more(count: int, code: str) -> list[Message]:
+    return [Message(phrase(code, count=count - MAX_NAMED))] if count > MAX_NAMED else []
 
 
 def plate_remarks(session: Session, cases: Sequence[PlacedCase]) -> list[Message]:
-    """Remark on plates whose grid calibration is not valid, and on points that were not measured."""
+    """Return remarks on plates whose grid calibration is not valid, and on points without measurement."""
     remarks = []
     for plate in dict.fromkeys(case.case.plate for case in cases):
         count = len(session.grids[plate].points)
-        own = [case for case in cases if case.case.plate == plate]
-        corners = [case.orientation.corner for case in own]
-        complete = all(len(case.points) == count for case in own)
-        if len({corners.count(corner) for corner in range(1, 5)}) > 1 or not complete:
+        on_plate = [case for case in cases if case.case.plate == plate]
+        corners = [case.orientation.corner for case in on_plate]
+        missing = {case.number: count - len(case.points) for case in on_plate}
+        if len({corners.count(corner) for corner in range(1, 5)}) > 1 or any(missing.values()):
             remarks.append(Message.of("comparator.rotations", plate=str(plate)))
-        missing = [count - len(case.points) for case in own]
         remarks += [
-            Message(f"case {case.number}: {lacking} of {count} points of plate {plate} are missing")
-            for case, lacking in zip(own, missing, strict=True)
-            if lacking
+            Message(phrase("comparators.missing", case=case, n=points, count=count, plate=plate))
+            for case, points in missing.items()
+            if points
         ]
     return remarks

@@ -28,11 +28,7 @@ def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
 
 
 def group_as_listed(points: Indices) -> Indices:
-    """Return the order of readings that the listing makes.
-
-    It brings later readings of a point forward by swapping, so that points which stood in the way end
-    elsewhere: in figure 7 point 2 comes last, after the close-out on point 1 took its place.
-    """
+    """Return the order of readings that the listing makes."""
     order = list(range(len(points)))
     numbers = points.tolist()
     # Where the readings of each point stand; those before `start` have moved away.
@@ -157,11 +153,7 @@ class PointReadings:
 
 
 def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
-    """Sum up readings, point by point in the order of their first reading.
-
-    Deviations are formed from the first reading of each point, so that large coordinates cost no digits and
-    identical readings give exactly zero.
-    """
+    """Sum up readings, point by point in the order of their first reading."""
     order = group(points)
     starts = np.flatnonzero(np.diff(points[order], prepend=points[order[:1]] - 1))
     counts = np.diff([*starts, len(points)])

@@ -14,6 +14,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 TERMS = ("x^4", "y^4", "x^3", "y^3", "x^2", "y^2", "x", "y", "1")  # The terms in the order of the report
 EXPONENTS = np.array([[4, 0], [0, 4], [3, 0], [0, 3], [2, 0], [0, 2], [1, 0], [0, 1], [0, 0]])
@@ -119,13 +120,11 @@ class Polynomial:
 def fit_polynomial(xy_um: Floats, residuals_um: Floats) -> Polynomial:
     """Fit both polynomials to the residuals (n, 2) that the linear adjustment left at places (n, 2)."""
     if len(xy_um) <= COUNT:
-        raise AdjustmentError(f"{len(xy_um)} points were measured; the polynomials need {COUNT + 1} at least")
+        raise AdjustmentError(phrase("comparators.few-points", count=len(xy_um), least=COUNT + 1))
     frame = Frame.of(xy_um)
     q, r = np.linalg.qr(design(frame, xy_um))
     if np.abs(np.diag(r)).min() < 1e-9 * np.abs(r).max():
-        raise AdjustmentError(
-            "the points have too few different coordinates for polynomials of fourth degree"
-        )
+        raise AdjustmentError(phrase("comparators.few-coordinates"))
     inverse = np.linalg.inv(r)
     cofactors = np.kron(np.eye(2), inverse @ inverse.T)
     return Polynomial(frame, np.asarray((inverse @ (q.T @ residuals_um)).T), cofactors)

@@ -12,8 +12,9 @@ from photogram.arguments.types import Floats, Indices
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io.places import Place as Place
-from photogram.messages import Message
+from photogram.messages import Message, unknown_name
 from photogram.show.summary import Brief
+from photogram.words import Phrase, phrase
 
 # A reading this far from the others on its point was taken on another point, or is in another unit
 FURTHEST_UM = 1000.0
@@ -93,33 +94,30 @@ class Case:
             The first reading at fault, with its place.
         """
         if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
-            raise InputError(f"case {self.number}: points, legs, coordinates and places differ in number")
-        finite = np.isfinite(self.xy_um).all(axis=1)
-        if not finite.all():
-            at = int(np.flatnonzero(~finite)[0])
-            raise self.places[at].error(f"case {self.number}, point {self.points[at]}: not a number")
+            raise InputError(phrase("comparators.lengths", case=self.number))
         largest = np.abs(self.xy_um).max(axis=1, initial=0.0)
-        if largest.max(initial=0.0) > LARGEST_UM:
-            at = int(largest.argmax())
-            raise self.places[at].error(
-                f"case {self.number}, point {self.points[at]}: a coordinate of {largest[at]:.3g} um is beyond"
-                f" every comparator ({LARGEST_UM:g} um)"
-            )
+        for code, bad in (
+            ("error.finite", ~np.isfinite(largest)),
+            ("error.most", largest > LARGEST_UM),
+        ):
+            if bad.any():
+                at = int(np.argmax(bad))
+                name = phrase("comparators.point", case=self.number, point=int(self.points[at]))
+                message = phrase(code, value=float(largest[at]), high=LARGEST_UM)
+                raise self.places[at].error(phrase("error.at", what=name, message=message))
         known = np.isin(self.points, grid.points)
         if not known.all():
-            at = int(np.flatnonzero(~known)[0])
-            raise self.places[at].error(f"point {self.points[at]} is unknown: plate {grid.number} has it not")
-        self._refuse_far_readings()
-
-    def _refuse_far_readings(self) -> None:
+            at = int(np.argmin(known))
+            fields = {"plate": grid.number, "point": int(self.points[at])}
+            raise self.places[at].error(phrase("comparators.no-point", **fields))
         rows = np.flatnonzero(self.legs == 0)
-        _, own = np.unique(self.points[rows], return_inverse=True)
-        away = np.abs(self.xy_um[rows] - _medians(own, self.xy_um[rows])[own]).max(axis=1)
+        _, group = np.unique(self.points[rows], return_inverse=True)
+        away = np.abs(self.xy_um[rows] - _medians(group, self.xy_um[rows])[group]).max(axis=1)
         if away.max(initial=0.0) > FURTHEST_UM:
-            at = rows[int(away.argmax())]
+            at = int(rows[away.argmax()])
+            fields = {"case": self.number, "point": int(self.points[at])}
             raise self.places[at].error(
-                f"case {self.number}, point {self.points[at]}: a reading is {away.max():.0f} um from the"
-                " others: another point, or another unit?"
+                phrase("comparators.far-reading", distance=float(away.max()), **fields)
             )
 
 
@@ -198,8 +196,7 @@ class Session(Brief):
             No plate with that number was given.
         """
         if case.plate not in self.grids:
-            listed = ", ".join(str(number) for number in self.grids)
-            raise case.place.error(f"case {case.number} is on plate {case.plate}; there is only {listed}")
+            raise case.place.error(unknown_name("plate", str(case.plate), map(str, self.grids)))
         return self.grids[case.plate]
 
     def expanded(self) -> Session:
@@ -211,9 +208,9 @@ class Session(Brief):
                 grids[number] = grid.at(t)
             elif t is not None or grid.expansion_per_k:
                 missing = (
-                    "temperature_c of the measurements" if known else "its temperature_c, expansion_per_k"
+                    "temperature_c of the measurements" if known else "its temperature_c or expansion_per_k"
                 )
-                remarks.append(Message(f"plate {number} is taken as it is given: {missing} are not said"))
+                remarks.append(Message(phrase("comparators.expansion", plate=number, missing=missing)))
         return replace(self, grids=grids, messages=[*self.messages, *remarks])
 
     def check(self) -> None:
@@ -226,20 +223,19 @@ class Session(Brief):
             point.
         """
         if not self.cases:
-            raise InputError("there are no measurements", file=self.source)
+            raise InputError(phrase("error.empty-file", content="measurements"), file=self.source)
         first: dict[int, Case] = {}
         for case in self.cases:
             if case.number in first:
-                where = _where(first[case.number].place)
-                raise case.place.error(f"case {case.number} was measured twice: first {where}")
+                raise case.place.error(_repeated(case.number, first[case.number].place))
             first[case.number] = case
             case.check(self.grid_of(case))
 
 
-def _where(place: Place) -> str:
-    if place.record is None:
-        return "earlier"
-    return f"in record {place.record}" + (f" of {place.file}" if place.file else "")
+def _repeated(case: int, first: Place) -> Phrase:
+    if first.record is None:
+        return phrase("error.repeated", kind="case", name=str(case))
+    return phrase("comparators.repeated-case", case=case, record=first.record, file=str(first.file))
 
 
 def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
@@ -255,25 +251,25 @@ def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
     last: int | None = None
     for reading in readings:
         if reading.case != last and reading.case in runs:
-            raise reading.place.error(
-                f"case {reading.case} was measured twice: first {_where(runs[reading.case][0].place)}"
-            )
+            raise reading.place.error(_repeated(reading.case, runs[reading.case][0].place))
         last = reading.case
-        run = runs.setdefault(reading.case, [])
-        if run and (run[0].plate, run[0].operator) != (reading.plate, reading.operator):
-            what = "plate" if run[0].plate != reading.plate else "operator"
-            raise reading.place.error(f"case {reading.case} changes its {what} on the way")
-        run.append(reading)
-    return tuple(_case(run) for run in runs.values())
-
-
-def _case(run: list[Reading]) -> Case:
-    return Case(
-        number=run[0].case,
-        operator=run[0].operator,
-        plate=run[0].plate,
-        points=np.array([reading.point for reading in run]),
-        legs=np.array([reading.leg for reading in run]),
-        xy_um=np.array([reading.xy_um for reading in run]),
-        places=tuple(reading.place for reading in run),
+        run = runs.setdefault(reading.case, [reading])
+        for what in ("plate", "operator"):
+            before, now = getattr(run[0], what), getattr(reading, what)
+            if before != now:
+                fields = {"case": reading.case, "what": what, "first": before, "second": now}
+                raise reading.place.error(phrase("comparators.changes", **fields))
+        if reading is not run[0]:
+            run.append(reading)
+    return tuple(
+        Case(
+            number=run[0].case,
+            operator=run[0].operator,
+            plate=run[0].plate,
+            points=np.array([reading.point for reading in run]),
+            legs=np.array([reading.leg for reading in run]),
+            xy_um=np.array([reading.xy_um for reading in run]),
+            places=tuple(reading.place for reading in run),
+        )
+        for run in runs.values()
     )

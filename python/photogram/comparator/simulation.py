@@ -19,6 +19,7 @@ from photogram.comparator.readings import Case, Session
 from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import phrase
 
 IDEAL = Correction(1.0, 1.0, 0.0)
 
@@ -95,7 +96,7 @@ def simulate_calibration(
         No operator, a rotation that is infinite, a negative seed, errors of another shape.
     """
     if not operators or not math.isfinite(rotation_rad) or seed < 0:
-        raise InputError("a simulation needs an operator, a finite rotation and a seed that is not negative")
+        raise InputError(phrase("comparators.simulation"))
     random = np.random.default_rng(seed)
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)
@@ -104,30 +105,22 @@ def simulate_calibration(
     if sequence is not None:
         points = np.array(sequence, dtype=np.int64)
     rows = grid.rows_of(points)
-    measured = []
+    measured, places = [], exchanged(plate.xy_um, left_handed)
+    places = places - (places.min(axis=0) + places.max(axis=0)) / 2
     for k in range(cases):
-        exact = _readings(plate, correction, rotation_rad + k * math.pi / 2, centre_um, left_handed)
+        turned = places @ rotation_matrix(rotation_rad + k * math.pi / 2)
+        exact = correction.invert(turned + centre_um)
         exact = exact + random_um * random.standard_normal(exact.shape)
         xy = exact[rows] + pointing_um * random.standard_normal((len(rows), 2))
         if least_count_um > 0:
             xy = np.round(xy / least_count_um) * least_count_um
         operator = operators[min(k // 4, len(operators) - 1)]
-        legs = np.zeros(len(rows), dtype=np.int64)
-        places = (Place(),) * len(rows)
-        measured.append(Case(k + 1, operator, grid.number, grid.points[rows], legs, xy, places))
+        legs, origins = np.zeros(len(rows), dtype=np.int64), (Place(),) * len(rows)
+        measured.append(Case(k + 1, operator, grid.number, grid.points[rows], legs, xy, origins))
     session = Session(
         tuple(measured), {grid.number: grid}, comparator=comparator, date=date, left_handed=left_handed
     )
     return Simulation(session, correction, errors)
-
-
-def _readings(
-    plate: Grid, correction: Correction, rotation: float, centre: tuple[float, float], left_handed: bool
-) -> Floats:
-    """Read every point without error."""
-    own = exchanged(plate.xy_um, left_handed)
-    middle = (own.min(axis=0) + own.max(axis=0)) / 2
-    return correction.invert((own - middle) @ rotation_matrix(rotation) + centre)
 
 
 DAYS = ("1970-01-15", "1970-07-02", "1971-01-20", "1971-06-28", "1972-01-11", "1972-07-17")

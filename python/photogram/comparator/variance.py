@@ -1,23 +1,21 @@
-"""Where errors come from (NOAA TR NOS 57, equations 66 to 68, figure 30), and tests of significance.
-
-Probabilities of the tests need scipy (`pip install 'photogram[statistics]'`) and are None without it.
-"""
+"""Analysis of variance (NOAA TR NOS 57, equations 66 to 68, figure 30), and tests of significance."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from functools import cache
-from importlib.util import find_spec
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
 from photogram.comparator.fits import RigidFit
 from photogram.comparator.pointing import Precision
 from photogram.comparator.polynomial import TERMS
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.distributions import critical_chi_square, log_chi_square, log_fisher
 
 NM = 1000.0
 
@@ -81,21 +79,11 @@ def analyse_variance(
     *,
     as_listed: bool = False,
 ) -> VarianceAnalysis:
-    """Split the total error into linear, nonlinear, grid, pointing and random.
+    """Split the total error of the free adjustments into linear, nonlinear, grid, pointing and random.
 
-    Parameters
-    ----------
-    free
-        The free adjustments of the measurements.
-    linear, nonlinear
-        The combined adjustments; without polynomials the nonlinear share is 0.
-    pointing
-        Pooled precision of all pointings (equation 30).
-    grid_um
-        Standard deviation of a grid coordinate.
-    as_listed
-        Cut the sigmas after the linear stage (SIGX, SIGY) to whole nanometres first: the listing takes them
-        back from the INTEGER array of its cards, those after the nonlinear stage it still has.
+    Without polynomials the nonlinear share is 0. `pointing` is the pooled precision of all pointings
+    (equation 30). `as_listed` cuts the sigmas after the linear stage (SIGX, SIGY) to whole nanometres first:
+    the listing reads them from the INTEGER array of its cards.
     """
     before = _pooled(free, sum(len(fit.residuals.points) - 1.5 for fit in free))
     # nu of equation 57 counts both axes.
@@ -117,9 +105,7 @@ def analyse_variance(
         after_nonlinear=after,
         pointing=mean_pointing,
         grid=grid_um,
-        linear=shares["linear"][0],
-        nonlinear=shares["nonlinear"][0],
-        random=shares["random"][0],
+        **{name: share for name, (share, _) in shares.items()},
         negative=tuple(name for name, (_, negative) in shares.items() if negative),
     )
 
@@ -141,7 +127,7 @@ class TermTest:
     term: str
     coefficient_um: float  # Its effect at the edge of the range, and the standard deviation
     sd_um: float
-    probability: float | None  # Of a ratio as large as this (two-sided) without the term; None without scipy
+    probability: float | None  # Of a ratio as large as this (two-sided) without the term
 
     @property
     def ratio(self) -> float:
@@ -155,7 +141,7 @@ class PolynomialTest:
 
     ratio: float  # F, and its two degrees of freedom
     degrees_of_freedom: tuple[int, int]
-    probability: float | None  # Of so large a ratio without polynomials; None without scipy
+    probability: float | None  # Of so large a ratio without polynomials
     terms: tuple[TermTest, ...]  # Each term
 
 
@@ -175,105 +161,95 @@ class CaseVarianceTest:
 NODES = 200
 
 
-def _scipy() -> bool:
-    return find_spec("scipy") is not None
-
-
 def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> PolynomialTest:
     """Test the polynomials of the combined adjustment."""
     polynomial = nonlinear.polynomial
     dof = linear.degrees_of_freedom - 2 * OWN_TERMS
-    before = sum(sum(fit.residuals.squares_um2[:2]) for fit in linear.cases)
-    after = sum(sum(fit.residuals.squares_um2[:2]) for fit in nonlinear.cases)
+    before, after = (
+        sum(sum(fit.residuals.squares_um2[:2]) for fit in stage.cases) for stage in (linear, nonlinear)
+    )
     ratio = (before - after) / (2 * OWN_TERMS) / (after / dof) if after > 0 else math.nan
     sd = np.sqrt(after / dof * np.diag(polynomial.scaled_cofactors)).reshape(2, -1)
-    terms = tuple(
-        TermTest(
-            axis,
-            TERMS[term],
-            float(polynomial.scaled_um[row, term]),
-            float(sd[row, term]),
-            _student(float(polynomial.scaled_um[row, term]), float(sd[row, term]), dof),
-        )
-        for row, axis in enumerate("xy")
-        for term in range(OWN_TERMS)
-    )
-    return PolynomialTest(ratio, (2 * OWN_TERMS, dof), _fisher(ratio, 2 * OWN_TERMS, dof), terms)
+    terms = []
+    for row, axis in enumerate("xy"):
+        for term in range(OWN_TERMS):
+            coefficient, own_sd = float(polynomial.scaled_um[row, term]), float(sd[row, term])
+            p = _fisher((coefficient / own_sd) ** 2, 1, dof) if own_sd else None
+            terms.append(TermTest(axis, TERMS[term], coefficient, own_sd, p))
+    return PolynomialTest(ratio, (2 * OWN_TERMS, dof), _fisher(ratio, 2 * OWN_TERMS, dof), tuple(terms))
 
 
-def compare_case_variances(residuals: Sequence[Floats], dof: Sequence[int]) -> CaseVarianceTest:
-    """Compare the variances of unit weight of single cases, by their residuals (n, 2) in micrometres.
+def _fisher(ratio: float, first: float, second: float) -> float | None:
+    """Return the probability that Fisher's variable exceeds a ratio."""
+    return None if math.isnan(ratio) else float(np.exp(log_fisher(ratio, first, second)))
 
-    Where degrees of freedom differ, F-max takes the fewest, and errs on the safe side.
+
+def _chi_square(x: ArrayLike, dof: float) -> Floats:
+    """Return the probability that a chi-square variable exceeds x."""
+    return np.asarray(np.exp(log_chi_square(x, dof)))
+
+
+def compare_case_variances(residuals: Sequence[Floats]) -> CaseVarianceTest | None:
+    """Compare the variances of unit weight of linear adjustments, by their residuals (n, 2) in micrometres.
+
+    If degrees of freedom differ, F-max has the fewest, on the safe side. None for one case.
     """
-    squares = [float((values**2).sum()) for values in residuals]
-    variances = [square / own for square, own in zip(squares, dof, strict=True)]
-    ratio = max(variances) / min(variances) if min(variances) > 0 else math.inf
-    few = min(dof)
-    if not _scipy() or not math.isfinite(ratio):
+    if len(residuals) < 2:
+        return None
+    dof = np.array([values.size - 6 for values in residuals])
+    variances = np.array([float((values**2).sum()) for values in residuals]) / dof
+    ratio = float(variances.max() / variances.min()) if variances.min() > 0 else math.inf
+    few = int(dof.min())
+    if not math.isfinite(ratio):
         return CaseVarianceTest(ratio, few, None, None, None, None)
-    from scipy.stats import levene
-
     return CaseVarianceTest(
         ratio,
         few,
         _f_max_tail(ratio, len(dof), few),
         _f_max_limit(len(dof), few),
         _bartlett(variances, dof),
-        float(levene(*(values.ravel() for values in residuals)).pvalue),
+        _levene([values.ravel() for values in residuals]),
     )
 
 
-def _student(value: float, sd: float, dof: int) -> float | None:
-    if not _scipy() or sd == 0:
-        return None
-    from scipy.stats import t
-
-    return float(2 * t.sf(abs(value / sd), dof))
-
-
-def _fisher(ratio: float, first: int, second: int) -> float | None:
-    if not _scipy() or math.isnan(ratio):
-        return None
-    from scipy.stats import f
-
-    return float(f.sf(ratio, first, second))
+def _bartlett(variances: Floats, dof: Indices) -> float:
+    total, groups = dof.sum(), len(dof)
+    statistic = total * math.log(dof @ variances / total) - float(dof @ np.log(variances))
+    correction = 1 + (float((1 / dof).sum()) - 1 / total) / (3 * (groups - 1))
+    return float(_chi_square(statistic / correction, groups - 1))
 
 
-def _bartlett(variances: Sequence[float], dof: Sequence[int]) -> float:
-    """Return the probability of Bartlett's statistic, from variances and degrees of freedom."""
-    from scipy.stats import chi2
-
-    own = np.array(dof, dtype=float)
-    total = own.sum()
-    pooled = float(own @ variances / total)
-    statistic = total * math.log(pooled) - float(own @ np.log(variances))
-    correction = 1 + (float((1 / own).sum()) - 1 / total) / (3 * (len(own) - 1))
-    return float(chi2.sf(statistic / correction, len(own) - 1))
+def _levene(groups: Sequence[Floats]) -> float | None:
+    """Return the probability of Levene's statistic, with deviations from medians (Brown and Forsythe)."""
+    away = [np.abs(values - np.median(values)) for values in groups]
+    counts, means = np.array([len(values) for values in away]), np.array([values.mean() for values in away])
+    between = counts @ (means - counts @ means / counts.sum()) ** 2 / (len(groups) - 1)
+    within = sum(((values - values.mean()) ** 2).sum() for values in away) / (counts.sum() - len(groups))
+    return _fisher(float(between / within), len(groups) - 1, int(counts.sum()) - len(groups))
 
 
 def _f_max_tail(ratio: float, groups: int, dof: int) -> float:
-    """Probability that the largest of `groups` variances is `ratio` times the smallest, or more.
+    """Return the probability that the largest of variances is `ratio` times the smallest, or more.
 
     1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), with G the distribution of
     chi squared: x is the smallest. Gauss-Legendre nodes.
     """
-    from scipy.stats import chi2
-
-    u, weights = _unit_nodes()
-    inside = chi2.cdf(ratio * chi2.ppf(u, dof), dof) - u
-    within = groups * float(weights @ inside ** (groups - 1))
-    return min(1.0, max(0.0, 1 - within))
+    u, weights, x = _nodes(dof)
+    inside = 1 - _chi_square(ratio * x, dof) - u
+    return min(1.0, max(0.0, 1 - groups * float(weights @ inside ** (groups - 1))))
 
 
 @cache
-def _unit_nodes() -> tuple[Floats, Floats]:
-    """Gauss-Legendre nodes and weights of the interval from 0 to 1."""
+def _nodes(dof: int) -> tuple[Floats, Floats, Floats]:
+    """Return Gauss-Legendre nodes and weights from 0 to 1, and quantiles of chi squared at the nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    return (nodes + 1) / 2, weights / 2
+    u = (nodes + 1) / 2
+    return u, weights / 2, np.array([critical_chi_square(1 - each, dof) for each in u.tolist()])
 
 
 def _f_max_limit(groups: int, dof: int) -> float:
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda ratio: _f_max_tail(ratio, groups, dof) - 0.05, 1.0, 1e4, xtol=1e-4))
+    low, high = 0.0, math.log(1e4)
+    while high - low > 1e-9:
+        middle = (low + high) / 2
+        low, high = (middle, high) if _f_max_tail(math.exp(middle), groups, dof) > 0.05 else (low, middle)
+    return math.exp(low)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from photogram.diagnosis.findings import Finding, Section
@@ -9,7 +10,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.show.methods import Documented
 from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
-from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict, as_phrase
+from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Rule, Verdict, as_phrase, fitting_rules
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.results.result import Result
@@ -31,11 +33,6 @@ CONVENTIONS = frozenset(
     }
 )
 """Kinds of findings that are mistakes in what the data of a whole set mean."""
-_CORRECT = (
-    "Correct what the first finding names, and check again: one mistake may hide another, and explain it.",
-)
-_LOOK = ("Look at what was found first.",)
-_ADJUST = ("Adjust: `photogram adjust`, `giant` for a GIANT project, `collection` for a collection.",)
 
 
 @dataclass(repr=False)
@@ -88,30 +85,51 @@ class Diagnosis(Documented, Brief):
         """
         if self.adjusted_before and self.result is not None:
             return self.result.verdict
-        grave, look = self.grave, [each for each in self.findings if each.level == "look"]
-        hints = tuple(each.text for each in grave if each.kind in CONVENTIONS)
-        tests = () if self.result is None else self.result.verdict.tests
-        if grave:
-            code, exit_code = ("hint" if hints else "gross-errors"), EXIT_NOT_CONVERGED
-            what = "The data are likely wrong" if hints else "Gross errors likely"
-            named = [each.text for each in sorted(grave, key=lambda each: each.kind not in CONVENTIONS)]
-            headline = f"{what}: {named[0]}" + (f" (and {len(named) - 1} more)" if named[1:] else "")
-        else:
-            code, exit_code = ("look-at", 0) if look else ("accepted", 0)
-            headline = f"Nothing grave was found; {len(look)} to look at" if look else "Nothing was found"
+        rule, message, exit_code = fitting_rules(RULES, self)[0]
+        first, *others = [*self._ordered, None]
         return Verdict(
-            code=code,
-            message=as_phrase(headline),
+            code=rule.code,
+            message=message,
             exit=exit_code,
-            warning=bool(grave or look),
-            lines=tuple(as_phrase(each.text) for each in [*grave[1:], *look]),
-            next=tuple(map(as_phrase, _CORRECT if grave else (*_LOOK, *_ADJUST) if look else _ADJUST)),
-            tests=tests,
-            hints=hints,
+            warning=first is not None,
+            lines=tuple(_message(each) for each in (others if self.grave else self._ordered) if each),
+            next=tuple(phrase(f"check.verdict.{name}") for name in rule.advice),
+            tests=() if self.result is None else self.result.verdict.tests,
+            hints=tuple(each.text for each in self.grave if each.kind in CONVENTIONS),
         )
+
+    @property
+    def _ordered(self) -> list[Finding]:
+        """The findings: mistakes in the meaning of data, other grave ones, and those to look at."""
+        return sorted(self.findings, key=lambda each: (each.level != "grave", each.kind not in CONVENTIONS))
 
     def document(self) -> Document:
         """Return the document of the check; `docs/giant-check.md` lists the members of its JSON form."""
         from photogram.diagnosis.document import check_document
 
         return check_document(self.title, self.verdict, self.sections, self.result)
+
+
+def _message(finding: Finding) -> Phrase:
+    return getattr(finding, "phrase", None) or as_phrase(finding.text)
+
+
+def _grave(code: str, check: Diagnosis) -> Phrase | None:
+    """Return the message on grave findings: on mistakes in the meaning of data (`hint`), or on others."""
+    if not check.grave or any(each.kind in CONVENTIONS for each in check.grave) is not (code == "hint"):
+        return None
+    fields = {"finding": _message(check._ordered[0]), "n": len(check.grave) - 1}
+    return Phrase(f"check.verdict.{code}{'.more' if fields['n'] else ''}", fields)
+
+
+def _look(check: Diagnosis) -> Phrase | None:
+    return phrase("check.verdict.look-at", n=len(check.findings)) if check.findings else None
+
+
+RULES = (
+    Rule("hint", partial(_grave, "hint"), EXIT_NOT_CONVERGED, ("correct",)),
+    Rule("gross-errors", partial(_grave, "gross-errors"), EXIT_NOT_CONVERGED, ("correct",)),
+    Rule("look-at", _look, 0, ("look", "adjust"), warning=True),
+    Rule("accepted", lambda _: phrase("check.verdict.accepted"), 0, ("adjust",)),
+)
+"""The rules of a check; the first that fits gives the headline."""

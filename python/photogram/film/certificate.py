@@ -15,7 +15,7 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.certificate_check import DistanceDifference, difference_of
-from photogram.film.certificate_file import REFERENCES, read_table, read_toml
+from photogram.film.certificate_file import REFERENCES, SD_PLACE, read_table, read_toml
 from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.lens_table import (
     Curve,
@@ -36,18 +36,17 @@ from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
 from photogram.statistics.findings import Findings
+from photogram.words import Phrase, phrase
 
-SD_PLACE = 0.002
-"""Of a coordinate that is printed to 0.001 mm."""
 SD_DESIGN = 0.02
 SD_C = 0.003
 SD_PRINCIPAL_POINT = 0.003
 SD_UNKNOWN_POINT = 0.02
-"""Of a principal point that nothing says, or that distances alone leave uncertain against the marks (mm)."""
+"""Of an unknown principal point, or if distances alone determine the marks (mm)."""
 APART = 3.0
-"""Standard deviations of a point by which that of symmetry is away from that of autocollimation."""
+"""Notable distance of the points of symmetry and autocollimation, in standard deviations."""
 PRINTED = 2e-3
-"""Millimetres by which printed coefficients may differ from the table of distortion."""
+"""Largest difference of printed coefficients from the table of distortion, millimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +141,9 @@ class Certificate(Documented, Judged, Brief):
 
     def __post_init__(self) -> None:
         one_of("reference", self.reference, REFERENCES)
-        own = {"autocollimation": self.autocollimation, "symmetry": self.symmetry}.get(self.reference)
-        if own is not None and any(own):
-            raise self._error(
-                f"coordinates refer to the point of {self.reference}, which is then the origin, not {own}:"
-                " say where the others are from there"
-            )
+        origin = {"autocollimation": self.autocollimation, "symmetry": self.symmetry}.get(self.reference)
+        if origin is not None and any(origin):
+            raise self._error("films.origin", reference=self.reference, value=str(origin))
 
     @classmethod
     def read(cls, path: Path | str, camera: str | None = None) -> Self:
@@ -168,7 +164,7 @@ class Certificate(Documented, Judged, Brief):
         file = Path(path)
         if file.suffix.lower() == ".toml":
             if camera is not None:
-                raise InputError("is the certificate of one camera: none is to be chosen", file=file)
+                raise InputError(phrase("films.one-camera"), file=file)
             return cls(**read_toml(file))
         return cls(**read_table(file, camera))
 
@@ -185,10 +181,6 @@ class Certificate(Documented, Judged, Brief):
 
     def check(self) -> tuple[DistanceDifference, ...]:
         """Compare distances with coordinates where both are given; explain those beyond 0.010 mm."""
-        return self._checked
-
-    @cached_property
-    def _checked(self) -> tuple[DistanceDifference, ...]:
         figures = {
             f"{mark}.{axis}": repr(v)
             for mark, xy in self.places.items()
@@ -228,13 +220,10 @@ class Certificate(Documented, Judged, Brief):
             return CalibratedMarks(names, xy, sd**2 * np.eye(xy.size) if given is None else given)
         marks = self._of_distances()
         if not marks:
-            raise self._error("has neither coordinates of marks nor distances between them")
+            raise self._error("films.no-marks")
         places = self._usual(marks)
         if missing := [name for name in marks if name not in places]:
-            raise self._error(
-                f"has distances alone, and nothing says where about {listed(missing)} are: give the type of"
-                " the camera, or places in [certificate.design]"
-            )
+            raise self._error("films.no-design", marks=missing)
         adjusted = adjust_distances(
             marks,
             np.array([places[name] for name in marks]),
@@ -262,12 +251,8 @@ class Certificate(Documented, Judged, Brief):
         InputError
             There is no table, or one that is too short.
         """
-        return self._curves
-
-    @cached_property
-    def _curves(self) -> tuple[Curve, ...]:
         if self.radial is None or self.c is None:
-            raise self._error("has no table of radial distortion with a focal length")
+            raise self._error("films.no-distortion")
         return curves_of(self.radial, self.c, self._sd_c)
 
     @property
@@ -285,7 +270,7 @@ class Certificate(Documented, Judged, Brief):
         if terms is None:
             return chosen(self.curves())
         if self.radial is None or self.c is None:
-            raise self._error("has no table of radial distortion with a focal length")
+            raise self._error("films.no-distortion")
         return fit_curve(self.radial, self.c, self._sd_c, terms)
 
     @property
@@ -312,7 +297,7 @@ class Certificate(Documented, Judged, Brief):
         """
         one_of("model", model, ("brown_forward", "brown"))
         if self.c is None:
-            raise self._error("has no focal length c")
+            raise self._error("films.no-focal-length")
         if self.radial is None:
             return LensParameters(model, ("c",), np.array([-self.c]), np.array([[self._sd_c**2]]))
         return (forward if model == "brown_forward" else backward)(self.curve(terms))
@@ -340,7 +325,7 @@ class Certificate(Documented, Judged, Brief):
         variances = [sd**2] * 2
         if self.tangential is not None:
             if model == "brown":
-                raise self._error("has decentring, which is converted to brown_forward only")
+                raise self._error("films.decentring")
             names, values = [*names, "B1", "B2"], [*values, *self.tangential.terms]
             variances += [self.tangential.sd_j1**2] * 2
         n = len(lens.names)
@@ -375,42 +360,33 @@ class Certificate(Documented, Judged, Brief):
         return certificate_document(self)
 
     def _findings(self) -> Findings:
-        from photogram.film.certificate_findings import certificate_findings
+        from photogram.film.certificate_document import certificate_findings
 
         return certificate_findings(self)
 
-    def told(self) -> list[str]:
-        """Return what a user should know beside the verdict, as sentences."""
-        said = [*self.remarks]
-        apart = self.printed_coefficients()
-        if apart is not None and apart > PRINTED:
-            turned = self._printed_less(-1.0) <= PRINTED
-            said.append(
-                f"the printed coefficients differ from the table of distortion by up to {1e3 * apart:.1f} um"
-                f"{'; they are those of the table with the other sign: is its sign -1?' if turned else ''}"
-            )
+    def told(self) -> list[str | Phrase]:
+        """Return remarks beside the verdict."""
+        remarks: list[str | Phrase] = [*self.remarks]
+        difference = self.printed_coefficients()
+        if difference is not None and difference > PRINTED:
+            opposite = self._printed_less(-1.0) <= PRINTED
+            code = "films.printed-other-sign" if opposite else "films.printed"
+            remarks.append(phrase(code, difference=1e3 * difference))
         if self.radial_coefficients and self.radial is None:
-            said.append("printed coefficients without a table of distortion are not used")
+            remarks.append(phrase("films.printed-alone"))
         if self.c is not None:
-            _, sd, what = self.principal_point
-            if what == "fiducial-centre":
-                said.append(f"nothing says where the principal point is: the fiducial centre, sd {sd:g} mm")
+            _, sd, point = self.principal_point
+            if point == "fiducial-centre":
+                remarks.append(phrase("films.unknown-point", sd=sd))
             elif not self.places:
-                said.append(f"distances leave the principal point against the marks uncertain: sd {sd:g} mm")
+                remarks.append(phrase("films.uncertain-point", sd=sd))
             if self.autocollimation is not None and self.symmetry is not None:
                 apart = math.dist(self.autocollimation, self.symmetry)
                 if apart > APART * sd:
-                    said.append(
-                        f"the point of symmetry is {1e3 * apart:.0f} um from that of autocollimation, about"
-                        " which distortion is taken"
-                    )
-        if self.places and (left := [m for m in self._of_distances() if m not in self.places]):
-            said.append(
-                f"marks with distances alone beside others with coordinates are left out: {listed(left)}"
-            )
-        return said
+                    remarks.append(phrase("films.points-apart", distance=1e3 * apart))
+        if self.places and (unused := [m for m in self._of_distances() if m not in self.places]):
+            remarks.append(phrase("films.unused-marks", marks=unused))
+        return remarks
 
-    def _error(self, message: str) -> InputError:
-        return InputError(
-            message if self.file else f"the certificate {self.name} {message}".rstrip(), file=self.file
-        )
+    def _error(self, code: str, **fields: object) -> InputError:
+        return InputError(Phrase(code, {"certificate": self.name, **fields}), file=self.file)

@@ -1,8 +1,8 @@
-"""Calibrated distances beside calibrated coordinates: which differ, and what single change would explain it.
+"""Calibrated distances and calibrated coordinates: differences, and single changes that explain them.
 
-Certificates were typed, and typed again. Of a distance and the four coordinates that give it, every variant
-that one slip of the hand makes is tried: neighbouring digits exchanged, the sign, one digit, one digit lost
-or added. No figure is ever changed: people are told.
+Certificates were typed by hand, often twice. All variants of a distance and its four coordinates by one
+typing error are tested: neighbouring digits exchanged, the sign, one digit, one digit lost or added.
+No figure is changed.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, get_args
 
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import Phrase, phrase
 
 How = Literal["exchange", "sign", "digit", "lost or extra"]
 
 LIMIT = 0.010
-"""Millimetres: a distance that differs by more from its coordinates is named."""
+"""Largest difference of a distance from its coordinates, millimetres."""
 EXPLAINED = 0.0035
-"""Millimetres: what may be left of a difference that a change explains."""
+"""Largest remaining difference if a change explains it, millimetres."""
 SAME = 1e-9
-"""Millimetres: what is left of differences alike but for rounding."""
+"""Differences that are equal except for rounding, millimetres."""
 _LEADING_ZERO = re.compile(r"[-+]?0\d")
-"""What nobody meant to type."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Explanation:
     from_usual: float | None = None
 
     def __str__(self) -> str:
-        return f"{self.field} {self.perhaps} for {self.typed} ({self.how})"
+        return str(phrase("films.change", **vars(self)))
 
 
 @dataclass(frozen=True)
@@ -85,32 +85,38 @@ class DistanceDifference:
         return abs(self.difference) > LIMIT
 
     def __str__(self) -> str:
-        said = f"{self.name} is {self.distance:.3f} mm, by coordinates {self.from_coordinates:.3f} mm"
-        if not self.explanations:
-            return f"{said}; no single change of a typed figure explains it" if self.beyond else said
-        first, *others = self.explanations
-        found = f"{said}; perhaps {first}"
-        if len(others) > 1:
-            return f"{found}, or {len(others)} other single changes"
-        return f"{found}, or {others[0]}" if others else found
+        return str(difference_message(self))
+
+
+def difference_message(difference: DistanceDifference) -> Phrase:
+    """Return the message of a distance: the likeliest change, and the second one or the number of others."""
+    changes = [phrase("films.change", **vars(each)) for each in difference.explanations[:2]]
+    others = len(difference.explanations) - 1
+    fields = {"distance": difference.distance, "coordinates": difference.from_coordinates}
+    code = "films.difference.several" if others > 1 else "films.difference"
+    if len(changes) == 0 and difference.beyond:
+        code = "films.difference.unexplained"
+    elif changes and others < 2:
+        code = "films.difference.two" if others else "films.difference.single"
+    explained = dict(zip(("first", "second"), changes, strict=False))
+    return phrase(code, name=difference.name, others=others, **fields, **explained)
 
 
 def difference_of(
     first: str, second: str, typed: Mapping[str, str], usual: Mapping[str, tuple[float, float]]
 ) -> DistanceDifference:
-    """Compare a distance with the coordinates of its marks; explain what differs by more than 0.010 mm.
+    """Compare a distance with the coordinates of its marks; explain differences of more than 0.010 mm.
 
-    `typed` are all figures as they stand in the certificate, by their fields; `usual` the usual places of
-    marks (mm), where they are known.
+    `typed` are all figures as typed in the certificate, by their fields; `usual` the usual places of marks
+    (mm), if they are known.
     """
     name = f"{first}-{second}"
     fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
-    own = {field: typed[field] for field in fields}
-    found = DistanceDifference(name, float(own[name]), _from_coordinates(fields, own))
+    found = DistanceDifference(name, float(typed[name]), _from_coordinates(fields, typed))
     if not found.beyond:
         return found
     places = {field: usual[field[:-2]]["xy".index(field[-1])] for field in fields[:4] if field[:-2] in usual}
-    return replace(found, explanations=explained(fields, own, places))
+    return replace(found, explanations=explained(fields, {field: typed[field] for field in fields}, places))
 
 
 def explained(
@@ -143,10 +149,14 @@ def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:
 
 
 def _variants(text: str) -> Iterator[tuple[How, str]]:
-    """Yield what one slip makes of a typed number, each other number once a kind."""
+    """Yield the other numbers that one typing error makes of a number, each once for a kind of error."""
     seen: set[tuple[How, str]] = set()
     for how, variant in _slips(text):
-        if (how, variant) not in seen and _other_number(variant, text):
+        try:
+            differs = float(variant) != float(text)
+        except ValueError:
+            continue
+        if differs and (how, variant) not in seen:
             seen.add((how, variant))
             yield how, variant
 
@@ -166,10 +176,3 @@ def _slips(text: str) -> Iterator[tuple[How, str]]:
             for added in (text[:place] + digit + text[place:], text[: place + 1] + digit + text[place + 1 :]):
                 if not _LEADING_ZERO.match(added):
                     yield "lost or extra", added
-
-
-def _other_number(variant: str, text: str) -> bool:
-    try:
-        return float(variant) != float(text)
-    except ValueError:
-        return False

@@ -1,13 +1,15 @@
-"""The document of a certificate; `docs/certificates.md` lists the members of its JSON form."""
+"""The document of a certificate and its findings; `docs/certificates.md` lists the members of its JSON."""
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.film.certificate_check import difference_message
 from photogram.film.certificate_tables import (
     compared,
     curve,
@@ -26,9 +28,12 @@ from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Line, Mark, Markers, band, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
+from photogram.statistics.findings import Findings, Tested
+from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.film import Certificate
+    from photogram.film import AdjustedMarks, Certificate
 
 CURVE = (
     "Readings with their standard deviation, the fitted curve with its own; beyond the table it is dashed."
@@ -62,7 +67,7 @@ def certificate_document(certificate: Certificate) -> Document:
             "type": certificate.camera_type or None,
             "date": certificate.day.isoformat() if certificate.day else None,
             "verdict": verdict.document(),
-            "remarks": certificate.told(),
+            "remarks": [*map(str, certificate.told())],
             "marks": of_marks,
             "lens": of_lens,
             "cameras": [_camera_members(each) for each in cameras],
@@ -77,19 +82,20 @@ def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]
     found = certificate.fiducials()
     parts: list[Part] = [marks(found)]
     order = [f"{name}.{axis}" for name in found.names for axis in "xy"]
-    own: dict[str, Any] = {
-        "covariance_mm2": {"order": order, "matrix": found.covariance},
-        "adjustment": None,
-    }
+    adjustment = None
     if found.adjusted is not None:
         test = found.adjusted.test
-        parts.append(observed(found.adjusted))
-        own["adjustment"] = {
+        tests = _distances(found.adjusted)
+        parts.append(observed(found.adjusted, certificate.verdict.marks(tests.kind, tests.values.shape)))
+        adjustment = {
             **members(found.adjusted, "degrees_of_freedom", free_movements="free"),
             "omega": test.weighted_sum_of_squares if test else None,
             "probability": test.probability_above if test else None,
         }
-    return parts, own
+    return parts, {
+        "covariance_mm2": {"order": order, "matrix": found.covariance},
+        "adjustment": adjustment,
+    }
 
 
 def _lens(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
@@ -128,19 +134,19 @@ def _cameras(certificate: Certificate) -> list[Camera]:
 def _facts(certificate: Certificate) -> list[Fact]:
     """Return what it is of, and how it was taken."""
     (xp, yp), sd, what = certificate.principal_point
-    found = [
+    facts = [
         Fact("Camera", certificate.name, note=certificate.camera_type),
         Fact("Date", certificate.day.isoformat() if certificate.day else "not given"),
     ]
     if certificate.c is not None:
-        found += [
+        facts += [
             Fact("Calibrated focal length", f"{certificate.c:.3f}", "mm"),
             Fact("Principal point", f"{xp:.4f}, {yp:.4f}", "mm", f"{what}, sd {sd:g} mm"),
         ]
     if certificate.radial is not None:
         apart = certificate.lens("brown").apart
-        found.append(Fact("Conversion to brown", significant(1e3 * apart, 2), "um", "differs by at most"))
-    return found
+        facts.append(Fact("Conversion to brown", significant(1e3 * apart, 2), "um", "differs by at most"))
+    return facts
 
 
 def _sketch(certificate: Certificate) -> Plot:
@@ -158,3 +164,73 @@ def _sketch(certificate: Certificate) -> Plot:
     drawn += [Line(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
     limits = np.column_stack([spread(0.0, 1.1 * edge), spread(low, high, *ends)])
     return Plot(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])
+
+
+def certificate_findings(certificate: Certificate) -> Findings:
+    """Return the tests of a certificate: distances with coordinates, distances alone, the lens."""
+    compared = certificate.check()
+    beyond = [difference_message(each) for each in compared if each.beyond]
+    tests: list[Tested] = []
+    fits: list[GlobalTest] = []
+    if compared:
+        tests.append(_compared(certificate))
+    if not certificate.places and (certificate.distances or certificate.lines):
+        adjusted = certificate.fiducials().adjusted
+        assert adjusted is not None
+        tests.append(_distances(adjusted))
+        fits += [adjusted.test] if adjusted.test else []
+    if certificate.radial is not None:
+        curve, angles = certificate.curve(), np.degrees(certificate.radial.angle)
+        kind = phrase("films.readings")
+        tests.append(
+            Tested(kind, curve.standardized, lambda at: phrase("films.reading", angle=float(angles[at[0]])))
+        )
+        fits += [curve.test] if curve.test else []
+    freedom = sum(test.degrees_of_freedom for test in fits)
+    squares = sum(test.weighted_sum_of_squares for test in fits)
+    return Findings(
+        status="converged",
+        observations=tests,
+        degrees_of_freedom=freedom + len(compared),
+        global_test=global_test(squares, freedom) if freedom else None,
+        untested=Phrase("untested.distances" if compared else "untested.redundant"),
+        spoiled=phrase("films.contradictions", differences=beyond) if beyond else "",
+        remarks=[*_agreement(certificate), *certificate.told()],
+        scaled=False,
+        check=Phrase("how.check.certificate"),
+        take_out=Phrase("advice.certificate"),
+        if_withheld=[Phrase("advice.printed-report")],
+    )
+
+
+def _distances(adjusted: AdjustedMarks) -> Tested:
+    return Tested(phrase("films.distances"), adjusted.standardized, lambda at: adjusted.rows[at[0]])
+
+
+def _compared(certificate: Certificate) -> Tested:
+    """Return differences of distances from coordinates over the standard deviations of both."""
+    marks, compared = certificate.fiducials(), certificate.check()
+    of = {name: row for row, name in enumerate(marks.names)}
+    cofactors = marks.covariance.reshape(len(of), 2, len(of), 2)
+    w: list[float] = []
+    for each in certificate.distances:
+        if not {each.first, each.second} <= of.keys():
+            continue
+        i, j = of[each.first], of[each.second]
+        along = (marks.xy[j] - marks.xy[i]) / np.hypot(*(marks.xy[j] - marks.xy[i]))
+        both = cofactors[i, :, i] + cofactors[j, :, j] - cofactors[i, :, j] - cofactors[j, :, i]
+        w.append(compared[len(w)].difference / math.sqrt(each.sd**2 + along @ both @ along))
+    return Tested(phrase("films.compared"), np.array(w), lambda at: compared[at[0]].name)
+
+
+def _agreement(certificate: Certificate) -> list[Phrase]:
+    """Return whether distances agree with coordinates, or what determines a figure of distances."""
+    compared = certificate.check()
+    if compared and not any(each.beyond for each in compared):
+        largest = max(abs(each.difference) for each in compared)
+        return [Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)})]
+    if certificate.places or not certificate.distances:
+        return []
+    adjusted = certificate.fiducials().adjusted
+    assert adjusted is not None
+    return [Phrase("line.free-figure" if adjusted.free else "line.few-distances")]

@@ -29,18 +29,16 @@ from photogram.film.lens_table import (
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
-from photogram.io.toml import TomlFile, day_of
-from photogram.io.toml_tables import Table, read_document
-from photogram.messages import listed, quoted
-from photogram.show.page import significant
+from photogram.io.places import at_place
+from photogram.io.toml import KeyPlace, Table, TomlFile, day_of, read_document
+from photogram.messages import unknown_name
+from photogram.words import Phrase, phrase
 
 UM = 1e-3
-"""In millimetres."""
 SD_DISTANCE = 0.002
 SD_DISTORTION_UM = 1.5
 SD_TANGENTIAL_UM = 2.0
-LARGEST = 1e4
-"""Millimetres of a camera."""
+LARGEST = 1e4  # millimetres
 
 _KEYS = (
     *("camera", "type", "date", "data_strip", "unit", "c", "sd_c", "principal_point", "autocollimation"),
@@ -55,9 +53,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     InputError: the file cannot be read, is no TOML, or has what is not known or cannot be used.
     """
     table = read_document(path, {"certificate": _KEYS}).table("certificate")
-    if (unit := table.text("unit", "mm")) != "mm":
-        raise table.error("unit", f"is {quoted(unit)}: certificates are read in mm")
-    strip = _choice(table, "data_strip", "left", get_args(DataStrip))
+    table.choice("unit", ("mm",), "mm")
+    strip = table.choice("data_strip", get_args(DataStrip), "left")
     frame = _Frame(cast(DataStrip, strip), path)
     found: dict[str, Any] = {
         "name": table.word("camera", path.stem),
@@ -65,7 +62,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         "day": _day(table),
         "c": abs(table.number("c", low=-LARGEST, high=LARGEST)) if "c" in table else None,
         "sd_c": _positive(table, "sd_c"),
-        "reference": _choice(table, "principal_point", "fiducial-centre", REFERENCES),
+        "reference": table.choice("principal_point", REFERENCES, "fiducial-centre"),
         "autocollimation": frame.place(table, "autocollimation"),
         "symmetry": frame.place(table, "symmetry"),
         "sd_principal_point": _positive(table, "sd_principal_point"),
@@ -79,7 +76,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         "file": path,
     }
     if found["c"] == 0:
-        raise table.error("c", "is zero")
+        raise table.error("c", phrase("error.positive", value=0.0))
     found |= _radial(table, found["c"], frame)
     found["tangential"] = _tangential(table, found["c"], found.get("radial"), frame)
     return found
@@ -90,7 +87,7 @@ REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")
 
 
 class _Frame:
-    """Marks and places as a file has them, turned; and the figures as they were typed."""
+    """Marks and places of a file, turned; and the figures as typed."""
 
     def __init__(self, data_strip: DataStrip, path: Path) -> None:
         self.data_strip, self.typed = data_strip, dict[str, str]()
@@ -112,7 +109,7 @@ class _Frame:
         for key in table.values:
             name, place = self.mark(key), self.place(table, key)
             if name in found:
-                raise table.error(key, f"is the mark {name}, which is there already")
+                raise table.error(key, phrase("error.repeated", kind="mark", name=name))
             assert place is not None
             found[name] = place
             if section == "fiducials":
@@ -120,7 +117,7 @@ class _Frame:
         return found
 
     def _keep(self, name: str, texts: list[str]) -> None:
-        """Keep coordinates as they were typed: turned, they have changed places and signs."""
+        """Store coordinates as typed; if they are turned, with exchanged places and signs."""
         x, y = texts
         if self.data_strip == "top":
             x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
@@ -131,49 +128,42 @@ class _Frame:
         for key in table.values:
             parts = [self.mark(part) for part in key.split("-")]
             if len(parts) != 2 or not all(parts) or parts[0] == parts[1]:
-                raise table.error(key, "is no pair of marks: a distance is called ml-mr")
-            length = table.number(key, low=0, high=LARGEST)
-            each = MarkDistance(parts[0], parts[1], length, sd)
-            if not length:
-                raise table.error(key, "is 0")
+                raise table.error(key, phrase("films.pair-of-marks"))
+            distance = MarkDistance(parts[0], parts[1], table.positive(key), sd)
+            if distance.length > LARGEST:
+                raise table.error(key, phrase("error.most", high=LARGEST, value=distance.length))
             if frozenset(parts) in found:
-                raise table.error(key, f"is the distance {each.name}, which is there already")
-            found[frozenset(parts)] = each
-            self.typed[each.name] = _text(self._typed["distances"][key])
+                raise table.error(key, phrase("error.repeated", kind="distance", name=distance.name))
+            found[frozenset(parts)] = distance
+            self.typed[distance.name] = _text(self._typed["distances"][key])
         return tuple(found.values())
 
     def lines(self, table: Table) -> tuple[RightAngle | Crossing, ...]:
         found: list[RightAngle | Crossing] = []
         for number, row in enumerate(table.items("lines", []), 1):
             if not isinstance(row, dict):
-                raise table.error("lines", "is no list of tables")
-            own = Table(row, f"certificate.lines {number}", table.file)
-            own.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
-            names = [self.mark(each) for each in own.words("marks")]
+                raise table.error("lines", phrase("error.table", value=str(row)))
+            line = Table(row, f"certificate.lines {number}", table.source)
+            line.only(("marks", "angle", "sd_angle_arcmin", "place", "sd_place"))
+            names = [self.mark(each) for each in line.words("marks")]
             if len(names) != 4 or len(set(names)) < 4:
-                raise own.error("marks", "are four: those of the first line, then of the second")
+                raise line.error("marks", phrase("films.four-marks"))
             marks = (names[0], names[1], names[2], names[3])
-            if "sd_angle_arcmin" in own:
-                sd = math.radians(own.positive("sd_angle_arcmin") / 60)
-                found.append(RightAngle(marks, sd, math.radians(own.number("angle", 90.0, low=1, high=179))))
-            if "sd_place" in own:
-                place = self.place(own, "place") or (0.0, 0.0)
-                found.append(Crossing(marks, own.positive("sd_place"), place))
-            if not {"sd_angle_arcmin", "sd_place"} & own.values.keys():
-                raise own.error("marks", "say nothing without sd_angle_arcmin or sd_place")
+            if "sd_angle_arcmin" in line:
+                sd = math.radians(line.positive("sd_angle_arcmin") / 60)
+                angle = math.radians(line.number("angle", 90.0, low=1, high=179))
+                found.append(RightAngle(marks, sd, angle))
+            if "sd_place" in line:
+                place = self.place(line, "place") or (0.0, 0.0)
+                found.append(Crossing(marks, line.positive("sd_place"), place))
+            if not {"sd_angle_arcmin", "sd_place"} & line.values.keys():
+                raise line.error("marks", phrase("films.line-without-sd"))
         return tuple(found)
 
 
 def _text(value: Any) -> str:
     """Return a number as it was typed."""
     return str(value).replace("_", "")
-
-
-def _choice(table: Table, key: str, default: str, known: tuple[str, ...]) -> str:
-    value = table.text(key, default)
-    if value not in known:
-        raise table.error(key, f"is {quoted(value)}, not one of {', '.join(known)}")
-    return value
 
 
 def _positive(table: Table, key: str) -> float | None:
@@ -187,36 +177,36 @@ def _day(table: Table) -> date | None:
     try:
         return day_of(value)
     except ValueError:
-        raise table.error("date", f"is {quoted(str(value))}, not a day such as 1983-05-11") from None
+        raise table.error("date", phrase("error.day", value=str(value))) from None
 
 
 def _numbers(table: Table, key: str, count: int | None = None) -> Floats:
-    """Return a list of finite numbers, so many where that is said."""
+    """Return a list of finite numbers, of any length if the count is None."""
     found = np.array(table.numbers(key, len(table.items(key)) if count is None else count))
     if not np.isfinite(found).all():
-        raise table.error(key, "has what is not a finite number")
+        raise table.error(key, phrase("error.finite", value=math.inf))
     return found
 
 
-def _sign(table: Table, key: str, why: str) -> int:
+def _sign(table: Table, key: str) -> int:
     value = table.values.get(key)
     if value not in (1, -1) or isinstance(value, bool):
-        raise table.error(key, f"must say 1 or -1: {why}")
+        raise table.error(key, phrase("films.sign", value=str(value)))
     return int(value)
 
 
 def _angles(own: Table, c: float | None) -> Floats:
-    """Return angles from the axis, rad, of a table that has these in degrees or radii in mm."""
+    """Return angles from the axis, rad, of a table with angles in degrees or radii in mm."""
     if ("angle" in own) == ("radius" in own):
-        raise own.error("angle", "or radius: one of them is needed")
+        raise own.error("angle", phrase("error.exclusive", first="angle", second="radius"))
     key = "angle" if "angle" in own else "radius"
     values = _numbers(own, key)
     if key == "radius":
         if c is None:
-            raise own.error("radius", "needs c, to which radii refer")
+            raise own.error("radius", phrase("error.requires", name="radius", other="c"))
         values = np.degrees(np.arctan2(values, c))
     if not ((values > 0) & (values < 90)).all():
-        raise own.error(key, "has values that are not between the axis and 90 degrees from it")
+        raise own.error(key, phrase("films.angles"))
     return np.radians(values)
 
 
@@ -229,36 +219,28 @@ def _radial(table: Table, c: float | None, frame: _Frame) -> dict[str, Any]:
     own = table.table("radial")
     own.only(("angle", "radius", "distortion", "sign", "sd_um", "correlation", *SEMI_DIAGONALS))
     if c is None:
-        raise own.error("distortion", "needs c, the focal length that it belongs to")
+        raise own.error("distortion", phrase("error.requires", name="distortion", other="c"))
     angle = _angles(own, c)
     correlation = own.number("correlation", 0.0, low=0.0, high=0.999)
-    outwards = UM * _sign(own, "sign", "distortion outwards is 1, inwards -1") if "sign" in own else UM
+    outwards = UM * _sign(own, "sign") if "sign" in own else UM
     if "distortion" in own:
         values = outwards * _numbers(own, "distortion", len(angle))
         return found | {
             "radial": RadialTable(angle, values, UM * own.positive("sd_um", SD_DISTORTION_UM), correlation)
         }
     singly = {frame.mark(name): outwards * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
-    try:
+    with at_place(KeyPlace(own, "ll")):
         four = of_semi_diagonals(angle, singly, UM * own.positive("sd_um") if "sd_um" in own else None)
-    except InputError as error:
-        raise own.error("ll", error.message) from None
     radial = RadialTable(angle, four.mean, four.sd, correlation)
-    return found | {"radial": radial, "remarks": tuple(_told_by(four))}
+    return found | {"radial": radial, "remarks": tuple(_remarks_on(four))}
 
 
-def _told_by(four: SemiDiagonals) -> Iterator[str]:
+def _remarks_on(four: SemiDiagonals) -> Iterator[Phrase]:
     if four.is_elsewhere:
         x, y = four.centre.tolist()
-        yield (
-            f"opposite semi-diagonals differ alike at all radii: that of symmetry is at ({x:.3f}, {y:.3f}) mm"
-            f" (sd {significant(four.sd_centre, 2)}) from the point about which these count: the indicated"
-            " principal point, and not the calibrated one? Their mean is free of it"
-        )
-    yield (
-        f"opposite semi-diagonals show decentring of up to {significant(four.decentring / UM, 2)} um"
-        f" (sd {significant(four.sd_half_difference / UM, 2)} um)"
-    )
+        yield phrase("films.symmetry-elsewhere", x=x, y=y, sd=float(four.sd_centre))
+    sizes = {"size": float(four.decentring / UM), "sd": float(four.sd_half_difference / UM)}
+    yield phrase("films.decentring-of-diagonals", **sizes)
 
 
 def _tangential(
@@ -266,25 +248,25 @@ def _tangential(
 ) -> Tangential | None:
     if "tangential" not in table:
         return None
-    sign = _sign(table, "tangential_sign", "laboratories count the profile either way, it is not guessed")
+    sign = _sign(table, "tangential_sign")
     own = table.table("tangential")
     own.only(("J1", "phi0", "angle", "radius", "displacement", "sd_um"))
     phi0 = math.radians(own.number("phi0")) + (math.pi / 2 if frame.data_strip == "top" else 0.0)
     sd = UM * own.positive("sd_um", SD_TANGENTIAL_UM)
     if "J1" in own:
         if radial is None or c is None:
-            raise own.error("J1", "needs the table of radial distortion, whose edge sd_um refers to")
+            raise own.error("J1", phrase("error.requires", name="J1", other="the table radial"))
         edge = c * math.tan(float(radial.angle.max()))
         return Tangential(own.number("J1"), phi0, sign, sd / edge**2)
     if c is None:
-        raise own.error("displacement", "needs c")
+        raise own.error("displacement", phrase("error.requires", name="displacement", other="c"))
     angle = _angles(own, c)
     values = UM * _numbers(own, "displacement", len(angle))
     j1, sd_j1 = of_profile(c * np.tan(angle), values, sd)
     return Tangential(j1, phi0, sign, sd_j1)
 
 
-SD_PLACE = 0.002
+SD_PLACE = 0.002  # of a coordinate that is printed to 0.001 mm
 _NUMBERS = ("x", "y", "sd_x", "sd_y")
 _COLUMNS = ("camera", "fiducial", *_NUMBERS, "use")
 
@@ -292,15 +274,14 @@ _COLUMNS = ("camera", "fiducial", *_NUMBERS, "use")
 def read_table(path: Path, camera: str | None) -> dict[str, Any]:
     """Return the fields of a certificate from a table `camera, fiducial, x, y, sd_x, sd_y, use`.
 
-    Marks with `use` off are left out, and remarked on. A table `covariances` beside it (`kind, name, first,
-    second, covariance`; kind `fiducials`) takes the place of the standard deviations of what it names.
-    InputError: the file cannot be read, lacks a column, has other ones, or several cameras of which none is
-    chosen.
+    Marks with `use` off are not used. A table `covariances` in the same folder (`kind, name, first, second,
+    covariance`; kind `fiducials`) replaces standard deviations. InputError: the file cannot be read, lacks a
+    column, has other ones, or several cameras of which none is chosen.
     """
     table = read_columns(path, known=_COLUMNS, numbers=_NUMBERS)
     table.require("camera", "fiducial", "x", "y")
     if unknown := [each for each in table.columns if each not in _COLUMNS]:
-        raise table.head.error(f"there is no column {listed(unknown)}, but {', '.join(_COLUMNS)}")
+        raise table.head.error(unknown_name("column", unknown[0], _COLUMNS))
     rows, name = _rows_of(table, camera)
     marks = [by_side(each) for each in table.texts("fiducial")]
     on = [row for row in rows if _used(table, row)]
@@ -310,9 +291,10 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
     names = [marks[row] for row in on]
     for row in on:
         if names.count(marks[row]) > 1:
-            raise table.error(row, f"the mark {marks[row]} is there twice")
+            raise table.error(row, phrase("error.repeated", kind="mark", name=marks[row]))
         if not (sd[row] > 0).all():
-            raise table.error(row, "column sd_x or sd_y: is not positive")
+            message = phrase("error.positive", value=float(sd[row].min()))
+            raise table.error(row, phrase("error.at", what="sd_x, sd_y", message=message))
     fields = [f"{mark}.{axis}" for mark in names for axis in "xy"]
     typed = {f"{marks[row]}.{axis}": table.texts(axis)[row] for row in on for axis in "xy"}
     left = [marks[row] for row in rows if row not in on]
@@ -322,32 +304,30 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
         "covariance": _covariance(path.with_name("covariances.csv"), name, fields, sd[on].ravel()),
         "typed": typed,
         "file": path,
-        "remarks": (f"marks that are off: {listed(left)}",) if left else (),
+        "remarks": (phrase("films.marks-off", marks=left),) if left else (),
     }
 
 
 def _rows_of(table: ColumnTable, camera: str | None) -> tuple[list[int], str]:
     cameras = table.names("camera")
     if camera is None and len(cameras.names) > 1:
-        raise InputError(f"has marks of {listed(cameras.names)}: choose one", file=table.path)
+        raise InputError(phrase("films.choose-camera", cameras=cameras.names), file=table.path)
     name = cameras.names[0] if camera is None and cameras.names else camera
     if name is None or name not in cameras.names:
-        there = listed(cameras.names) or "none"
-        raise InputError(
-            f"has no marks of the camera {quoted(str(name))}: there are {there}", file=table.path
-        )
+        raise InputError(unknown_name("camera", str(name), cameras.names), file=table.path)
     return np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist(), name
 
 
 def _used(table: ColumnTable, row: int) -> bool:
     word = table.texts("use")[row].lower()
     if word not in ("", "on", "off"):
-        raise table.error(row, f"column use: {quoted(word)} is neither on nor off")
+        message = phrase("error.choice", value=word, names=["on", "off"])
+        raise table.error(row, phrase("error.column", column="use", message=message))
     return word != "off"
 
 
 def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Floats:
-    """Return the matrix of coordinates in mm^2: that of the table beside, or standard deviations."""
+    """Return the matrix of coordinates in mm^2: of the table of covariances, or of standard deviations."""
     found = np.diag(sd**2)
     if not path.exists():
         return found
@@ -361,11 +341,12 @@ def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Float
         pair = [texts[column][row] for column in ("first", "second")]
         for word in pair:
             if word not in fields:
-                raise table.error(row, f"there is no coordinate {quoted(word)} of {camera}")
+                raise table.error(row, unknown_name("coordinate", word, fields))
         if np.isnan(values[row]):
-            raise table.error(row, "column covariance: is empty")
+            message = phrase("error.empty")
+            raise table.error(row, phrase("error.column", column="covariance", message=message))
         i, j = (fields.index(word) for word in pair)
         found[i, j] = found[j, i] = values[row]
     if not is_covariance(found, singular=True):
-        raise InputError(f"the covariances of the marks of {camera} are no covariance matrix", file=path)
+        raise InputError(phrase("error.covariance-singular"), file=path)
     return found

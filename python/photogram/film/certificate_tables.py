@@ -14,7 +14,6 @@ from photogram.film.distances import AdjustedMarks
 from photogram.film.lens_table import Curve, RadialTable
 from photogram.network.cameras import Camera
 from photogram.show.quantity import Axis, Kind, Quantity, Table, of_each
-from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
 
 if TYPE_CHECKING:
     from photogram.film import CalibratedMarks
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
 MM = (Axis("", "mm", small="um", factor=1e3),)
 XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))
-RADII = 8
-"""Along the curve of a table."""
+RADII = 8  # along the curve of a table
 
 
 def marks(found: CalibratedMarks) -> Table:
@@ -37,21 +35,20 @@ def marks(found: CalibratedMarks) -> Table:
     return Table("marks.places", "Places of the marks", columns)
 
 
-def compared(found: Sequence[DistanceDifference]) -> Table:
-    """Return distances beside those from coordinates, and what single changes explain the difference."""
+def compared(differences: Sequence[DistanceDifference]) -> Table:
+    """Return distances, those from coordinates, and single changes that explain the difference."""
     given, computed, apart = (
-        np.array([getattr(each, name) for each in found])
+        np.array([getattr(each, name) for each in differences])
         for name in ("distance", "from_coordinates", "difference")
     )
+    beyond = np.array([each.beyond for each in differences], bool)
     columns = [
-        of_each(found, "name", kind="name", member="distance", head="Distance"),
+        of_each(differences, "name", kind="name", member="distance", head="Distance"),
         _mm(given, "value", "distance", "Given", 3),
         _mm(computed, "value", "from_coordinates", "From coordinates", 4),
-        _mm(
-            apart, "deviation", "difference", "Difference", 1, np.array([each.beyond for each in found], bool)
-        ),
-        of_each(found, "beyond"),
-        Quantity([[vars(one) for one in each.explanations] for each in found], member="explanations"),
+        _mm(apart, "deviation", "difference", "Difference", 1, beyond),
+        of_each(differences, "beyond"),
+        Quantity([[vars(one) for one in each.explanations] for each in differences], member="explanations"),
     ]
     about = (
         "Beyond 0.010 mm a distance and its coordinates contradict each other. Single changes of a typed"
@@ -60,10 +57,12 @@ def compared(found: Sequence[DistanceDifference]) -> Table:
     return Table("distances", "Distances beside coordinates", columns, "", about)
 
 
-def explanations(found: Sequence[DistanceDifference]) -> Table:
-    """Return the single changes of a figure that explain differences, and what each leaves."""
+def explanations(differences: Sequence[DistanceDifference]) -> Table:
+    """Return the single changes of a figure that explain differences, with the remaining difference."""
     pairs: list[tuple[str, Explanation | None]] = [
-        (each.name, one) for each in found for one in each.explanations or ((None,) if each.beyond else ())
+        (each.name, one)
+        for each in differences
+        for one in each.explanations or ((None,) if each.beyond else ())
     ]
     remaining = np.array([one and one.remaining for _, one in pairs], dtype=float)
     moved = np.array([one and one.from_usual for _, one in pairs], dtype=float)
@@ -79,16 +78,15 @@ def explanations(found: Sequence[DistanceDifference]) -> Table:
 def _mm(
     values: Floats, kind: Kind, member: str, head: str, decimals: int, marked: Bools | None = None
 ) -> Quantity:
-    """Return lengths, which people read in mm, or as small ones in um."""
+    """Return lengths in mm, small ones in um."""
     return Quantity(values, MM, kind, member=f"{member}_mm", head=head, decimals=decimals, marked=marked)
 
 
-def observed(found: AdjustedMarks) -> Table:
-    """Return what was adjusted: residuals, redundancy, w, and by how much each would be wrong alone."""
+def observed(found: AdjustedMarks, marked: Bools) -> Table:
+    """Return the adjusted observations with residuals, redundancy, w, and the error if one is wrong."""
     of = np.array([int(name.startswith("angle ")) for name in found.rows])
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.where(np.isnan(found.standardized), math.nan, found.residuals / found.redundancy)
-    marked = np.abs(found.standardized) > critical_normal(bonferroni(LEVEL, max(len(found.rows), 1)))
     columns = [
         Quantity([*found.rows], kind="name", member="observed", head="Observed"),
         Quantity(found.observed, OBSERVED, "value", member="value", head="Value", decimals=3, of=of),
@@ -132,7 +130,7 @@ def terms(curves: tuple[Curve, ...], taken: int) -> Table:
     omega = [each.omega for each in curves]
     p = [each.test.probability_above if each.test else None for each in curves]
     freedom = [len(each.radius) - each.terms - 1 for each in curves]
-    said = ["chosen" if each.terms == taken else "" for each in curves]
+    choice = ["chosen" if each.terms == taken else "" for each in curves]
     gain = np.array([math.nan, *-np.diff(omega)])
     columns = [
         of_each(curves, "terms", head="Odd terms"),
@@ -140,7 +138,7 @@ def terms(curves: tuple[Curve, ...], taken: int) -> Table:
         Quantity(freedom, member="degrees_of_freedom", head="f"),
         Quantity(p, member="probability", head="p", figures=2),
         Quantity(gain, member="gain", head="Gain", decimals=2),
-        Quantity(said, kind="name", head="Taken"),
+        Quantity(choice, kind="name", head="Taken"),
         Quantity([each.coefficients for each in curves], member="coefficients"),
         Quantity([each.covariance for each in curves], member="covariance"),
     ]

@@ -1,12 +1,11 @@
 """Places of fiducial marks from distances between them, by least squares in the plane, and their frame.
 
-Observations are distances s = |q_j - q_i|, and where a report says so the angle in which lines through
-opposite marks cross, and the place where they do. Where these determine the figure it is free: of all places
-that fit alike those nearest to the design (inner constraints), with the pseudo-inverse as their cofactors.
-Where they do not, design places are weighted observations besides.
+Observations are distances s = |q_j - q_i|, and, if a report has them, the angle between lines through
+opposite marks and their intersection. If these determine the figure it is free: of all solutions the nearest
+to the design (inner constraints), with the pseudo-inverse as cofactors. Else design places are observations.
 
-The engine of blocks adjusts points that photos show, and knows no angle between lines: this is a dense fit of
-some tens of unknowns (`photogram.statistics.fits`), linearised anew until nothing moves.
+Blocks adjust points of photos, and have no angles between lines: this is a dense fit of some tens of unknowns
+(`photogram.statistics.fits`), linearised until nothing moves.
 """
 
 from __future__ import annotations
@@ -21,12 +20,11 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
-STEPS = 50
-CLOSE = 1e-13
-"""Millimetres: where steps end."""
-DETERMINED = 1e-6
-"""Least part of the largest singular value by which a movement of the marks is seen."""
+MAX_STEPS = 50
+CONVERGED = 1e-13  # of the format
+DETERMINED = 1e-6  # least singular value of a determined movement, in parts of the largest
 
 
 @dataclass(frozen=True)
@@ -180,7 +178,7 @@ def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floa
     """Return places, the last fit, and the directions (2n, u) in which its parameters are."""
     xy = design.astype(float)
     variances = np.diag([each.sd**2 for each in rows])
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         a = _partials(rows, xy)
         misfit = np.array([each.observed - each.at(xy)[0] for each in rows])
         left = _open(a, xy) if free else np.zeros((xy.size, 0))
@@ -188,16 +186,14 @@ def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floa
             break
         within = np.linalg.qr(left, mode="complete")[0][:, left.shape[1] :]
         fit = Fit.of(misfit, variances, a @ within)
-        # Movements that nothing observes take the figure as near to the design as it comes.
+        # Unobserved movements bring the figure as near to the design as possible.
         step = within @ fit.parameters + left @ (left.T @ (design - xy).ravel())
         xy = xy + step.reshape(-1, 2)
-        if np.abs(step).max() < CLOSE * np.abs(design).max():
+        if np.abs(step).max() < CONVERGED * np.abs(design).max():
             return xy, fit, within
         if not np.isfinite(xy).all():
             break
-    raise AdjustmentError(
-        "the distances between marks do not fit their design places: other marks, or another unit?"
-    )
+    raise AdjustmentError(phrase("films.distances-not-converged"))
 
 
 def _partials(rows: Sequence[_Row], xy: Floats) -> Floats:
@@ -205,12 +201,8 @@ def _partials(rows: Sequence[_Row], xy: Floats) -> Floats:
 
 
 def _open(partials: Floats, xy: Floats) -> Floats | None:
-    """Return (2n, d) orthonormal movements of the whole that no row sees; None where rows see too little."""
-    n = len(xy)
-    ones, zeros = np.ones(n), np.zeros(n)
-    shifts = [np.column_stack(each).ravel() for each in ((ones, zeros), (zeros, ones))]
-    turn = np.column_stack([-xy[:, 1], xy[:, 0]]).ravel()
-    whole = np.linalg.qr(np.column_stack([*shifts, turn]))[0]
+    """Return (2n, d) an orthonormal basis of the datum defect; None if rows do not determine the figure."""
+    n, whole = len(xy), _movements(xy)
     seen, size = np.linalg.svd(partials @ whole, full_matrices=True)[2], _sizes(partials @ whole, 3)
     largest = np.linalg.norm(partials, ord=2)
     left = whole @ seen[size < DETERMINED * largest].T
@@ -290,18 +282,17 @@ def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
 
 
 SINGULAR = 1e-9
-"""Least part of the largest eigenvalue of a covariance that is not zero."""
+"""Least eigenvalue of a covariance that is not zero, in parts of the largest."""
 HELD = 1e-2
-"""Standard deviation of the frame in parts of the least of the figure."""
+"""Standard deviation of the frame in parts of the least one of the figure."""
 
 
 def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
-    """Return a covariance of marks that is positive definite, and how many movements it holds.
+    """Return a positive definite covariance of marks, and the number of movements that it fixes.
 
-    A figure from distances has no covariance of shifts and rotation, G: C G = 0. Its frame is that of its
-    marks, and C + s^2 G G' with s small says this with weights. Films take shift and rotation by t and theta,
-    images by the principal point and kappa: nothing that can be estimated depends on s, but for the principal
-    point, to whose variance s^2/n is added.
+    A figure from distances has no covariance of shifts and rotation, G: C G = 0. Its marks define the frame:
+    C + s^2 G G' with a small s. The placement of films, the principal point and kappa absorb shift and
+    rotation: only the variance of the principal point depends on s, by s^2/n.
 
     Places are (n, 2) mm, their covariance (2n, 2n) mm^2, x and y of a mark behind each other. InputError: a
     covariance that is singular otherwise.
@@ -314,9 +305,7 @@ def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
     movements = _movements(xy)
     outside = vectors[:, free] - movements @ (movements.T @ vectors[:, free])
     if count > 3 or np.abs(outside).max() > np.sqrt(SINGULAR):
-        raise InputError(
-            "the covariance of its marks is singular, and not as that of distances is: by shifts and rotation"
-        )
+        raise InputError(phrase("films.singular-marks"))
     own = vectors[:, free]
     return covariance + HELD**2 * values[~free].min() * (own @ own.T), count
 

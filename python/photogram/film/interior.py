@@ -1,4 +1,4 @@
-"""The film of a photo from its fiducial marks alone: what is affine in it, and whether it is mirrored."""
+"""The film of a photo from its fiducial marks alone: its affine form, and whether it is mirrored."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from photogram.network.films import (
     Scanner,
     ScannerCurve,
 )
+from photogram.words import Phrase, phrase
 
 FilmModel = Literal["conformal", "affine", "bilinear", "projective"]
 
@@ -36,10 +37,10 @@ UNKNOWNS: dict[str, tuple[str, ...]] = {
 }
 """Unknowns of each model."""
 FAR = 5.0
-"""Millimetres: marks that are as far off on either side are no such marks."""
-_STEPS = 20
-_ENDED = 1e-12
-"""Steps of the adjustment at the most, and one so small, in parts of the format, is the last."""
+"""Residuals on both sides beyond which marks are named wrongly, millimetres."""
+_MAX_STEPS = 20
+_CONVERGED = 1e-12
+"""Largest step at convergence, in parts of the format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ class Interior:
 def is_mirrored(places: ArrayLike, true: ArrayLike) -> bool | None:
     """Return whether an affine map of places (n, 2) to true places (n, 2), y up, changes the side.
 
-    None where fewer than three marks, or marks on a line, do not tell.
+    None with fewer than three marks, or marks on a line.
     """
     q, p = (np.asarray(each, dtype=float) for each in (places, true))
     if len(q) < 3:
@@ -180,12 +181,11 @@ def interior_orientation(
     xy = shaped("readings", readings, q.shape)
     weights = 1.0 / np.broadcast_to(np.asarray(sd, dtype=float), xy.shape)
     if not (np.isfinite(q).all() and np.isfinite(xy).all() and np.isfinite(weights).all()):
-        raise InputError("places, readings and their standard deviations must be finite")
+        raise InputError(phrase("films.finite-readings"))
     names = UNKNOWNS[model]
     if 2 * len(q) < len(names):
-        raise InputError(
-            f"the {model} film has {len(names)} unknowns, and {len(q)} marks have {2 * len(q)} coordinates"
-        )
+        fields = {"unknowns": len(names), "marks": len(q), "coordinates": 2 * len(q)}
+        raise InputError(phrase("films.few-marks", model=model, **fields))
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
     true = true_places(xy, own, machine, curves)
     side = _side(q, true, mirrored)
@@ -210,7 +210,8 @@ def pairs(name: str, value: ArrayLike) -> Floats:
     """Return an array (n, 2), n at least 1."""
     found = numbers(name, value)
     if found.ndim != 2 or found.shape[1] != 2 or not len(found):
-        raise InputError(f"{name} has the shape {found.shape}, not (n, 2)")
+        fields = {"shape": "(n, 2)", "actual": str(found.shape)}
+        raise InputError(phrase("error.at", what=name, message=phrase("error.shape", **fields)))
     return found
 
 
@@ -229,27 +230,22 @@ def _vectors(film: Film) -> Floats:
 def _side(q: Floats, true: Floats, given: bool | None) -> bool:
     found = is_mirrored(q, true)
     if given is None and found is None:
-        raise InputError("the marks do not tell whether the film is mirrored: say mirrored")
+        raise InputError(phrase("films.unknown-side"))
     if given is not None and found is not None and found != given:
         raise ContradictionError(mirror_message(given, side_residuals(q, true)))
     return bool(found if given is None else given)
 
 
-def mirror_message(given: bool, apart: tuple[float, float]) -> str:
-    """Return what is said of marks that tell another side than what is given.
+def mirror_message(given: bool, apart: tuple[float, float]) -> Phrase:
+    """Return the message if marks contradict the given side of the film.
 
-    `apart`: root mean squares (mm) of their residuals as they are, and mirrored.
+    `apart` are root mean squares (mm) of their residuals as they are, and mirrored.
     """
-    side, other = apart[given], apart[not given]
-    fits = f"its marks are {side:.3g} mm off as is given, and {other:.3g} mm on the other side"
-    if other > FAR:
-        return f"{fits}: they are named wrongly, or those of another camera"
-    if given:
-        return f"the film is not mirrored: {fits}; say mirrored = false"
-    return (
-        f"the film is mirrored: {fits}: scanned from the other side, a negative, or rows that count up; say"
-        " mirrored = true"
-    )
+    fields = {"given": apart[given], "other": apart[not given]}
+    code = "films.wrong-marks" if fields["other"] > FAR else "films.mirrored"
+    if code == "films.mirrored" and given:
+        code = "films.not-mirrored"
+    return phrase(code, **fields)
 
 
 def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
@@ -314,19 +310,17 @@ class _Fit:
         known, shifts = [_place(name) for name in self.names], list(range(8, len(values)))
         columns, size, rows = known + shifts, np.abs(self.places).max(), 2 * len(self.places)
         moves = np.concatenate([_moves(size), np.ones(len(shifts))])[columns]
-        for _ in range(_STEPS):
+        for _ in range(_MAX_STEPS):
             right, matrix = self.equations(values)
             scale = np.linalg.norm(matrix, axis=0)
             if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
-                raise InputError(
-                    f"the marks do not determine the {model} film: they lie on a line, or together"
-                )
+                raise InputError(phrase("films.undetermined", model=model))
             step = np.linalg.lstsq(matrix / scale, right, rcond=None)[0] / scale
             values[columns] += step
-            if np.abs(step * moves).max() < _ENDED * size:
+            if np.abs(step * moves).max() < _CONVERGED * size:
                 break
         else:
-            raise InputError(f"the {model} film does not converge: marks and readings do not belong together")
+            raise InputError(phrase("films.not-converged", model=model))
         right, matrix = self.equations(values)
         basis, triangle = np.linalg.qr(matrix)
         inverse = np.linalg.inv(triangle)

@@ -1,6 +1,6 @@
-"""A lens from what certificates say of its distortion, with covariance: radial tables, and decentring.
+"""A lens with its covariance from tables of radial distortion and decentring of certificates.
 
-The laboratory measures where rays of known angles alpha come to lie: dr = measured minus ideal radius, with
+The laboratory measures the images of rays of known angles alpha: dr = measured minus ideal radius, with
 r = c0 tan alpha and c0 its calibrated focal length. The curve is
 
     dr(r) = k0 r + k1 r^3 + k2 r^5 + k3 r^7.
@@ -23,13 +23,11 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
-MOST_TERMS = 3
-"""Odd terms that cameras have."""
-LEVEL = 0.01
-"""Of the test by which a term is taken in."""
-STEP = 0.01
-"""Of differences, in standard deviations."""
+MAX_TERMS = 3  # odd terms of cameras
+LEVEL = 0.01  # of the test of a term
+STEP = 0.01  # of differences, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +130,7 @@ def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, t
     """
     radius = focal_length * np.tan(table.angle)
     if len(np.unique(radius)) < terms + 1:
-        raise InputError(f"a table of {len(radius)} angles does not determine k0 and {terms} odd terms")
+        raise InputError(phrase("films.few-angles", angles=len(radius), terms=terms))
     fit = Fit.of(table.distortion, table.covariance, _columns(radius, terms))
     freedom = len(radius) - terms - 1
     return Curve(
@@ -154,9 +152,9 @@ def curves_of(table: RadialTable, focal_length: float, sd_focal_length: float) -
 
     InputError: fewer than four angles.
     """
-    most = min(MOST_TERMS, len(np.unique(table.angle)) - 3)
+    most = min(MAX_TERMS, len(np.unique(table.angle)) - 3)
     if most < 1:
-        raise InputError(f"a table of {len(table.angle)} angles is too short for a curve: it takes four")
+        raise InputError(phrase("films.short-table", angles=len(table.angle)))
     return tuple(fit_curve(table, focal_length, sd_focal_length, terms) for terms in range(1, most + 1))
 
 
@@ -212,7 +210,7 @@ def backward(curve: Curve) -> LensParameters:
 
 
 def _with_focal_length(curve: Curve) -> Floats:
-    """Return the covariance of c0, k0, k1 ...: the table says nothing of the first."""
+    """Return the covariance of c0, k0, k1 ...: the table is independent of c0."""
     whole = np.zeros((2 + curve.terms,) * 2)
     whole[0, 0] = curve.sd_focal_length**2
     whole[1:, 1:] = curve.covariance
@@ -235,7 +233,7 @@ def _columns(radius: Floats, terms: int) -> Floats:
 
 SEMI_DIAGONALS = ("ll", "ul", "ur", "lr")
 ELSEWHERE = 4.0
-"""Standard deviations by which the point of symmetry is away from that about which radii count."""
+"""Notable distance of the point of symmetry from the origin of the radii, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -274,15 +272,15 @@ def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, 
 class SemiDiagonals:
     """Distortion along four semi-diagonals.
 
-    Opposite ones differ by what lies to one side, h = u o + d r^2 with the direction u: decentring, and the
-    place o of the point of symmetry, as seen from the point about which radii count.
+    Opposite ones differ by h = u o + d r^2 with the direction u: decentring d, and the point of symmetry o
+    against the origin of the radii.
     """
 
-    mean: Floats  # (n,) of the four, free of that; its standard deviation (mm)
-    sd: float
-    centre: Floats  # (2,) o, the data strip at the left; its standard deviation (mm)
+    mean: Floats  # (n,) of the four, mm
+    sd: float  # of the mean
+    centre: Floats  # (2,) o, the data strip at the left, mm
     sd_centre: float
-    decentring: float  # The largest half difference of opposite ones, but for o (mm)
+    decentring: float  # The largest half difference of opposite ones without o, mm
 
     @property
     def sd_half_difference(self) -> float:
@@ -291,22 +289,22 @@ class SemiDiagonals:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether radii count about another point than that of symmetry, beyond chance."""
+        """Whether the point of symmetry differs significantly from the origin of the radii."""
         return float(np.abs(self.centre).max()) > ELSEWHERE * self.sd_centre
 
 
 def of_semi_diagonals(angle: Floats, distortion: Mapping[str, Floats], sd: float | None) -> SemiDiagonals:
-    """Return the mean of four semi-diagonals, and what opposite ones differ by.
+    """Return the mean of four semi-diagonals, and the differences of opposite ones.
 
-    What is left, half of ll + ur - ul - lr, has the variance of a single reading, and gives the standard
-    deviation of the mean, unless this is given (mm). Angles are (n,) rad, distortion (n,) mm along each of
-    `SEMI_DIAGONALS`. InputError: readings that leave nothing from which a standard deviation could be found.
+    The rest, half of ll + ur - ul - lr, has the variance of a single reading. It gives the standard deviation
+    of the mean if `sd` (mm) is None. Angles are (n,) rad, distortion (n,) mm along each of `SEMI_DIAGONALS`.
+    InputError: equal readings without a standard deviation.
     """
     ll, ul, ur, lr = (np.asarray(distortion[name], float) for name in SEMI_DIAGONALS)
     single = math.sqrt(float(np.mean(((ll + ur - ul - lr) / 2) ** 2)))
     found = single / 2 if sd is None else sd
     if not found > 0:
-        raise InputError("the four semi-diagonals are alike: give sd_um, which cannot be found from them")
+        raise InputError(phrase("films.equal-diagonals"))
     halves: Floats = np.column_stack([ur - ll, ul - lr]) / 2
     columns = np.column_stack([np.ones(len(angle)), np.tan(angle) ** 2])
     constant, sd_constant = np.zeros(2), math.inf

@@ -1,8 +1,8 @@
 """Fiducial marks: what they are called, where they usually are, and which one a reading is of.
 
 Sides are those of the positive with the data strip (clock, level, number) at the left: `ll, ul, ur, lr` in
-the corners, `ml, mt, mr, mb` amid the sides. Where nobody has said which mark a reading is of, quarter turns
-of the film and its side are tried.
+the corners, `ml, mt, mr, mb` in the middle of the sides. If readings do not name their marks, quarter turns
+of the film and its sides are tested.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.film.interior import pairs
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 DataStrip = Literal["left", "top"]
 
@@ -25,7 +26,7 @@ SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")
 """The marks in the order of their numbers in USGS certificates, 1 to 8."""
 _LETTERS = {"a": "ml", "b": "mr", "c": "mb", "d": "mt"}
 _TURNED = {"ul": "ll", "ll": "lr", "lr": "ur", "ur": "ul", "mt": "ml", "ml": "mb", "mb": "mr", "mr": "mt"}
-"""What the sides of a frame with the strip on top are when the strip lies at the left."""
+"""Sides of a frame with the strip at the top by their names with the strip at the left."""
 
 
 def by_side(name: str) -> str:
@@ -57,7 +58,7 @@ _SIGNS = {
     "mt": (0, 1),
     "mb": (0, -1),
 }
-"""In which direction marks lie from the centre."""
+"""Directions of marks from the centre."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class UsualPlaces:
     # Distance of the marks from the axes (mm): corners at (corner, corner), middles at (middle, 0)
     corner: float
     middle: float
-    sd_corner: float  # What single marks differ from that (mm): robust standard deviations of public reports
+    sd_corner: float  # Robust standard deviations of single marks (mm) in public reports
     sd_middle: float
 
     def places(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -100,11 +101,11 @@ def usual_places(camera_type: str) -> UsualPlaces | None:
 
 
 CHANCE = 1e-4
-"""Of a wrong choice among the eight."""
+"""Probability of a wrong choice among the eight."""
 DECIDED = 2.0 * float(np.log(8.0 / CHANCE))
-"""By how much the weighted sum of squares of the runner-up must exceed that of the best."""
+"""Difference of the weighted sums of squares of the second and the best choice that decides."""
 NEAR = 0.1
-"""A reading as far from every mark, in parts of the format, is of none of them."""
+"""Largest distance of a reading from its mark, in parts of the format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,8 @@ class FilmWay:
     mirrored: bool
 
     def __str__(self) -> str:
-        return f"turned by {90 * self.quarter_turns} degrees{', mirrored' if self.mirrored else ''}"
+        code = "films.turned-mirrored" if self.mirrored else "films.turned"
+        return str(phrase(code, degrees=90 * self.quarter_turns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,7 @@ class WhichMark:
     alike: tuple[FilmWay, ...]
 
     def __str__(self) -> str:
-        return str(self.alike[0]) if self.decided else "cannot be told from the marks: quarter turn or side"
+        return str(self.alike[0] if self.decided else phrase("films.undecided"))
 
 
 def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> WhichMark:
@@ -184,16 +186,14 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
     """
     q, p = pairs("places", places), pairs("true", true)
     if len(p) < 3 or len(q) < len(p):
-        raise InputError(
-            f"{len(p)} readings without names, and {len(q)} marks: three of these at least are needed"
-        )
+        raise InputError(phrase("films.few-readings", readings=len(p), marks=len(q)))
     if number("sd", sd) <= 0:
-        raise InputError(f"sd is no standard deviation: {sd}")
+        raise InputError(phrase("error.at", what="sd", message=phrase("error.positive", value=sd)))
     ways = [_tried(q, p, turns, mirrored=mirrored) for mirrored in (False, True) for turns in range(4)]
     omega = np.array([each[1] for each in ways]) / sd**2
     best = int(np.argmin(omega))
     if not np.isfinite(omega[best]):
-        raise InputError("the readings without names are of no marks of the camera, however the film lies")
+        raise InputError(phrase("films.readings-of-no-marks"))
     every = [FilmWay(frozen(marks), k % 4, k >= 4) for k, (marks, _) in enumerate(ways)]
     alike = sorted(np.flatnonzero(omega - omega[best] <= DECIDED).tolist(), key=lambda k: k != best)
     return WhichMark(
@@ -221,9 +221,9 @@ def _tried(q: Floats, p: Floats, turns: int, *, mirrored: bool) -> tuple[Indices
 
 
 def _nearest(lain: Floats, p: Floats) -> Indices | None:
-    """Return the mark of each reading, each once, for the shift that brings readings nearest; None without.
+    """Return the mark of each reading, each once, by the shift that brings readings nearest; else None.
 
-    Every mark is tried for the first reading: marks may have been lost.
+    Every mark is tested for the first reading, since marks may have been lost.
     """
     limit = NEAR * np.ptp(lain, axis=0).max()
     best, found = np.inf, None

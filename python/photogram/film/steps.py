@@ -1,4 +1,4 @@
-"""One step against two: films inside the adjustment beside films that were fitted to their marks before."""
+"""One step and two: films inside the adjustment, and films that were fitted to their marks before."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.show.summary import Brief, Rows
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.results.result import Result
@@ -54,9 +55,9 @@ class StepsCompared(Documented, Brief):
 
     @property
     def sentence(self) -> str:
-        """What the comparison says."""
-        axes = ", ".join(f"{own:+.1f} % in {axis}" for axis, own in zip("XYZ", self.percent, strict=True))
-        return f"films fitted before change standard deviations of points by {axes} (median)"
+        """The comparison as a sentence."""
+        axes = [phrase("films.percent", axis=a, percent=p) for a, p in zip("XYZ", self.percent, strict=True)]
+        return str(phrase("films.steps", axes=axes))
 
     def brief(self) -> tuple[str, Rows]:
         """Return the comparison in a line."""
@@ -65,13 +66,11 @@ class StepsCompared(Documented, Brief):
     def document(self) -> Document:
         """Return the document of the comparison; docs/film.md lists the members of its JSON form."""
         results = {"inside": self.inside, "before": self.before}
-        sentence = f"{self.sentence[:1].upper()}{self.sentence[1:]}."
-        of_axes = replace(_axes(self), note=sentence)
+        of_axes = replace(_axes(self), note=f"{self.sentence[:1].upper()}{self.sentence[1:]}.")
         return Document(
             what=WHAT,
             title=self.inside.block.title,
             judgements=[judged(self.inside.verdict, "films inside the adjustment")],
-            advice=[],
             highlights=_facts(self),
             sections=[
                 Section("points", of_axes.title, [of_axes], _WHY),
@@ -84,9 +83,10 @@ class StepsCompared(Documented, Brief):
                 "unit": self.inside.block.linear_unit,
                 "points": len(self.rows),
                 "sums": {
-                    name: dict(
-                        zip(("sum_of_squares", "degrees_of_freedom"), own.sum_and_freedom, strict=True)
-                    )
+                    name: {
+                        "sum_of_squares": own.sum_and_freedom[0],
+                        "degrees_of_freedom": own.sum_and_freedom[1],
+                    }
                     for name, own in results.items()
                 },
             },
@@ -108,13 +108,13 @@ def compare_steps(inside: Result, before: Result) -> StepsCompared:
     """
     for name, result, held in (("inside", inside, False), ("before", before, True)):
         if not result.films or any(film.placement.is_held != held for _, film in result.films):
-            raise InputError(f'the films of one result are not such of interior = "{name}"')
+            raise InputError(phrase("films.other-interior", interior=name))
     if list(inside.block.point_ids) != list(before.block.point_ids):
-        raise InputError("the results are of different points")
+        raise InputError(phrase("films.different-points"))
     variances = np.array([np.diagonal(each.point_cofactors, axis1=1, axis2=2) for each in (inside, before)])
     rows = np.flatnonzero((variances > 0).all(axis=(0, 2)))
     if not len(rows):
-        raise InputError("the results have no covariances of points")
+        raise InputError(phrase("films.no-covariances"))
     difference = (before.point_positions - inside.point_positions)[rows]
     return StepsCompared(inside, before, rows, np.sqrt(variances[:, rows]), difference)
 

@@ -1,4 +1,4 @@
-"""Which certificate of a camera is that of a flight, by their dates."""
+"""The certificate of a camera that is valid for a flight, by their dates."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from photogram.errors import ContradictionError, InputError
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.film.certificate import Certificate
 
-YEARS = 3.0
-"""A camera is calibrated anew after as many at the latest: what is farther from a flight is told."""
-_YEAR = 365.25
-"""Days."""
+MAX_AGE_YEARS = 3.0
+"""Cameras are calibrated again after as many years at most."""
+_DAYS_OF_YEAR = 365.25
 
 
 def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> Certificate:
@@ -26,34 +26,32 @@ def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> 
     if len(certificates) == 1:
         return certificates[0]
     if day is None:
-        raise InputError(
-            "has several certificates, and nothing says when was flown: [film] flown, or column flown"
-        )
+        raise InputError(phrase("films.several-certificates"))
     dated: dict[date, Certificate] = {}
-    for own in certificates:
-        if own.day is None:
-            raise InputError("has no date, and is one of several certificates of its camera", file=own.file)
-        if own.day in dated:
-            name = getattr(dated[own.day].file, "name", "another")
-            raise ContradictionError(f"is of {own.day}, as {name} is: which one is valid?", file=own.file)
-        dated[own.day] = own
+    for certificate in certificates:
+        if certificate.day is None:
+            raise InputError(phrase("films.undated", certificate=certificate.name), file=certificate.file)
+        if certificate.day in dated:
+            other = getattr(dated[certificate.day].file, "name", certificate.name)
+            message = phrase("films.same-date", day=str(certificate.day), other=other)
+            raise ContradictionError(message, file=certificate.file)
+        dated[certificate.day] = certificate
     return dated[max((each for each in dated if each <= day), default=min(dated))]
 
 
-def age_remark(certificate: Certificate, day: date) -> str:
-    """Return a sentence where a certificate is far from a flight, or of later; nothing else."""
+def age_remark(certificate: Certificate, day: date) -> str | Phrase:
+    """Return a remark if a certificate is much older than a flight, or later; else an empty text."""
     if certificate.day is None:
-        return f"its certificate has no date, and was flown {day}: nothing says that it is of this flight"
-    years = (day - certificate.day).days / _YEAR
-    if 0 <= years <= YEARS:
+        return phrase("films.undated-flight", day=str(day))
+    years = (day - certificate.day).days / _DAYS_OF_YEAR
+    if 0 <= years <= MAX_AGE_YEARS:
         return ""
-    way = "before" if years > 0 else "after"
-    said = f"its certificate is of {certificate.day}, {abs(years):.1f} years {way} the flight of {day}"
-    return f"{said}: was the camera changed or repaired between?"
+    code = "films.before-flight" if years > 0 else "films.after-flight"
+    return phrase(code, certificate=str(certificate.day), years=abs(years), day=str(day))
 
 
-def changed_remark(chosen: Certificate, several: Sequence[Certificate], day: date) -> str:
-    """Return a sentence where a camera has changed between its certificates before and after a flight."""
+def changed_remark(chosen: Certificate, several: Sequence[Certificate], day: date) -> str | Phrase:
+    """Return a remark if a camera has changed between its certificates before and after a flight."""
     from photogram.film.years import compare_cameras
 
     later = [each for each in several if each.day is not None and each.day > day and each is not chosen]
@@ -62,7 +60,4 @@ def changed_remark(chosen: Certificate, several: Sequence[Certificate], day: dat
     after = min(later, key=lambda each: each.day or day)
     if after.c is None or compare_cameras([chosen, after]).verdict.code != "changed":
         return ""
-    return (
-        f"it has changed between {chosen.day} and {after.day}, and nothing says whether before the flight of"
-        f" {day}: `photogram camera compare` has the figures"
-    )
+    return phrase("films.changed", before=str(chosen.day), after=str(after.day), day=str(day))

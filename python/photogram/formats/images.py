@@ -5,7 +5,7 @@ What needs the size of the pictures of a camera, and does not know it, is an :cl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -13,8 +13,11 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
+from photogram.io.places import Failing
 from photogram.io.units import scaled
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
+from photogram.words import phrase
 
 
 def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Floats]) -> Floats:
@@ -53,7 +56,7 @@ def to_corner(project: Project) -> Floats:
     """Return (m, 2) columns and rows from the upper-left corner, pixels; images in millimetres have none."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError("images are in millimetres: they have no columns and rows")
+        raise InputError(phrase("format.pixels"))
     which = block.photo_cameras[block.image_photos]
     return by_camera(
         block.image_xy, which, lambda row, own: in_corner(block.cameras[row], project.sizes[row], own)
@@ -63,7 +66,7 @@ def to_corner(project: Project) -> Floats:
 def known_size(camera: Camera, size: Size | None) -> Size:
     """Return the size of the pictures of a camera."""
     if size is None:
-        raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
+        raise InputError(phrase("format.image-size", camera=camera.title))
     return size
 
 
@@ -96,3 +99,97 @@ def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Fl
     if camera.unit == "px" and image_y == "down":
         return in_corner(camera, size, xy)
     return xy if camera.image_y == image_y else xy * [1.0, -1.0]
+
+
+Y_DOWN: Floats = np.diag([1.0, -1.0, -1.0])
+"""Carries vectors between axes x right, y up, z back and axes x right, y down, z forward."""
+
+
+def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
+    """Whether a (3, 3) matrix is orthonormal, up to the digits that a file has, and not mirrored."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    return bool(apart < tolerance and np.linalg.det(matrix) > 0)
+
+
+def checked_rotation(place: Failing, matrix: Floats) -> Floats:
+    """Return a rotation matrix of a file, orthonormal to the last bits."""
+    if not is_rotation(matrix):
+        raise place.error(phrase("format.rotation"))
+    found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
+    return found
+
+
+_TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
+"""Models that count from the middle of the picture, y up."""
+_FAMILY = _MIDDLE | {
+    *("radial", "simple_radial", "simple_pinhole", "pinhole"),
+    *("opencv", "full_opencv", "opencv_pinhole", "agisoft_frame"),
+}
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera in pixels whose lens is that of OpenCV, y down; p1 belongs to r^2 + 2 y^2 in y."""
+
+    fx: float  # Principal distances
+    fy: float
+    cx: float  # Principal point from the upper-left corner
+    cy: float
+    k1: float = 0.0  # Terms; k4 .. k6 are of the denominator
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+
+    @property
+    def terms(self) -> tuple[float, ...]:
+        """k1, k2, p1, p2, k3, k4, k5, k6."""
+        return tuple(getattr(self, name) for name in _TERMS)
+
+    def is_plain(self, *names: str) -> bool:
+        """Whether nothing but the named terms is there."""
+        return not any(getattr(self, name) for name in _TERMS if name not in names)
+
+
+def lens_of(camera: Camera, size: Size | None) -> Lens | None:
+    """Return a camera as one of the family, to the last digit; None where it is none.
+
+    A camera that counts from the middle of the picture needs its size.
+    """
+    values = camera.parameters
+    if camera.unit != "px" or camera.model not in _FAMILY:
+        return None
+    if camera.model == "opencv_pinhole" and any(values[name] for name in ("s1", "s2", "s3", "s4")):
+        return None
+    terms = {name: values[name] for name in _TERMS if name in values}
+    if camera.model == "agisoft_frame":
+        if values["b2"] or values["k4"]:
+            return None
+        terms |= {"p1": values["p2"], "p2": values["p1"]}
+        fx, middle = values["f"] + values["b1"], (values["w"] / 2, values["h"] / 2)
+        return Lens(fx, values["f"], middle[0] + values["cx"], middle[1] + values["cy"], **terms)
+    if camera.model in _MIDDLE:
+        return None if size is None else _about_middle(camera, size, terms)
+    if "k" in values:
+        terms = {"k1": values["k"]}
+    fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+    return Lens(fx, fy, values["cx"], values["cy"], **terms)
+
+
+def _about_middle(camera: Camera, size: Size, terms: Mapping[str, float]) -> Lens | None:
+    values = camera.parameters
+    f = values["f"] if camera.model == "bal" else -values["c"]
+    lost = {"brown": ("K1", "K2", "K3", "P1", "P2", "b1", "b2"), "brown_forward": ("C1", "C2", "r0")}
+    if f < 0 or any(values[name] for name in lost.get(camera.model, ())):
+        return None
+    if camera.model == "brown_forward":
+        # With y down B2 has the other sign.
+        terms = {"p1": -values["B2"] * f, "p2": values["B1"] * f}
+        terms |= {f"k{n}": values[f"A{n}"] * f ** (2 * n) for n in (1, 2, 3)}
+    middle = size[0] / 2 + values.get("xp", 0.0), size[1] / 2 - values.get("yp", 0.0)
+    return Lens(f, f, *middle, **terms)

@@ -29,16 +29,14 @@ from photogram.network.rigs import Mount
 from photogram.results.features import Definition
 from photogram.show.summary import Brief
 from photogram.targets.board import Board
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
 
 DatumName = Literal["control", "minimum", "inner"]
-Size = tuple[int, int]
-"""Width and height of the pictures of a camera, pixels."""
+Size = tuple[int, int]  # Width and height of the pictures of a camera, pixels
 
-ASSUMED_SD = {"px": 1.0, "mm": 0.010}
-"""Of image coordinates where nothing says how good they are."""
+ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Of image coordinates where nothing says how good they are
 
 
 def frame_of(block: Block) -> Frame:
@@ -154,7 +152,7 @@ class Project(Brief):
         object.__setattr__(self, "frame", frame_of(given))
         if (self.frame.kind == "geographic") != given.geographic:
             space = "geographic" if given.geographic else "rectangular: it has no spheroid"
-            raise InputError(f"the frame is {self.frame.kind}, but the block is {space}")
+            raise InputError(phrase("plain.frame-of-block", frame=self.frame.kind, space=space))
         if self.block.frame != self.frame:
             object.__setattr__(self, "block", self.block.in_frame(self.frame))
 
@@ -220,7 +218,7 @@ def assembled(
     """
     place, found = Place(path), list(messages)
     if not photo_ids:
-        raise place.error("has no photos")
+        raise place.error(phrase("error.empty-file", content="photos"))
     left = repeated_pairs(image_photos, image_points, len(point_ids))
     repeated = Repeated(
         tuple(photo_ids[row] for row in image_photos[left].tolist()),
@@ -304,5 +302,5 @@ def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
         for kind, own in names.items():
             if len(set(own)) < len(own):
                 twice = next(name for name, count in Counter(own).items() if count > 1)
-                raise place.error(f"the {kind} {twice} is there more than once") from None
+                raise place.error(phrase("error.repeated", kind=kind, name=twice)) from None
         raise

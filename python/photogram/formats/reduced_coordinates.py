@@ -11,8 +11,10 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Wishes
+from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.point_table import PointTable
 from photogram.formats.project import Project, assembled
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
@@ -20,17 +22,13 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
-from photogram.network.observations import Control
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
-BETTER = 3.0
-"""How much better rotations must fit transposed to be taken so."""
-LEAST, MOST = 2.0, 3000.0
-"""Millimetres between which principal distances of cameras lie."""
+BETTER = 3.0  # How much better rotations must fit transposed to be taken so
+LEAST, MOST = 2.0, 3000.0  # Millimetres between which principal distances of cameras lie
 NOMINAL = 100.0
 """Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
-SIDE = -0.02
-"""u3 of unit directions beyond which a perspective camera has no picture."""
+SIDE = -0.02  # u3 of unit directions beyond which a perspective camera has no picture
 
 
 @dataclass
@@ -49,7 +47,7 @@ class Reduced:
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
         if not LEAST < abs(c) < MOST:
-            raise place.error(f"a principal distance of {abs(c):g} mm: is the unit another one?")
+            raise place.error(phrase("reduced.distance", value=abs(c), low=LEAST, high=MOST))
         name = f"c {abs(c):.12g} mm"
         # Coordinates are those of the positive plane: the model has c negative there.
         self.cameras.setdefault(name, Camera("perspective", {"c": -abs(c)}, name=name))
@@ -69,19 +67,18 @@ def project_of(
     for name, (centre, matrix) in found.poses.items():
         if name in rows:
             centres[rows[name]], matrices[rows[name]] = centre, matrix
-    positions, sd = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.inf)
-    lacks = []
+    table, lacks = PointTable(points), []
     held = [name for name, (_, used) in found.control.items() if used.any()]
     if held and "control" not in wishes.sd:
         lacks.append(Phrase("read.control", {"number": len(held), "option": option_sd("control")}))
-    check_sd = np.full_like(positions, np.nan)
     for name, (position, used) in found.control.items():
         # What is not held of a control point is not known; a check point is known altogether.
-        positions[places[name]] = np.where(used | ~used.any(), position, np.nan)
+        row = places[name]
+        table.positions[row] = table.starts[row] = np.where(used | ~used.any(), position, np.nan)
         if used.any() and "control" in wishes.sd:
-            sd[places[name]] = np.where(used, wishes.sd["control"], np.inf)
+            table.sd[row] = np.where(used, wishes.sd["control"], np.inf)
         elif not used.any():
-            check_sd[places[name]] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
+            table.check_sd[row] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
     cameras = {camera: row for row, camera in enumerate(found.cameras)}
     return assembled(
         path=path,
@@ -92,21 +89,12 @@ def project_of(
         photo_cameras=[cameras[camera] for camera in found.photos.values()],
         centres=centres,
         matrices=matrices,
-        point_ids=points,
-        starts=positions.copy(),
-        point_positions=positions,
-        point_sd=sd,
-        point_check_sd=check_sd,
+        **table.arguments(),
         image_photos=np.array([rows[each[0]] for each in found.images], dtype=np.int64),
         image_points=np.array([places[each[1]] for each in found.images], dtype=np.int64),
         image_xy=np.array([each[2:] for each in found.images], dtype=float).reshape(-1, 2),
         lacks=lacks,
-        messages=[
-            *messages,
-            Message(
-                "coordinates are taken as reduced and the object space as cartesian, as such files mean them"
-            ),
-        ],
+        messages=[*messages, Message(phrase("reduced.assumed"))],
     )
 
 
@@ -124,14 +112,9 @@ def with_fitting_rotations(project: Project) -> Project:
     transposed = _misfit(other)
     limit = 0.1 * float(np.median(block.camera_scales()))
     if min(as_read, transposed) > limit:
-        raise InputError(
-            f"rays meet neither with the rotations as they stand nor transposed: residuals of"
-            f" {as_read:.3g} and"
-            f" {transposed:.3g} mm",
-            file=project.path,
-        )
+        raise InputError(phrase("reduced.rays", as_read=as_read, transposed=transposed), file=project.path)
     if transposed * BETTER < as_read:
-        remark = Message("rotations were read transposed: so rays meet, and as they stand they do not")
+        remark = Message(phrase("reduced.transposed"))
         return other.replace(messages=(*project.messages, remark))
     return project
 
@@ -203,31 +186,14 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
     return found
 
 
-def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[str]:
-    """Return what has no place in files of reduced coordinates."""
-    block = project.block
-    found = [
-        "standard deviations of images, poses and control",
-        "positions of points that are no control, the frame and its unit",
-    ]
-    cameras, _ = known_cameras(block)
-    if any(each.model != "perspective" for each in cameras):
-        found.append(
-            "lenses: coordinates are those of cameras without distortion, which is exact for the geometry"
-        )
-    if any(each.unit == "px" for each in cameras) and None in project.pixel_mm:
-        found.append(f"pixels whose size is not known: the principal distance is {NOMINAL:g} mm for them")
-    if lost := len(block.image_xy) - len(reduced.rows):
-        found.append(f"{lost} images that a perspective camera does not have")
-    if not reduced.posed.all():
-        found.append(f"that {np.count_nonzero(~reduced.posed)} photos have no pose or only part of one")
-    others = [each for each in block.observations if not isinstance(each, Control)]
-    if len(others) < len(block.observations):
-        found.append("correlations between coordinates of control")
-    if others:
-        found.append(f"{len(others)} observations beside images and control")
-    if block.mounts:
-        found.append("rigs: photos have their poses")
+def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
+    """Return parts of a project that files of reduced coordinates cannot contain."""
+    found = losses(project, "deviations", "points", "frame", "lenses", "unposed", "correlations")
+    found += losses(project, "observations-and-gnss", "rigs")
+    if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
+        found.append(phrase("lost.nominal-distance", distance=NOMINAL))
+    if lost := len(project.block.image_xy) - len(reduced.rows):
+        found.append(phrase("lost.images", n=lost))
     return found
 
 

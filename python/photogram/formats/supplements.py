@@ -25,7 +25,8 @@ from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
-from photogram.messages import Message, listed
+from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
 from photogram.network.wider_models import (
@@ -36,15 +37,13 @@ from photogram.network.wider_models import (
     with_parameters,
 )
 from photogram.results.result import Result
-from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd
+from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
 
-SAME = 1e-3
-"""Pixels that two measurements of a point on a photo may be apart to be one."""
-SIMILAR = 10.0
-"""How much better control must fit a model after a similarity for the model to be carried over."""
+SAME = 1e-3  # Pixels that two measurements of a point on a photo may be apart to be one
+SIMILAR = 10.0  # How much better control must fit a model after a similarity for the model to be carried over
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -54,16 +53,16 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
         name, equals, numbers = each.partition("=")
         name = name.strip()
         if name not in WITH_SD:
-            raise InputError(f"--sd {each}: one of {', '.join(WITH_SD)}, as images=0.5")
+            raise InputError(phrase("plain.sd-option", text=each, names=list(WITH_SD)))
+        counts = WITH_SD[name]
         try:
             values = tuple(float(number) for number in numbers.split(","))
         except ValueError:
-            raise InputError(f"--sd {each}: what follows the = is no number, or three with commas") from None
-        counts = WITH_SD[name]
+            values = ()
         if not equals or len(values) not in counts or not all(0 <= value < np.inf for value in values):
-            raise InputError(f"--sd {each}: {' or '.join(map(str, counts))} standard deviations")
+            raise InputError(phrase("plain.sd-numbers", text=each, counts=list(counts)))
         if name == "images" and not all(values):
-            raise InputError(f"--sd {each}: image coordinates cannot be without error")
+            raise InputError(phrase("plain.sd-of-images", text=each))
         found[name] = values
     return found
 
@@ -138,12 +137,17 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
     block, again = project.block, project.repeated
     if not again.points:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
-    place = {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
+    place = _image_rows(block)
     pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
     rows = np.array(pairs, dtype=np.int64)
     there = np.flatnonzero(rows >= 0)
     return rows[there], there
+
+
+def _image_rows(block: Block) -> dict[tuple[str, str], int]:
+    """Return the row of each image observation by the names of photo and point."""
+    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    return {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
 
 
 def self_calibrated(project: Project, names: Sequence[str]) -> Project:
@@ -155,7 +159,7 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     if not names:
         return project
     if not project.block.cameras:
-        raise InputError("the block has principal distances and no cameras that could be calibrated")
+        raise InputError(phrase("plain.no-cameras"))
     wanted = {name.lower() for name in names}
     cameras, used, messages = [], set(), []
     titles_by_text: dict[str, list[str]] = {}
@@ -172,15 +176,15 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
             titles_by_text.setdefault(text, []).append(camera.title)
         used |= {matching_word(name, wanted) for name in free}
         if model.model != camera.model:
-            messages.append(
-                Message(
-                    f"{camera.title}: the model {model.model} replaces {camera.model}, which lacks lens terms"
-                )
-            )
-    messages += [Message(f"camera {listed(titles, 3)}: {text}") for text, titles in titles_by_text.items()]
+            fields = {"camera": camera.title, "model": model.model, "former": camera.model}
+            messages.append(Message(phrase("plain.model-replaced", **fields)))
+    messages += [
+        Message(phrase("plain.focal-length", names=titles, message=text))
+        for text, titles in titles_by_text.items()
+    ]
     if missing := sorted(wanted - used - {"all"}):
-        known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
-        raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")
+        names = sorted({name for camera in project.block.cameras for name in camera.names})
+        raise InputError(phrase("error.unknown", kind="parameter of a camera", name=missing[0], names=names))
     return project.replace(
         block=project.block.replace(cameras=cameras), messages=(*project.messages, *messages)
     )
@@ -195,21 +199,17 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
         return project
     block = project.block
     if block.geographic:
-        raise InputError("--hold: a datum of chosen coordinates needs rectangular space; this is geographic")
+        raise InputError(phrase("plain.hold-geographic"))
     known, places = project.positions(), block.point_positions.copy()
     sd = np.full(places.shape, np.inf)
     for each in wanted:
         name, _, axes = each.partition("=")
         columns = ["XYZ".find(axis) for axis in (axes or "XYZ").upper()]
         if name not in block.point_ids or -1 in columns:
-            raise InputError(
-                f"--hold: {each!r} is no point of the block with axes of X, Y and Z: A=XYZ,B=YZ,C=Z"
-            )
+            raise InputError(phrase("plain.hold-form", text=each))
         row = block.point_ids.index(name)
         if not np.isfinite(known[row, columns]).all():
-            raise InputError(
-                f"--hold: the point {name} has no coordinates to be held at; --control FILE gives it some"
-            )
+            raise InputError(phrase("plain.hold-unknown", point=name))
         places[row, columns], sd[row, columns] = known[row, columns], 0.0
     return project.replace(block=block.replace(point_positions=places, point_sd=sd))
 
@@ -226,7 +226,7 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     if not table.count:
         return project
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
+        raise InputError(phrase("plain.pixels-with-mm"), file=path)
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
     known = {name: row for row, name in enumerate(block.point_ids)}
@@ -266,21 +266,13 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
     rows = [row for row, name in enumerate(names) if name]
     if len(rows) < len(names):
         lost = sorted({own for own, name in zip(table.texts("photo"), names, strict=True) if not name})
-        given.messages.append(
-            Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
-        )
+        given.messages.append(Message(phrase("plain.other-photos", names=lost), table.path))
     return table.some(rows).with_texts("photo", [names[row] for row in rows])
 
 
 def _present_rows(project: Project, table: ColumnTable) -> set[int]:
     """Return the rows of measurements that the project has at the same place in the photo."""
-    block = project.block
-    known = {
-        (block.photo_ids[photo], block.point_ids[point]): row
-        for row, (photo, point) in enumerate(
-            zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
-        )
-    }
+    known = _image_rows(project.block)
     pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
     if not any(pair in known for pair in pairs):
         return set()
@@ -307,13 +299,8 @@ def _with_list(project: Project, given: ControlList) -> Project:
         for name in new:
             while new[name] in taken:
                 new[name] = f"track {new[name]}"
-        given.messages.append(
-            Message(
-                f"{len(new)} tracks have the identifier of a control point and are other points:"
-                f" they are renamed to {listed(list(new.values()), 3)}",
-                table.path,
-            )
-        )
+        message = phrase("plain.renamed-tracks", n=len(new), names=list(new.values()))
+        given.messages.append(Message(message, table.path))
         project = with_other_names(project, new)
     further = table.some([row for row in range(table.count) if row not in present])
     return _with_table(project, table.path, further, None)
@@ -355,14 +342,11 @@ def with_control(
     places = {name: row for row, name in enumerate(block.point_ids)}
     rows = [row for row, name in enumerate(given.names) if name in places]
     if not rows:
-        raise table.head.error(
-            f"none of the points {listed(given.names, 4)} has an image; --images FILE adds measurements of"
-            " control, --names FILE gives points other names"
-        )
+        raise table.head.error(phrase("plain.no-control-images", names=given.names))
     missing = [name for name in given.names if name not in places]
     messages = [*project.messages, *tables.messages]
     if missing:
-        messages.append(Message(f"control without images is left out: {listed(missing)}", path))
+        messages.append(Message(phrase("plain.control-without-images", names=missing), path))
     targets = np.array([places[given.names[row]] for row in rows])
     raw = table.vectors("xyz")
     messages += check_systems(project, settings, table, targets, raw[rows], free=is_free(project))
@@ -422,8 +406,6 @@ def _carried(
     before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
     if not (np.isfinite(misfit) and SIMILAR * misfit < before):
         return same
-    message = Message(
-        f"the model is carried onto {np.count_nonzero(known)} control points by a similarity: scale"
-        f" {scale:.6g}, {misfit:.3g} {block.linear_unit} rms left, {before:.3g} before"
-    )
+    fields = {"n": int(np.count_nonzero(known)), "scale": scale, "misfit": misfit, "before": before}
+    message = Message.of("plain.carried", unit=block.linear_unit, **fields)
     return carried(project, (scale, turn, shift), frame, message)

@@ -10,7 +10,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.messages import listed
+from photogram.words import phrase
 
 MAX_RATIO, SMALL = 250, 1 << 26
 """Members of more bytes than the second are no larger than so many times their packed selves."""
@@ -24,12 +24,8 @@ def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> Non
 
     No member is unpacked beyond its header.
     """
-    packed = sum(each.compress_size for each in members)
-    size = sum(each.file_size for each in members)
+    packed = sum(member.compress_size for member in members)
+    size = sum(member.file_size for member in members)
     if size > max(SMALL, MAX_RATIO * packed):
-        names = listed([each.filename for each in members], 3)
-        raise InputError(
-            f"holds {names}, which would grow from {packed} to {size} bytes; at most {MAX_RATIO} times are"
-            " read: save the data without compression",
-            file=path,
-        )
+        fields = {"names": [member.filename for member in members], "packed": packed, "size": size}
+        raise InputError(phrase("file.expands", ratio=MAX_RATIO, **fields), file=path)

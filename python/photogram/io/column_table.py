@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.files import read_text
 from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import listed, quoted
-from photogram.words import Phrase
+from photogram.messages import missing_columns, unknown_name
+from photogram.words import Phrase, phrase
 
 TRUE, FALSE = (
     frozenset({"true", "yes", "on", "1", "t", "y"}),
@@ -81,6 +82,17 @@ class ColumnTable:
         """Return an error that names the place of a row."""
         return self.place(row).error(message)
 
+    def cell_error(self, row: int, column: str, code: str, **fields: Any) -> InputError:
+        """Return an error of a cell, by the code of its message."""
+        return self.error(row, phrase("error.column", column=column, message=Phrase(code, fields)))
+
+    def unknown_error(
+        self, row: int, column: str, kind: str, name: str, names: Collection[str]
+    ) -> InputError:
+        """Return the error of a name that does not exist."""
+        message = unknown_name(kind, name, names)
+        return self.error(row, phrase("error.column", column=column, message=message))
+
     def renamed(self, names: Mapping[str, str]) -> ColumnTable:
         """Return the table with other names of some columns."""
         columns = tuple(names.get(column, column) for column in self.columns)
@@ -104,10 +116,9 @@ class ColumnTable:
         return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns."""
+        """Reject a table without these columns."""
         if missing := [column for column in columns if column not in self.columns]:
-            what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
-            raise self.head.error(f"{what.format(listed(missing))}; there are {listed(list(self.columns))}")
+            raise self.head.error(missing_columns(missing, self.columns))
 
     def names(self, column: str) -> Names:
         """Return a column of names, without blanks at both ends."""
@@ -119,20 +130,14 @@ class ColumnTable:
         for name in found.names:
             if not name or name.lower() == "nan":
                 row = int(np.flatnonzero(found.rows == found.names.index(name))[0])
-                raise self.error(
-                    row, f"column {column}: {'is empty' if not name else f'{name!r} is no name'}"
-                )
+                raise self.cell_error(row, column, "error.no-name", value=name)
         seen: dict[str, int] = {}
         for place, name in enumerate(found.names):
             plain = "".join(name.split()).casefold()
             other = seen.setdefault(plain, place)
             if other != place:
                 row = int(np.flatnonzero(found.rows == place)[0])
-                raise self.error(
-                    row,
-                    f"column {column}: {quoted(name)} differs from {quoted(found.names[other])} by blanks or"
-                    " case alone",
-                )
+                raise self.cell_error(row, column, "cells.similar", name=name, other=found.names[other])
         return found
 
     def names_once(self, column: str) -> list[str]:
@@ -141,7 +146,7 @@ class ColumnTable:
         if len(found.names) < self.count:
             _, first = np.unique(found.rows, return_index=True)
             row = int(np.setdiff1d(np.arange(self.count), first)[0])
-            raise self.error(row, f"the {column} {quoted(texts[row])} is there twice")
+            raise self.error(row, phrase("error.repeated", kind=column, name=texts[row]))
         return texts
 
     def texts(self, column: str, default: str = "") -> list[str]:
@@ -159,9 +164,7 @@ class ColumnTable:
         if numbers is None:
             return self.cells[column]
         if not np.isnan(numbers).all():  # type: ignore[arg-type]
-            raise self.head.error(
-                f"the column {column} holds numbers with decimals: names and words are text or whole numbers"
-            )
+            raise self.head.error(phrase("cells.decimals", column=column))
         return [""] * self.count
 
     def numbers(
@@ -195,7 +198,8 @@ class ColumnTable:
             try:
                 values[row] = convert(marks.plain(cell))
             except ValueError as error:
-                raise self.error(row, f"column {column}: {error}") from None
+                message = message_of(error)
+                raise self.error(row, phrase("error.column", column=column, message=message)) from None
         return values
 
     def _known(
@@ -209,7 +213,8 @@ class ColumnTable:
     ) -> Floats:
         """Return numbers that the file has as such, as :meth:`numbers` has them; NaN stands for empty."""
         if not infinite and np.isinf(found).any():
-            raise self.error(int(np.argmax(np.isinf(found))), f"column {column}: is not a finite number")
+            row = int(np.argmax(np.isinf(found)))
+            raise self.cell_error(row, column, "error.finite", value=float(found[row]))
         if read is not None:
             return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
         return found if np.isnan(default) else np.where(np.isnan(found), default, found)
@@ -226,26 +231,32 @@ class ColumnTable:
         found = [self.numbers(each, default, infinite=infinite, read=read) for each in columns]
         return np.stack(found, axis=1)
 
-    def given(self, columns: Sequence[str], why: str = "is empty") -> Floats:
-        """Return (rows, k) k columns of numbers, none of which may be missing; see :meth:`check_given`."""
-        found = self.vectors(columns)
-        self.check_given(found, columns, why)
-        return found
+    def given(self, columns: Sequence[str]) -> Floats:
+        """Return (rows, k) k columns of numbers, none of which may be missing."""
+        values = self.vectors(columns)
+        self.check_given(values, columns)
+        return values
 
-    def check_given(self, values: Floats, columns: Sequence[str], why: str = "is empty") -> None:
-        """Refuse NaN among (rows, k) numbers of some columns."""
+    def check_given(self, values: Floats, columns: Sequence[str], table: str = "") -> None:
+        """Reject NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
-            raise self.error(row, f"column {columns[column]}: {why}")
+            code = "cells.no-sd" if table else "error.empty"
+            raise self.cell_error(row, columns[column], code, table=table)
 
-    def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
-        """Return a column of known words in small letters; empty cells have the default, or the first."""
-        found = [each.lower() for each in self.texts(column, known[0] if default is None else default)]
-        for row, word in enumerate(found):
-            if word not in known:
-                raise self.error(row, f"column {column}: {quoted(word)} is none of {', '.join(known)}")
-        return found
+    def words(
+        self, column: str, known: Sequence[str], default: str | None = None, *, optional: bool = False
+    ) -> list[str]:
+        """Return a column of known words in small letters; empty cells have the default, or the first.
+
+        `optional`: the default of empty cells needs not be a known word.
+        """
+        words = [word.lower() for word in self.texts(column, known[0] if default is None else default)]
+        for row, word in enumerate(words):
+            if word not in known and not (optional and word == default):
+                raise self.cell_error(row, column, "error.choice", names=list(known), value=word)
+        return words
 
     def flags(self, column: str) -> Bools:
         """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true."""
@@ -254,7 +265,7 @@ class ColumnTable:
             for row, cell in enumerate(self.texts(column)):
                 word = cell.lower()
                 if word and word not in TRUE | FALSE:
-                    raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
+                    raise self.cell_error(row, column, "error.flag", value=cell)
                 values[row] = not word or word in TRUE
         return values
 

@@ -1,4 +1,4 @@
-"""Tables as text of commas: numbers read back to the last bit, names stand in quotation marks at need."""
+"""Tables as comma-separated text: numbers read back to the last bit, names have quotation marks if needed."""
 
 from __future__ import annotations
 

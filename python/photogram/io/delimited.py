@@ -24,7 +24,7 @@ from photogram.io.column_table import ColumnTable, Names, merged
 from photogram.io.files import read_beginning, read_text, reading
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
-from photogram.messages import listed, quoted
+from photogram.words import Phrase, phrase
 
 LARGE = 1 << 20  # Bytes of a table above which the extension module reads it
 PIECE = 1 << 22  # Bytes of a large table that are read at a time
@@ -43,7 +43,7 @@ def read_columns(
     known: Collection[str] = (),
     numbers: Collection[str] = (),
     spelling: Spelling = tuple,
-    hint: Callable[[Sequence[str]], str] | None = None,
+    hint: Callable[[Sequence[str]], str | Phrase] | None = None,
 ) -> ColumnTable:
     """Read a table from a text or Parquet file.
 
@@ -68,10 +68,9 @@ def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool
     for column in columns:
         if column and columns.count(column) > 1:
             both = [raw for raw, name in zip(own, columns, strict=True) if name == column]
-            what = f"is there twice: {listed(both)}" if set(both) != {column} else "is there twice"
             if settled and len(set(both)) > 1:
-                what += f": --columns {column}={both[0]}, or {column}={both[1]}, says which it is"
-            raise head.error(f"the column {quoted(column)} {what}")
+                raise head.error(phrase("cells.same-columns", column=column, names=both, first=both[0]))
+            raise head.error(phrase("error.repeated", kind="column", name=column))
     return columns
 
 
@@ -125,7 +124,7 @@ def _head(
     text: str,
     known: Collection[str],
     spelling: Spelling,
-    hint: Callable[[Sequence[str]], str] | None,
+    hint: Callable[[Sequence[str]], str | Phrase] | None,
 ) -> tuple[Place, str]:
     """Find the header: the first line, or the last comment before it where only that names known columns.
 
@@ -149,11 +148,11 @@ def _head(
                     return below, _delimiter(below)
             if hint is not None:
                 raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
-            raise head.error(f"is no header: it names none of the columns {listed(sorted(known))}")
+            raise head.error(phrase("cells.header", names=sorted(known)))
         return head, _delimiter(head)
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)
-    raise Place(path).error("holds no table")
+    raise Place(path).error(phrase("error.empty-file", content="table"))
 
 
 def _lines(text: str) -> Iterator[str]:
@@ -189,7 +188,7 @@ def _delimiter(head: Place) -> str:
 def _split(place: Place, delimiter: str) -> list[str]:
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
-        raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
+        raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
     if delimiter == " ":
         return [whole or bare for whole, bare in _BLANKS.findall(text)]
     if '"' not in text:
@@ -197,7 +196,7 @@ def _split(place: Place, delimiter: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
     except (csv.Error, StopIteration) as error:
-        raise place.error(f"cannot be split into cells: {error}") from None
+        raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
 
 
 def _by_lines(
@@ -227,7 +226,7 @@ def _by_lines(
             elif not rows and len(cells) == width + 1 and _shifted(cells, columns, numbers):
                 width += 1
             else:
-                raise place.error(f"there are {len(cells)} cells under {width} columns")
+                raise place.error(phrase("error.cells", count=len(cells), columns=width))
         rows.append(cells)
         records.append(record)
     return rows, records
@@ -301,35 +300,30 @@ def _decoded(
 
 def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:
     import pyarrow
-    import pyarrow.compute
     import pyarrow.parquet
+
+    from photogram.io.parquet import coded
 
     try:
         table = pyarrow.parquet.read_table(path)
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
+        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
     head = Place(path)
     own = tuple(name.strip().lower() for name in table.column_names)
     columns = _named(head, own, spelling)
     ready: dict[str, Floats | Names] = {}
     cells: dict[str, Sequence[str]] = {}
     for name, column in zip(columns, table.columns, strict=True):
-        kind = column.type
-        if pyarrow.types.is_integer(kind) and name not in numbers:
-            # Names that are digits all of them.
-            column, kind = column.cast(pyarrow.string()), pyarrow.string()
-        if pyarrow.types.is_large_string(kind):
-            column, kind = column.cast(pyarrow.string()), pyarrow.string()
-        if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-            whole = column.unify_dictionaries().combine_chunks()
-            coded = whole if pyarrow.types.is_dictionary(kind) else pyarrow.compute.dictionary_encode(whole)
-            texts = [str(text).strip() for text in coded.dictionary.to_pylist()]
-            codes = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
-            if (codes < 0).any():
-                texts.append("")
-                codes = np.where(codes < 0, len(texts) - 1, codes)
-            ready[name] = merged(codes, texts)
-        elif pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
+        kind = pyarrow.types
+        is_number = kind.is_floating(column.type) or kind.is_integer(column.type)
+        is_text = kind.is_string(column.type) or kind.is_large_string(column.type)
+        # Names may consist of digits.
+        digits = kind.is_integer(column.type) and name not in numbers
+        if is_text or digits or kind.is_dictionary(column.type):
+            texts, codes = coded(column)
+            empty = [""] * bool((codes < 0).any())  # the last name
+            ready[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
+        elif is_number:
             ready[name] = column.to_numpy().astype(float)
         else:
             cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]

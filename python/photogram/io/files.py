@@ -9,6 +9,7 @@ from pathlib import Path
 
 from photogram.errors import InputError
 from photogram.io.sheets import sheet_text
+from photogram.words import phrase
 
 HEAD = 4096  # Bytes in which text of two bytes a character is told, where it has no mark
 
@@ -17,11 +18,11 @@ HEAD = 4096  # Bytes in which text of two bytes a character is told, where it ha
 def reading(path: Path) -> Iterator[None]:
     """Name the file that the system cannot read: an :class:`OSError` becomes an :class:`InputError`."""
     if "\0" in str(path):
-        raise InputError("a path cannot hold a NUL character", file=path)
+        raise InputError(phrase("file.nul"), file=path)
     try:
         yield
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise InputError(phrase("error.read", reason=error.strerror or str(error)), file=path) from None
 
 
 def read_bytes(path: Path) -> bytes:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import orjson
 
+from photogram.arguments.arrays import value_field
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import quoted
+from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 _FORM = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
@@ -35,20 +36,20 @@ def _rows(value: object) -> object:
     """Return the rows of an array that does not lie in memory row by row, or holds what is no number."""
     if isinstance(value, np.ndarray):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no place in a document")
+    raise TypeError(f"a JSON document cannot contain {type(value).__name__}")
 
 
 @contextmanager
 def holding(what: str, path: Path | None = None) -> Iterator[None]:
-    """Say of what is no document, or has other members than were looked for, what it does not hold."""
+    """Report errors of a document that lacks members or has others than expected."""
     try:
         yield
     except InputError as error:
-        raise InputError(error.message, file=path) from None
-    except KeyError as error:
-        raise InputError(f"holds no {what}: {error} is missing", file=path) from None
-    except (AttributeError, IndexError, TypeError, ValueError) as error:
-        raise InputError(f"holds no {what}: {error}", file=path) from None
+        raise InputError(message_of(error), file=path) from None
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        missing = isinstance(error, KeyError)
+        reason = phrase("error.missing", name=str(error)) if missing else str(error)
+        raise InputError(phrase("error.content", content=what, reason=reason), file=path) from None
 
 
 @dataclass(frozen=True)
@@ -64,63 +65,63 @@ class Tree:
         located = phrase("error.at", what=self.path or phrase("error.document"), message=message)
         return InputError(located, file=self.file, text=repr(self.value)[:120])
 
-    def _as(self, kind: type, word: str) -> Any:
+    def _as(self, kind: type, code: str) -> Any:
         if not isinstance(self.value, kind) or isinstance(self.value, bool):
-            raise self.error(f"is no {word}")
+            raise self._error(code)
         return self.value
+
+    def _error(self, code: str, **fields: Any) -> InputError:
+        return self.error(phrase(code, value=value_field(self.value), **fields))
 
     def __contains__(self, key: str) -> bool:
         return isinstance(self.value, Mapping) and self.value.get(key) is not None
 
     def __getitem__(self, key: str) -> Tree:
-        members = self._as(dict, "object")
+        members = self._as(dict, "error.table")
         if key not in members:
-            raise self.error(f"{key} is missing")
+            raise self.error(phrase("error.missing", name=key))
         return Tree(members[key], self.file, f"{self.path}/{key}")
 
     def get(self, key: str, default: Any) -> Tree:
         """Return a member, or a default where it is missing or null."""
-        members = self._as(dict, "object")
-        value = members.get(key)
+        value = self._as(dict, "error.table").get(key)
         return Tree(default if value is None else value, self.file, f"{self.path}/{key}")
 
     def items(self) -> Iterator[tuple[str, Tree]]:
         """Yield the members of an object."""
-        for key, value in self._as(dict, "object").items():
+        for key, value in self._as(dict, "error.table").items():
             yield key, Tree(value, self.file, f"{self.path}/{key}")
 
     def __iter__(self) -> Iterator[Tree]:
-        for row, value in enumerate(self._as(list, "list")):
+        for row, value in enumerate(self._as(list, "error.list")):
             yield Tree(value, self.file, f"{self.path}/{row}")
 
     def number(self) -> float:
         """Return a finite number."""
-        if self.value is None:
-            raise self.error("is null and must be a number")
         if not isinstance(self.value, int | float) or isinstance(self.value, bool):
-            raise self.error("is no number")
+            raise self._error("error.number")
         if not (abs(self.value) < LARGEST):
-            raise self.error("is no finite number")
+            raise self._error("error.finite")
         return float(self.value)
 
     def whole(self, lowest: int = 0, highest: int = 2**31) -> int:
         """Return a whole number."""
         value = self.number()
         if not math.isfinite(value) or value != int(value) or not lowest <= value <= highest:
-            raise self.error(f"is no whole number from {lowest} to {highest}")
+            raise self._error("error.whole-range", low=lowest, high=highest)
         return int(value)
 
     def text(self) -> str:
         """Return a text."""
-        value: str = self._as(str, "text")
+        value: str = self._as(str, "error.text")
         return value
 
     def numbers(self, count: int) -> Floats:
         """Return (count,) finite numbers."""
-        found = [each.number() for each in self]
-        if len(found) != count:
-            raise self.error(f"has {len(found)} numbers, not {count}")
-        return np.array(found)
+        values = [member.number() for member in self]
+        if len(values) != count:
+            raise self.error(phrase("error.count", count=count, actual=len(values)))
+        return np.array(values)
 
 
 def read_json(path: Path) -> Tree:
@@ -131,11 +132,11 @@ def read_json(path: Path) -> Tree:
     except orjson.JSONDecodeError as error:
         lines = data.decode("utf-8", "replace").split("\n")
         record = min(error.lineno, len(lines))
-        raise InputError(
-            f"is no JSON: {error.msg}, column {error.colno}", file=path, record=record, text=lines[record - 1]
-        ) from None
+        reason = phrase("error.at-column", message=error.msg, column=error.colno)
+        message = phrase("error.parse", format="JSON", reason=reason)
+        raise InputError(message, file=path, record=record, text=lines[record - 1]) from None
 
 
 def unknown(tree: Tree, what: str, known: Mapping[str, Any]) -> InputError:
     """Return an error for a word that is none of those known."""
-    return tree.error(f"{what} {quoted(str(tree.value))} is none of {', '.join(known)}")
+    return tree.error(unknown_name(what, str(tree.value), known))

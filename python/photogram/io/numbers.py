@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Iterable
 
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import quoted
+from photogram.words import phrase
 
 LARGEST_INTEGER = 2**63 - 1  # The largest that an array of 64-bit integers holds
 
@@ -29,10 +30,10 @@ def is_whole_number(text: str) -> bool:
 def whole_number(text: str, lowest: int = 0, highest: int = LARGEST_INTEGER) -> int:
     """Read a whole number between two limits, which is not negative by default."""
     if len(text) > LONGEST or not _WHOLE.fullmatch(text):
-        raise ValueError(f"{quoted(text)} is not a whole number")
+        raise InputError(phrase("error.whole", value=text))
     value = int(text)
     if not lowest <= value <= highest:
-        raise ValueError(f"{quoted(text)} is not from {lowest} to {highest}")
+        raise InputError(phrase("error.whole-range", value=text, low=lowest, high=highest))
     return value
 
 
@@ -44,7 +45,7 @@ def finite_number(text: str) -> float:
     """
     value = float(text) if len(text) <= LONGEST and _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{quoted(text)} is not a number")
+        raise InputError(phrase("error.number", value=text))
     return value
 
 
@@ -79,10 +80,7 @@ class Marks:
         if other in head:
             groups = _GROUPS.fullmatch(head)
             if groups is None or groups["mark"] != other or not self.thousands:
-                raise ValueError(
-                    f"{quoted(text)}: {self.decimal!r} divides decimals elsewhere in the table, and nothing"
-                    f" says that {other!r} divides thousands"
-                )
+                raise InputError(phrase("cells.marks", value=text, decimal=self.decimal, other=other))
             head = head.replace(other, "")
         return f"{head}.{tail}" if mark else head
 

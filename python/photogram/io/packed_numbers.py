@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.words import Phrase, phrase
 
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),
@@ -27,7 +28,7 @@ SHOWN = 120  # Characters of a faulty line that are shown
 
 def pieces(path: Path) -> Iterator[bytes]:
     """Yield the file, unpacked, in pieces that end where a number does."""
-    doing = "read"
+    unpack = None
     try:
         with path.open("rb") as file:
             begin = file.peek(LONGEST)[:LONGEST]
@@ -35,13 +36,13 @@ def pieces(path: Path) -> Iterator[bytes]:
             if unpack is None:
                 yield from _whole_words(path, file)
             else:
-                doing = "unpacked"
                 yield from _whole_words(path, unpack(file))
     except InputError:
         raise
     except (OSError, EOFError, ValueError, zlib.error) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"cannot be {doing}: {reason}", file=path) from None
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        code = "file.unpack" if unpack else "error.read"
+        raise InputError(phrase(code, reason=reason), file=path) from None
 
 
 def _whole_words(path: Path, file: BinaryIO) -> Iterator[bytes]:
@@ -53,7 +54,7 @@ def _whole_words(path: Path, file: BinaryIO) -> Iterator[bytes]:
             rest = b""
         rest += piece[cut:]
         if len(rest) > PIECE:
-            raise InputError(f"has {len(rest)} characters without white space: that is no number", file=path)
+            raise InputError(phrase("file.long-number", length=len(rest)), file=path)
     yield rest
 
 
@@ -69,7 +70,7 @@ def whole(numbers: Floats) -> NDArray[np.bool_]:
     return np.asarray((numbers >= 0) & (numbers == np.floor(numbers)) & (numbers < 2**53))
 
 
-def at(path: Path, index: int, message: str) -> InputError:
+def at(path: Path, index: int, message: str | Phrase) -> InputError:
     """Return an error at the line that holds the word of the given index."""
     words = lines = 0
     if not path.is_file():

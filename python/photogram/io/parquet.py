@@ -14,6 +14,8 @@ import numpy as np
 from photogram.arguments.types import Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import missing_columns
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pyarrow
@@ -24,7 +26,7 @@ LEVEL = 1  # Of zstd: numbers of measurements hardly get smaller at higher ones
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """A column of names, most of which stand there many times: row i is `names[rows[i]]`."""
+    """A column of names that repeat: row i is `names[rows[i]]`."""
 
     names: Sequence[str]
     rows: Indices
@@ -63,28 +65,25 @@ class Sheet:
     def column(self, name: str) -> Any:
         """Return a column."""
         if name not in self.columns:
-            raise InputError(f"the column {name} is missing", file=self.path)
+            raise InputError(missing_columns([name], list(self.columns)), file=self.path)
         return self.columns[name]
 
     def names(self, name: str) -> Repeated:
         """Return a column of names."""
-        found = self.column(name)
-        if not isinstance(found, Repeated):
-            raise self._other(name, found)
-        return found
+        values = self.column(name)
+        if not isinstance(values, Repeated):
+            raise InputError(phrase("cells.column-kind", column=name, kind="names"), file=self.path)
+        return values
 
     def numbers(self, name: str, columns: int = 0) -> Any:
         """Return a column of numbers: (rows,), or (rows, columns); a negative count divides their number."""
-        found = self.column(name)
-        kind = found.dtype.kind if isinstance(found, np.ndarray) else ""
-        width = found.shape[1] if kind and found.ndim == 2 else 0
+        values = self.column(name)
+        kind = values.dtype.kind if isinstance(values, np.ndarray) else ""
+        width = values.shape[1] if kind and values.ndim == 2 else 0
         fits = width == columns if columns >= 0 else width > 0 and width % columns == 0
         if kind not in tuple("iuf") or not fits:
-            raise self._other(name, found)
-        return found
-
-    def _other(self, name: str, found: object) -> InputError:
-        return InputError(f"the column {name} does not hold what it should: {found!r}"[:200], file=self.path)
+            raise InputError(phrase("cells.column-kind", column=name, kind="numbers"), file=self.path)
+        return values
 
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
@@ -117,10 +116,22 @@ def read_sheet(path: Path) -> Sheet:
     try:
         table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
+        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
     columns = {name: _values(path, name, table.column(name)) for name in table.column_names}
     about = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}
     return Sheet(path, columns, about)
+
+
+def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
+    """Return the names of a column of text, and the name of each row; -1 for empty cells."""
+    import pyarrow
+
+    whole = column.unify_dictionaries().combine_chunks()
+    # A batch may have all names of its file.
+    if not pyarrow.types.is_dictionary(whole.type) or len(whole.dictionary) > len(whole):
+        whole = whole.cast(pyarrow.string()).dictionary_encode()
+    rows = whole.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+    return whole.dictionary.to_pylist(), rows
 
 
 def packed(matrices: np.ndarray) -> np.ndarray:
@@ -133,10 +144,9 @@ def unpacked(triangles: np.ndarray) -> np.ndarray:
     """Return (n, k, k) symmetric matrices of their lower triangles."""
     k = round(((8 * triangles.shape[1] + 1) ** 0.5 - 1) / 2)
     rows, columns = np.tril_indices(k)
-    found = np.empty((len(triangles), k, k))
-    found[:, rows, columns] = triangles
-    found[:, columns, rows] = triangles
-    return found
+    matrices = np.empty((len(triangles), k, k))
+    matrices[:, rows, columns] = matrices[:, columns, rows] = triangles
+    return matrices
 
 
 def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table:
@@ -175,18 +185,10 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
 
     whole = column.combine_chunks()
     kind = column.type
-    if pyarrow.types.is_dictionary(kind):
-        return Repeated(
-            whole.dictionary.to_pylist(), whole.indices.to_numpy(zero_copy_only=False).astype(np.int64)
-        )
-    if pyarrow.types.is_string(kind):
-        coded = whole.dictionary_encode()
-        return Repeated(
-            coded.dictionary.to_pylist(),
-            coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64),
-        )
+    if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
+        return Repeated(*coded(column))
     if whole.null_count:
-        raise InputError(f"the column {name} has empty cells", file=path)
+        raise InputError(phrase("error.column", column=name, message=phrase("error.empty")), file=path)
     if pyarrow.types.is_fixed_size_list(kind):
         return whole.flatten().to_numpy(zero_copy_only=False).reshape(len(whole), kind.list_size)
     return whole.to_numpy(zero_copy_only=False)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.messages import Message
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 
 class Failing(Protocol):
@@ -22,12 +22,15 @@ class Failing(Protocol):
 
 
 @contextmanager
-def at_place(place: Failing) -> Iterator[None]:
-    """Have errors name a place that name no file yet."""
+def at_place(place: Failing, what: str | Phrase = "") -> Iterator[None]:
+    """Let errors name a place, and the faulty thing, if they name no file yet."""
     try:
         yield
     except InputError as error:
-        raise (error if error.file else place.error(error.phrase or error.message)) from None
+        if error.file:
+            raise
+        message = message_of(error)
+        raise place.error(phrase("error.at", what=what, message=message) if what else message) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +45,15 @@ class Place:
         """Return an error that names the place."""
         return InputError(message, file=self.file, record=self.record, text=self.text)
 
-    def number(self, text: str, what: str = "") -> float:
+    def number(self, text: str, what: str | Phrase = "") -> float:
         """Return a finite number that a text is; an error names the place, and what it should be."""
-        try:
+        with at_place(self, what):
             return finite_number(text)
-        except ValueError as error:
-            raise self.error(f"{what}: {error}" if what else str(error)) from None
 
-    def whole(self, text: str, what: str = "", highest: int = LARGEST_INTEGER) -> int:
+    def whole(self, text: str, what: str | Phrase = "", highest: int = LARGEST_INTEGER) -> int:
         """Return a whole number that is not negative; errors as :meth:`number`."""
-        try:
+        with at_place(self, what):
             return whole_number(text, highest=highest)
-        except ValueError as error:
-            raise self.error(f"{what}: {error}" if what else str(error)) from None
 
     def message(self, message: str | Phrase) -> Message:
         """Return a remark that names the place."""

@@ -12,8 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import quoted
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 
 class Quantity(NamedTuple):
@@ -66,7 +65,6 @@ _PLAIN = re.compile(r"[^\s=(){},;\"'<>#/-](?:[^\s=(){},;\"'<>#/-]|/(?!\*)|-(?!$)
 """Words that need no marks of quotation."""
 _DEEPEST = 32
 _OPENING = {"(": ")", "{": "}"}
-_SHOWN = 40
 _BEGINS = {"group": "group", "begin_group": "group", "object": "object", "begin_object": "object"}
 _ENDS = {"end_group": "group", "endgroup": "group", "end_object": "object", "endobject": "object"}
 
@@ -110,11 +108,7 @@ class _Reader:
             if kind != "space":
                 return _Token(kind, found[kind], start)
         if self.at < len(self.text):
-            raise InputError(
-                f"is no label of PVL from {self.text[self.at : self.at + _SHOWN]!r} on",
-                file=self.file,
-                record=self.line(self.at),
-            )
+            raise self.error(phrase("pvl.text", text=self.text[self.at :]), self.at)
         return _Token("end", "", self.at)
 
 
@@ -132,7 +126,7 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
             _close(reader, open_groups, ended, key, start)
             continue
         if not reader.is_sign("="):
-            raise reader.error(f"{key[:_SHOWN]} has no value", start)
+            raise reader.error(phrase("pvl.value", key=key), start)
         reader.take()
         if (kind := _BEGINS.get(key.lower())) is None:
             open_groups[-1].items.append((key, _value(reader, key)))
@@ -143,23 +137,23 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
         if reader.is_sign(";"):
             reader.take()
         if reader.is_sign("="):
-            raise reader.error(f"{key[:_SHOWN]} has no value", start)
+            raise reader.error(phrase("pvl.value", key=key), start)
     if reader.token.kind not in ("word", "end"):
-        raise reader.error(f"has {reader.token.text[:_SHOWN]!r} where a key should be")
+        raise reader.error(phrase("pvl.text", text=reader.token.text))
     if len(open_groups) > 1:
-        raise reader.error(f"has no end of the {open_groups[-1].kind} {open_groups[-1].name}")
+        raise reader.error(phrase("pvl.open", kind=open_groups[-1].kind, name=open_groups[-1].name))
     return label
 
 
 def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start: int) -> None:
     """End the innermost group; its name may be said again."""
     if len(open_groups) == 1 or open_groups[-1].kind != kind:
-        raise reader.error(f"{key} ends nothing that is open", start)
+        raise reader.error(phrase("pvl.end", key=key), start)
     ended = open_groups.pop()
     if reader.is_sign("="):
         reader.take()
-        if (said := str(_scalar(reader, key))).lower() != ended.name.lower():
-            raise reader.error(f"ends the {kind} {said[:_SHOWN]}, but {ended.name} is open", start)
+        if str(_scalar(reader, key)).lower() != ended.name.lower():
+            raise reader.error(phrase("pvl.open", kind=kind, name=ended.name), start)
     if reader.is_sign(";"):
         reader.take()
 
@@ -172,14 +166,14 @@ def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
 
 def _list(reader: _Reader, key: str, depth: int) -> list[Value]:
     if depth == _DEEPEST:
-        raise reader.error("lists are nested too deeply")
+        raise reader.error(phrase("error.nested"))
     start = reader.token.start
     closing = _OPENING[reader.take().text]
     values: list[Value] = []
     while not reader.is_sign(closing):
         if values:
             if not reader.is_sign(","):
-                raise reader.error(f"the list of {key[:_SHOWN]} has no end", start)
+                raise reader.error(phrase("pvl.list", key=key), start)
             reader.take()
         values.append(_value(reader, key, depth + 1))
     reader.take()
@@ -189,7 +183,7 @@ def _list(reader: _Reader, key: str, depth: int) -> list[Value]:
 def _scalar(reader: _Reader, key: str) -> str | int | float:
     kind, text, start = reader.token
     if kind not in ("word", "double", "single"):
-        raise reader.error(f"{key[:_SHOWN]} has no value", start)
+        raise reader.error(phrase("pvl.value", key=key), start)
     reader.take()
     text = _CONTINUED.sub("", text)
     if kind != "word":
@@ -240,7 +234,5 @@ def _value_text(value: Value) -> str:
         return value
     mark = "'" if '"' in value else '"'
     if mark in value or "\n" in value:
-        raise InputError(
-            f"{quoted(value)} cannot stand in a label: it has several lines, or both quotation marks"
-        )
+        raise InputError(phrase("pvl.text-written", value=value))
     return f"{mark}{value}{mark}"

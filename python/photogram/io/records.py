@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 WIDTH = 80
 WIDE = 0.25  # Zero bytes that no text of one byte a character has, as a part of all
@@ -36,16 +36,14 @@ class Source:
         lines = read_lines(path)
         text = "".join(lines)
         if text.count("\0") > WIDE * len(text):
-            error = "text of four bytes a character (UTF-32), or damaged text of two: save it as UTF-8"
-            raise InputError(error, file=path)
+            raise InputError(phrase("file.wide"), file=path)
         source = cls(path, [line[:WIDTH] for line in lines])
         if "".join(source.lines).isprintable():
             return source
         for number, line in enumerate(source.lines, 1):
             if not line.isprintable():
-                what = next(character for character in line if not character.isprintable())
-                error = f"the character {what!r} has no place in a record of fixed columns"
-                raise source.record(number).error(error)
+                character = next(character for character in line if not character.isprintable())
+                raise source.record(number).error(phrase("error.unprintable", value=character))
         return source
 
     def record(self, number: int) -> Record:
@@ -111,7 +109,7 @@ def parse_real(field: str, decimals: int) -> Decimal:
         return Decimal(0)
     match = _REAL.fullmatch(digits)
     if match is None:
-        raise ValueError(f"{field!r} is not a number")
+        raise InputError(phrase("error.number", value=field))
     mantissa, lettered, bare = match.groups()
     value, exponent = Decimal(mantissa), int(lettered or bare or 0)
     if not value:
@@ -119,7 +117,7 @@ def parse_real(field: str, decimals: int) -> Decimal:
     exponent = max(-LARGEST_EXPONENT, min(exponent, LARGEST_EXPONENT))
     value = value.scaleb(exponent - (0 if "." in mantissa else decimals))
     if math.isinf(float(value)) or float(value) == 0:
-        raise ValueError(f"{field!r} is beyond the range of numbers")
+        raise InputError(phrase("error.too-large", value=field))
     return value
 
 
@@ -127,5 +125,5 @@ def parse_integer(field: str) -> int:
     """Read an Iw field; blank is zero and blanks inside are ignored."""
     digits = field.replace(" ", "")
     if digits and _INTEGER.fullmatch(digits) is None:
-        raise ValueError(f"{field!r} is not a whole number")
+        raise InputError(phrase("error.whole", value=field))
     return int(digits or 0)

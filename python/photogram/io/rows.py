@@ -15,9 +15,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from photogram.io.files import read_lines
-from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
-from photogram.messages import listed, quoted
+from photogram.messages import missing_columns
+from photogram.words import phrase
 
 DELIMITERS = ("\t", ";", ",", "|")  # What a header shows to stand between cells, in this order
 LONGEST_RECORD = 100_000  # Characters of a record at most. The module `csv` stops at cells of 131,072
@@ -36,26 +36,21 @@ class Row:
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
-        try:
-            return whole_number(text)
-        except ValueError as error:
-            raise self.place.error(f"{column} {error}") from None
+        return self.place.whole(text, phrase("cells.cell", column=column))
 
     def number(self, column: str) -> float | None:
         """Return a finite number; None where the cell is blank or the column is missing."""
         text = self.cells.get(column, "")
         if not text:
             return None
-        try:
-            return finite_number(text.replace(",", ".") if self.commas and "." not in text else text)
-        except ValueError as error:
-            raise self.place.error(f"{column} {error}") from None
+        number = text.replace(",", ".") if self.commas and "." not in text else text
+        return self.place.number(number, phrase("cells.cell", column=column))
 
     def required(self, column: str) -> float:
         """Return a finite number."""
         value = self.number(column)
         if value is None:
-            raise self.place.error(f"{column} is blank")
+            raise self.place.error(phrase("error.column", column=column, message=phrase("error.empty")))
         return value
 
 
@@ -92,12 +87,12 @@ class Table:
             elif line.strip(" \t,;|"):
                 records.append(Place(path, number, line))
         if not records:
-            raise Place(path).error("holds no table")
+            raise Place(path).error(phrase("error.empty-file", content="table"))
         head, *body = records
         delimiter = next((each for each in DELIMITERS if each in (head.text or "")), ",")
         columns = tuple(spelling(name) for name in cells(head, delimiter))
         if twice := [name for name, count in Counter(columns).items() if name and count > 1]:
-            raise head.error(f"the column {quoted(twice[0])} is there twice")
+            raise head.error(phrase("error.repeated", kind="column", name=twice[0]))
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
     def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
@@ -109,31 +104,30 @@ class Table:
         return replace(self, columns=tuple(names))
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns."""
+        """Reject a table without these columns."""
         there = set(self.columns)
         if missing := [column for column in columns if column not in there]:
-            what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
-            raise self.head.error(what.format(listed(missing)))
+            raise self.head.error(missing_columns(missing, self.columns))
 
     def rows(self) -> Iterator[Row]:
         """Split the records, one after the other."""
         count = len(self.columns)
         for place in self.records:
-            found = cells(place, self.delimiter)
-            if len(found) > count or (len(found) < count and not self.ragged):
-                raise place.error(f"there are {len(found)} cells under {count} columns")
-            yield Row(dict(zip(self.columns, found, strict=False)), place, self.delimiter != ",")
+            texts = cells(place, self.delimiter)
+            if len(texts) > count or (len(texts) < count and not self.ragged):
+                raise place.error(phrase("error.cells", count=len(texts), columns=count))
+            yield Row(dict(zip(self.columns, texts, strict=False)), place, self.delimiter != ",")
 
 
 def cells(place: Place, delimiter: str = ",") -> list[str]:
     """Split a record at its commas, or another delimiter; quotation marks hold a cell together."""
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
-        raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
+        raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
     try:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
     except csv.Error as error:
-        raise place.error(f"cannot be split into cells: {error}") from None
+        raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
 
 
 def read_rows(

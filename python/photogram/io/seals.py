@@ -11,6 +11,7 @@ import orjson
 
 from photogram.errors import InputError
 from photogram.io.files import reading
+from photogram.words import phrase
 
 SEAL = "sha256"  # The member of a document that holds its own checksum
 
@@ -22,19 +23,17 @@ def seal(document: Mapping[str, Any]) -> str:
 
 
 def check_sealed(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document that is not the one which was sealed."""
+    """Reject a document that is not the one which was sealed."""
     if document.get(SEAL) != seal(document):
-        raise InputError("was changed after it was written: its checksum is another one", file=path)
+        raise InputError(phrase("file.changed"), file=path)
 
 
 def check_seal(path: Path, expected: object, of: str) -> None:
-    """Refuse a file whose checksum differs from the one that the file `of` states."""
+    """Reject a file whose checksum differs from the one that the file `of` states."""
     with reading(path), path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != expected:
-        raise InputError(
-            f"is not the file that was written with {of}: changed since, or of another result", file=path
-        )
+        raise InputError(phrase("file.other", file=of), file=path)
 
 
 class Seals:

@@ -11,8 +11,10 @@ from typing import Any
 
 from photogram.errors import InputError
 from photogram.io.archives import check_unpacked_size
+from photogram.words import phrase
 
-LARGEST = 1 << 29  # Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack
+LARGEST = 1 << 29  # Bytes that a workbook may unpack to: larger ones are attacks
+_NEEDS_OPENPYXL = phrase("error.package", what="an Excel workbook", package="openpyxl", extra="excel")
 
 
 def sheet_text(path: Path) -> str:
@@ -20,12 +22,12 @@ def sheet_text(path: Path) -> str:
     try:
         import openpyxl
     except ImportError:
-        raise InputError("Excel workbooks need openpyxl: pip install photogram[excel]", file=path) from None
+        raise InputError(_NEEDS_OPENPYXL, file=path) from None
     try:
         with zipfile.ZipFile(path) as archive:
             check_unpacked_size(path, archive.infolist())
             if sum(each.file_size for each in archive.infolist()) > LARGEST:
-                raise InputError(f"unpacks to more than {LARGEST >> 20} MiB", file=path)
+                raise InputError(phrase("file.unpacked", most=LARGEST >> 20), file=path)
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
             rows = list(book.worksheets[0].iter_rows(values_only=True))
@@ -34,10 +36,10 @@ def sheet_text(path: Path) -> str:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise InputError(phrase("error.read", reason=error.strerror or str(error)), file=path) from None
     except Exception as error:  # whatever a damaged archive makes the library raise
-        what = f"cannot be read as a workbook of Excel ({type(error).__name__}: {error})"
-        raise InputError(f"{what}: save it again as .xlsx, or as CSV", file=path) from None
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(phrase("file.workbook", reason=reason), file=path) from None
     width = max((k + 1 for row in rows for k, cell in enumerate(row) if cell is not None), default=0)
     return "".join("\t".join(_cell(cell) for cell in row[:width]) + "\n" for row in rows)
 
@@ -62,7 +64,7 @@ def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[s
         import openpyxl
         from openpyxl.cell import WriteOnlyCell
     except ImportError:
-        raise InputError("Excel workbooks need openpyxl: pip install photogram[excel]") from None
+        raise InputError(_NEEDS_OPENPYXL) from None
     book = openpyxl.Workbook(write_only=True)
 
     def cell(sheet: Any, value: Any) -> Any:

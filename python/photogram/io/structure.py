@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.annotations import check_members
-from photogram.errors import InputError
-from photogram.messages import quoted
+from photogram.errors import InputError, message_of
+from photogram.words import phrase
 
 SMALL = 36  # Numbers up to which an array is written as numbers that people can read
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -62,7 +62,7 @@ class Encoder:
             return {"path": str(given)}
         if is_dataclass(given) and not isinstance(given, type):
             return self._object(given)
-        raise TypeError(f"a document has no place for {type(given).__name__}")
+        raise TypeError(f"a document cannot contain {type(given).__name__}")
 
     def fields(self, given: Any, omitted: Iterable[str] = ()) -> dict[str, Any]:
         """Return the fields of an object of a data class that make it, but for some."""
@@ -118,36 +118,36 @@ class Decoder:
             return given
         kind = next(iter(given), "")  # the mark comes first: members of objects may be called as marks are
         if kind not in self._kinds:
-            raise self._error(f"does not say what {quoted(str(given))} is")
+            raise self._error("document.kind", value=str(given))
         try:
             return self._kinds[kind](given)
         except (LookupError, TypeError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            raise self._error(f"{quoted(str(given))} is no {kind} ({error})") from None
+            raise self._error("document.value", value=str(given), kind=kind, reason=str(error)) from None
 
     def fields(self, given: Any, kind: type = object) -> dict[str, Any]:
         """Return the fields of an object of a class that were written one by one."""
         if not isinstance(given, dict):
-            raise self._error(f"{quoted(str(given))} has no members")
-        found = {name: self.value(each) for name, each in given.items()}
+            raise self._error("error.table", value=str(given))
+        members = {name: self.value(value) for name, value in given.items()}
         try:
-            check_members(kind, found)
+            check_members(kind, members)
         except InputError as error:
-            raise self._error(error.message) from None
-        return found
+            raise InputError(message_of(error), file=self._path) from None
+        return members
 
     def _object(self, given: dict[str, Any]) -> object:
         name = given["is"]
         if name not in self._classes:
-            raise self._error(f"{quoted(str(name))} is no class that this version knows")
+            raise self._error("document.class", name=str(name))
         own = self.fields({member: each for member, each in given.items() if member != "is"})
         try:
             check_members(self._classes[name], own)
             made = self._classes[name](**own)
             made = made.original() if isinstance(made, Stand) else made
         except InputError as error:
-            raise self._error(error.message) from None
+            raise InputError(message_of(error), file=self._path) from None
         self._made.append(made)
         return made
 
@@ -160,5 +160,5 @@ class Decoder:
         found = np.frombuffer(b64decode(given["array"], validate=True), dtype=kind)
         return found.reshape(given["shape"]).astype(kind.newbyteorder("="))
 
-    def _error(self, text: str) -> InputError:
-        return InputError(text, file=self._path)
+    def _error(self, code: str, **fields: Any) -> InputError:
+        return InputError(phrase(code, **fields), file=self._path)

@@ -1,4 +1,4 @@
-"""TOML files, and sections with keys in them: errors name the line."""
+"""TOML files: tables whose values are read by kind and range; errors name file, line, table and key."""
 
 from __future__ import annotations
 
@@ -9,46 +9,59 @@ import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import value_field
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
-from photogram.messages import nearest
-from photogram.words import Phrase
+from photogram.messages import unknown_name
+from photogram.words import Phrase, phrase
 
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
-"""Python refuses whole numbers of thousands of digits, and does not say where they stand."""
-_SHOWN = 60  # Characters of a key that an error shows
+"""Python rejects integers of thousands of digits without their line."""
 
 
 class TomlFile:
-    """The content of a file."""
+    """The content of a file.
 
-    def __init__(self, path: Path) -> None:
+    `replaced` are values that replace those of the file: `section.key=value`, texts with or without quotes.
+    """
+
+    def __init__(self, path: Path, replaced: Sequence[str] = ()) -> None:
         self.path = path
         try:
             text = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError as error:
-            raise InputError(
-                f"is no text of UTF-8: {error.reason} at byte {error.start}", file=path
-            ) from None
+            raise InputError(phrase("error.encoding", byte=error.start), file=path) from None
         self.lines = text.split("\n")
         if (endless := _ENDLESS.search(text)) is not None:
-            place = self._place(text.count("\n", 0, endless.start()) + 1)
-            key = (place.text or "").split("=")[0].strip()[:_SHOWN]
-            raise InputError(
-                f"{key} has a number of more than {MOST_DIGITS} digits", file=path, record=place.record
-            )
+            record = text.count("\n", 0, endless.start()) + 1
+            key = self.lines[record - 1].split("=")[0].strip()
+            raise InputError(phrase("toml.digits", key=key, most=MOST_DIGITS), file=path, record=record)
         try:
             self.content: Mapping[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             where = re.search(r"at line (\d+)", str(error))
-            raise self._place(int(where[1]) if where else None).error(f"is no TOML: {error}") from None
+            message = phrase("error.parse", format="TOML", reason=str(error))
+            raise self._place(int(where[1]) if where else None).error(message) from None
         except RecursionError:
-            raise InputError("brackets are nested too deeply", file=path) from None
+            raise InputError(phrase("error.nested"), file=path) from None
+        self._replaced: dict[tuple[str, str], str] = {}
+        for text in replaced:
+            self._replace(text)
+
+    def _replace(self, text: str) -> None:
+        name, equals, value = text.partition("=")
+        section, point, key = name.strip().partition(".")
+        if not (equals and point and section and key):
+            raise InputError(phrase("toml.replace", text=text))
+        table = self.content.get(section, {})
+        if not isinstance(table, dict):
+            raise self.error(section, phrase("error.table", value=value_field(table)))
+        self.content = {**self.content, section: {**table, key: _value(value.strip())}}
+        self._replaced[section, key] = text
 
     def _place(self, record: int | None) -> Place:
         known = record is not None and record <= len(self.lines)
@@ -56,141 +69,333 @@ class TomlFile:
 
     def error(self, key: str, message: str | Phrase, section: str = "") -> InputError:
         """Return an error at the first line that has a key or table: of the section, if there."""
+        replaced = [text for pair, text in self._replaced.items() if pair == (section, key) or pair[0] == key]
+        if replaced:
+            return InputError(
+                phrase("error.at", what=f"--set {replaced[0]}", message=message), file=self.path
+            )
         return self.place(key, section).error(message)
 
     def place(self, key: str, section: str = "") -> Place:
         """Return the first line that has a key or table: of the section, if there."""
         word = rf"[\"']?{re.escape(key)}[\"']?\s*[\]=.]"
-        own, every = list(self._lines_of(section)), list(enumerate(self.lines, 1))
+        own = list(self._lines_of(section)) if section else []
         first = rf"^\s*\[?\[?\s*{word}"
         # Inline tables and names with points have their keys amid a line.
-        for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}"), (every, first)):
-            for record, line in lines:
+        for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}")):
+            for record, line in lines or enumerate(self.lines, 1):
                 if re.match(pattern, line):
                     return self._place(record)
-        return self._place(None)
+        return self._place(own[0][0] if own else None)
 
     def _lines_of(self, section: str) -> Iterator[tuple[int, str]]:
-        """Yield the lines of a section with their numbers: below its header, or with its name before keys."""
-        word = rf"\s*[\"']?{re.escape(section)}[\"']?\s*"
-        below, inside = False, False
+        """Yield the lines of a section with their numbers: below its header, or with its name before keys.
+
+        The section `NAME 2` is the second table of an array.
+        """
+        name, blank, number = section.rpartition(" ")
+        several = bool(blank) and number.isdigit()
+        word = rf"\s*[\"']?{re.escape(name if several else section)}[\"']?\s*"
+        below, inside, count = False, False, 0
         for record, line in enumerate(self.lines, 1):
             if line.lstrip().startswith("["):
                 below, inside = True, re.match(rf"\s*\[+{word}[\].]", line) is not None
+                count += inside
+                inside &= not several or count == int(number)
             if inside or (not below and re.match(rf"{word}[=.]", line)):
                 yield record, line
 
 
 def day_of(value: object) -> date:
-    """Return a day of TOML, or of a text such as 1983-07-02; `ValueError` where it is none."""
+    """Return a day of TOML, or of a text such as 1983-07-02; `ValueError` if it is neither."""
     # A time of a day is a date of Python's, too.
     return value if type(value) is date else date.fromisoformat(value if isinstance(value, str) else "")
 
 
 def quoted_text(text: str) -> str:
     """Return a text as files of TOML have it, between quotation marks."""
-    # Strings of JSON are strings of TOML, but for the one control character that JSON leaves as it is.
+    # Strings of JSON are strings of TOML, except for one control character, which JSON does not escape.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-class Sections(TomlFile):
-    """A file of sections with keys; errors name file, line and text.
+def toml_text(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return tables as text of TOML, without tables and values that are empty (None)."""
+    lines = []
+    for name, values in tables.items():
+        if own := [f"{key} = {_text(value)}" for key, value in values.items() if value is not None]:
+            lines += [f"[{name}]", *own, ""]
+    return "\n".join(lines)
 
-    `said` are values that replace those of the file: `section.key=value`, texts with or without quotes.
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return quoted_text(value)
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{quoted_text(name)} = {_text(own)}' for name, own in value.items())} }}"
+    if isinstance(value, int):
+        return str(value)
+    return repr(float(value)) if isinstance(value, float) else f"[{', '.join(map(_text, value))}]"
+
+
+class Table:
+    """One table of a TOML file, by its name in errors.
+
+    Missing values without a default, values of another kind or beyond their limits are an :class:`InputError`
+    that names file, line, table and key.
     """
 
-    def __init__(self, path: Path, said: Sequence[str] = ()) -> None:
-        super().__init__(path)
-        self._said: dict[tuple[str, str], str] = {}
-        content = dict(self.content)
-        for each in said:
-            name, equals, value = each.partition("=")
-            section, point, key = name.strip().partition(".")
-            if not (equals and point and section and key):
-                raise InputError(f"--set {each}: SECTION.KEY=VALUE, as film.model=affine")
-            if not isinstance(content.get(section, {}), dict):
-                self.fail("", section, f"{section} is no section")
-            content[section] = {**content.get(section, {}), key: _value(value.strip())}
-            self._said[section, key] = each
-        self.content = content
+    def __init__(self, values: Mapping[str, Any], name: str, source: TomlFile) -> None:
+        self.values, self.name, self.source = dict(values), name, source
 
-    def fail(self, section: str, key: str, message: str | Phrase) -> NoReturn:
-        """Raise an error at the first line of a section that has the key; without a section, of the file."""
-        given = [each for (own, name), each in self._said.items() if (own, name) == (section, key)]
-        given += [each for (own, _), each in self._said.items() if (section, key) == ("", own)]
-        if given:
-            raise InputError(f"--set {given[0]}: {message}", file=self.path)
-        raise self.error(key, message, section)
+    @property
+    def file(self) -> Path:
+        """The file."""
+        return self.source.path
 
-    def check_keys(self, known: Mapping[str, Collection[str] | None]) -> None:
-        """Refuse sections and keys that there are not; None: keys are names that people choose."""
-        for section, values in self.content.items():
-            if section not in known:
-                self.fail("", section, f"there is no section [{section}]{nearest(section, known)}")
-            if not isinstance(values, dict):
-                self.fail("", section, f"{section} is no section")
-            keys = known[section]
-            for key in values:
-                if keys is not None and key not in keys:
-                    self.fail(section, key, f"[{section}] has no key {key}{nearest(key, keys)}")
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
 
-    def has(self, section: str, key: str) -> bool:
-        """Whether a key is there."""
-        return key in self.content.get(section, {})
+    def error(self, key: str, message: str | Phrase) -> InputError:
+        """Return an error that names file, line, table and key."""
+        return self.source.error(
+            key, phrase("error.key", table=self.name, key=key, message=message), self.name
+        )
 
-    def value(self, section: str, key: str, default: Any = None) -> Any:
-        """Return what a key has."""
-        return self.content.get(section, {}).get(key, default)
+    def value_error(self, key: str, code: str, value: object = None, **fields: Any) -> InputError:
+        """Return an error of a value, by the code of its message."""
+        shown = value_field(self.values.get(key) if value is None else value)
+        return self.error(key, phrase(code, value=shown, **fields))
 
-    def text(self, section: str, key: str) -> str:
-        """Return a text; empty where the key is not there."""
-        value = self.value(section, key, "")
-        if not isinstance(value, str):
-            self.fail(section, key, f"{key} is no text: {shown(value)}")
+    def table(self, key: str) -> Table:
+        """Return a table within this one; an empty one if it is missing."""
+        value = self.values.get(key, {})
+        if not isinstance(value, dict):
+            raise self.value_error(key, "error.table")
+        return Table(value, f"{self.name}.{key}", self.source)
+
+    def only(self, keys: Collection[str]) -> None:
+        """Reject other keys."""
+        for key in self.values:
+            if key not in keys:
+                message = phrase("error.at", what=f"[{self.name}]", message=unknown_name("key", key, keys))
+                raise self.source.error(key, message, self.name)
+
+    def number(
+        self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """Return a finite number between two limits."""
+        number = self._number(key, self.value(key, default))
+        if not low <= number <= high:
+            code = "error.range" if math.isfinite(low) and math.isfinite(high) else "error.least"
+            code = "error.most" if math.isinf(low) else code
+            raise self.value_error(key, code, number, low=low, high=high)
+        return number
+
+    def says(self, today: str, report: str) -> bool:
+        """Return whether the table has a value in the units of today; else it may have it in the report's."""
+        if today in self and report in self:
+            raise self.error(today, phrase("error.exclusive", first=today, second=report))
+        return today in self
+
+    def positive(self, key: str, default: float | None = None) -> float:
+        """Return a finite number above zero."""
+        number = self.number(key, default)
+        if not number > 0:
+            raise self.value_error(key, "error.positive", number)
+        return number
+
+    def count(self, key: str, default: int | None = None, *, low: int = 0) -> int:
+        """Return an integer that is not below a limit."""
+        value = self.value(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value < 2**31:
+            raise self.value_error(key, "error.whole-range", value, low=low, high=2**31 - 1)
         return value
 
-    def texts(self, section: str, key: str) -> tuple[str, ...]:
-        """Return a list of texts."""
-        value = self.value(section, key)
-        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-            self.fail(section, key, f"{key} is a list of texts, not {shown(value)}")
-        return tuple(value)
-
-    def flag(self, section: str, key: str) -> bool:
+    def switch(self, key: str, default: bool | None = None) -> bool:
         """Return true or false."""
-        value = self.value(section, key)
-        if not isinstance(value, bool):
-            self.fail(section, key, f"{key} is true or false, not {shown(value)}")
+        return bool(self._of_kind(key, bool, "error.flag", default))
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a string."""
+        return str(self._of_kind(key, str, "toml.text", default))
+
+    def choice(self, key: str, words: Collection[str], default: str | None = None) -> str:
+        """Return one of some words."""
+        value = self.value(key, default)
+        if not isinstance(value, str) or value not in words:
+            raise self.value_error(key, "error.choice", value, names=list(words))
         return value
 
-    def count(self, section: str, key: str) -> int:
-        """Return a whole number of at least 1."""
-        value = self.value(section, key)
-        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
-            self.fail(section, key, f"{key} must be a whole number from 1 to {2**31 - 1}, got {shown(value)}")
+    def word(self, key: str, default: str | None = None) -> str:
+        """Return a name or a number of something, which may be written as an integer."""
+        return self._word(key, self.value(key, default))
+
+    def words(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
+        """Return names of things as `word` does."""
+        return tuple(self._word(key, value) for value in self.items(key, default))
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return a list of strings."""
+        values = self.items(key)
+        if not all(isinstance(value, str) for value in values):
+            raise self.value_error(key, "toml.texts")
+        return tuple(values)
+
+    def path(self, key: str) -> Path:
+        """Return the path of another file, relative to this one."""
+        name = self.text(key)
+        if not name or not name.isprintable():
+            raise self.value_error(key, "toml.file")
+        return self.file.parent / name
+
+    def numbers(
+        self, key: str, counts: int | Collection[int], default: Sequence[float] | None = None
+    ) -> list[float]:
+        """Return one of some counts of finite numbers; infinite ones mark fixed or free values.
+
+        A single number needs no brackets.
+        """
+        values = self.value(key, default)
+        allowed = [counts] if isinstance(counts, int) else list(counts)
+        values = [values] if 1 in allowed and isinstance(values, int | float) else self.items(key, default)
+        if len(values) not in allowed:
+            count = Phrase("toml.or", {"counts": allowed})
+            raise self.error(key, phrase("error.count", count=count, actual=len(values)))
+        return [
+            math.inf if isinstance(value, float) and value == math.inf else self._number(key, value)
+            for value in values
+        ]
+
+    def items(self, key: str, default: Collection[Any] | None = None) -> list[Any]:
+        """Return a list of anything."""
+        return list(self._of_kind(key, list | tuple, "error.list", default))
+
+    def rows(self, key: str, kinds: tuple[type[str] | type[float], ...]) -> list[list[Any]]:
+        """Return a list of lists of names (`str`) and numbers (`float`); empty if it is missing."""
+        rows = []
+        for row in self.items(key, []):
+            if not isinstance(row, list) or len(row) != len(kinds):
+                raise self.value_error(key, "toml.row", row, count=len(kinds))
+            rows.append(
+                [
+                    self._word(key, value) if kind is str else self._number(key, value)
+                    for kind, value in zip(kinds, row, strict=True)
+                ]
+            )
+        return rows
+
+    def value(self, key: str, default: Any = None) -> Any:
+        """Return a value of any kind."""
+        value = self.values.get(key, default)
+        if value is None:
+            raise self.source.error(key, phrase("toml.missing", table=self.name, key=key), self.name)
         return value
 
-    def numbers(self, section: str, key: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-        """Return a number, or some of them."""
-        value = self.value(section, key)
-        listed = value if isinstance(value, list) else [value]
-        good = all(isinstance(each, int | float) and not isinstance(each, bool) for each in listed)
-        if not good or len(listed) not in counts:
-            self.fail(section, key, f"{key} is {' or '.join(map(str, counts))} numbers, not {shown(value)}")
-        return tuple(float_of(each) for each in listed)
+    def _of_kind(self, key: str, kind: Any, code: str, default: Any) -> Any:
+        value = self.value(key, default)
+        if not isinstance(value, kind):
+            raise self.value_error(key, code, value)
+        return value
+
+    def _number(self, key: str, value: Any) -> float:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        number = float_of(value) if is_number else math.nan
+        if not math.isfinite(number):
+            raise self.value_error(key, "error.number", value)
+        return number
+
+    def _word(self, key: str, value: Any) -> str:
+        if isinstance(value, bool) or not isinstance(value, str | int):
+            raise self.value_error(key, "error.name", value)
+        return str(value)
+
+
+class KeyPlace:
+    """A table of a file, or a key of it, as the place of errors."""
+
+    def __init__(self, table: Table, key: str = "") -> None:
+        self.table, self.key = table, key
+
+    def error(self, message: str | Phrase, /) -> InputError:
+        """Return an error that names file, table and key."""
+        if self.key:
+            return self.table.error(self.key, message)
+        located = phrase("error.at", what=f"[{self.table.name}]", message=message)
+        return InputError(located, file=self.table.file)
+
+
+class Document:
+    """A TOML file of tables by name, one or several of each; a missing or surplus one is an InputError."""
+
+    def __init__(self, tables: Mapping[str, list[Table]], source: TomlFile) -> None:
+        self._tables, self.source = tables, source
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._tables
+
+    def table(self, name: str) -> Table:
+        """Return a table that must be there, once."""
+        tables = self.tables(name)
+        if len(tables) != 1:
+            raise self.source.error(name, phrase("error.repeated", kind="table", name=name))
+        return tables[0]
+
+    def optional(self, name: str) -> Table:
+        """Return a table, an empty one if it is missing."""
+        return self.table(name) if name in self._tables else Table({}, name, self.source)
+
+    def changed(self, values: Mapping[str, Mapping[str, Any]]) -> Document:
+        """Return the document with other values of keys, by table."""
+        tables = dict(self._tables)
+        for name, others in values.items():
+            if others:
+                tables[name] = [Table({**self.optional(name).values, **others}, name, self.source)]
+        return Document(tables, self.source)
+
+    def tables(self, name: str) -> list[Table]:
+        """Return all tables of a name."""
+        if name not in self._tables:
+            raise InputError(phrase("error.missing", name=f"[{name}]"), file=self.source.path)
+        return self._tables[name]
+
+
+def read_document(
+    path: Path, keys: Mapping[str, Collection[str] | None], replaced: Sequence[str] = ()
+) -> Document:
+    """Read a TOML file with the keys of each table; None: the reader of the table checks its keys."""
+    source = TomlFile(path, replaced)
+    tables: dict[str, list[Table]] = {}
+    for name, content in source.content.items():
+        if name not in keys:
+            raise source.error(name, unknown_name("table", name, keys))
+        single = isinstance(content, dict)
+        rows = [content] if single else content
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+            raise source.error(
+                name, phrase("error.at", what=name, message=phrase("error.table", value=value_field(content)))
+            )
+        tables[name] = [
+            Table(row, name if single else f"{name} {number}", source) for number, row in enumerate(rows, 1)
+        ]
+        for table in tables[name]:
+            if (known := keys[name]) is not None:
+                table.only(known)
+    return Document(tables, source)
 
 
 def _value(text: str) -> Any:
     """Return what a value is as TOML has it, or as a text."""
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
-    except ValueError:  # TOMLDecodeError, endless numbers, and a line that says more than one value
+    except ValueError:  # TOMLDecodeError, endless numbers, and a line with several values
         return text
     return value
 
 
 def float_of(value: float) -> float:
-    """Return a number as a float: infinite if a whole number is beyond double precision."""
+    """Return a number as a float: infinite if an integer is beyond double precision."""
     if isinstance(value, int) and abs(value) >= 2**1023:
         return math.inf if value > 0 else -math.inf
     return float(value)

@@ -1,23 +1,25 @@
 """YAML as OpenCV, ROS and Kalibr write it: mappings, sequences, flow lists, plain and quoted values, tags.
 
-Anchors, block text and several documents are refused by the line where they stand: a reader of few forms that
-says what it does not understand. Tags are read and left out: what `!!opencv-matrix` marks has its own keys.
+Anchors, block text and several documents are rejected with their lines. Tags such as `!!opencv-matrix` are
+ignored.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import number_or_text
 from photogram.io.places import Place
+from photogram.words import phrase
 
 DEEPEST = 50  # Brackets and indents within each other
 # Possessive: a run of blanks would be tried in all ways to divide it.
@@ -49,18 +51,18 @@ def read_yaml_text(path: Path) -> dict[str, Any]:
         if text.startswith("%YAML") or text.rstrip() in ("---", "..."):
             continue
         if "\t" in text[: len(text) - len(text.lstrip())]:
-            raise place.error("is indented by tabs")
+            raise place.error(phrase("yaml.tabs"))
         bare = text if '"' in text or "'" in text else _COMMENT.sub("", text)
         if bare.strip() and not bare.lstrip().startswith("#"):
             lines.append(_Line(place, bare))
     if not lines:
-        raise InputError("is empty", file=path)
+        raise InputError(phrase("error.empty-file", content="data"), file=path)
     reader = _Reader(lines)
     found = reader.block(lines[0].indent, 0)
     if reader.at < len(lines):
-        raise lines[reader.at].place.error("is indented unlike the lines before")
+        raise lines[reader.at].place.error(phrase("yaml.indent"))
     if not isinstance(found, dict):
-        raise InputError("is no mapping of keys to values", file=path)
+        raise InputError(phrase("yaml.mapping"), file=path)
     return found
 
 
@@ -71,7 +73,7 @@ class _Reader:
     def block(self, indent: int, depth: int) -> Any:
         """Return the mapping or sequence whose lines begin at an indent."""
         if depth > DEEPEST:
-            raise self.lines[self.at].place.error("is nested too deeply")
+            raise self.lines[self.at].place.error(phrase("error.nested"))
         if self.lines[self.at].text.startswith(("- ", "-\n")) or self.lines[self.at].text == "-":
             return self._sequence(indent, depth)
         found: dict[str, Any] = {}
@@ -79,10 +81,10 @@ class _Reader:
             line = self.lines[self.at]
             key = _KEY.match(line.text)
             if key is None:
-                raise line.place.error("is no `key: value`")
+                raise line.place.error(phrase("yaml.key"))
             name = _scalar_text(key[1].rstrip())
             if name in found:
-                raise line.place.error(f"the key {name} is there twice")
+                raise line.place.error(phrase("error.repeated", kind="key", name=name))
             found[name] = self._value(line.text[key.end() :], indent, depth)
         return found
 
@@ -107,7 +109,7 @@ class _Reader:
         line = self.lines[self.at]
         text = _TAG.sub("", text, count=1) if text.startswith("!") else text
         if text[:1] in ("&", "*", "|", ">", "@", "`"):
-            raise line.place.error(f"has a form of YAML that is not taken: {text[:1]}")
+            raise line.place.error(phrase("yaml.form", form=text[:1]))
         if text[:1] in ("[", "{"):
             return self._flow(text)
         self.at += 1
@@ -129,14 +131,14 @@ class _Reader:
         missing = _opened(tokens, 0, first)
         while missing > 0:
             if self.at == len(self.lines):
-                raise first.error("has a bracket that is not closed")
+                raise first.error(phrase("yaml.bracket"))
             more = _tokens(self.lines[self.at].text, self.lines[self.at].place)
             missing = _opened(more, missing, first)
             tokens += more
             self.at += 1
         value, end = _item(tokens, 0, first)
         if end < len(tokens):
-            raise first.error("goes on behind its last bracket")
+            raise first.error(phrase("yaml.bracket"))
         return value
 
 
@@ -149,7 +151,7 @@ def _tokens(text: str, place: Place) -> _Tokens:
     while at < end:
         match = _TOKEN.match(text, at)
         if match is None:
-            raise place.error("has a form of YAML that is not taken")
+            raise place.error(phrase("yaml.form", form=text[at:].strip()))
         mark, quoted, plain, colon = match.groups()
         found.append((mark or colon, mark or colon) if mark or colon else ("text", quoted or plain.strip()))
         at = match.end()
@@ -161,9 +163,9 @@ def _opened(tokens: _Tokens, depth: int, place: Place) -> int:
     for kind, _ in tokens:
         depth += (kind in "[{") - (kind in "]}")
         if depth < 0:
-            raise place.error("closes a bracket that was not opened")
+            raise place.error(phrase("yaml.bracket"))
         if depth > DEEPEST:
-            raise place.error("is nested too deeply")
+            raise place.error(phrase("error.nested"))
     return depth
 
 
@@ -172,7 +174,7 @@ def _item(tokens: _Tokens, at: int, place: Place) -> tuple[Any, int]:
     if kind == "text":
         return _scalar(text), at + 1
     if kind not in ("[", "{"):
-        raise place.error("has a list or mapping in brackets that is not well formed")
+        raise place.error(phrase("yaml.bracket"))
     close = "]" if kind == "[" else "}"
     items: list[Any] = []
     pairs: dict[str, Any] = {}
@@ -181,16 +183,16 @@ def _item(tokens: _Tokens, at: int, place: Place) -> tuple[Any, int]:
         value, at = _item(tokens, at, place)
         if close == "}":
             if at >= len(tokens) or tokens[at][0] != ":":
-                raise place.error(f"has no value for {value}")
+                raise place.error(phrase("yaml.value", key=str(value)))
             pairs[str(value)], at = _item(tokens, at + 1, place)
         else:
             items.append(value)
         if at < len(tokens) and tokens[at][0] == ",":
             at += 1
         elif at < len(tokens) and tokens[at][0] != close:
-            raise place.error("has a list or mapping in brackets that is not well formed")
+            raise place.error(phrase("yaml.bracket"))
     if at >= len(tokens):
-        raise place.error("has a list or mapping in brackets that is not well formed")
+        raise place.error(phrase("yaml.bracket"))
     return (items if close == "]" else pairs), at + 1
 
 
@@ -212,6 +214,34 @@ def _scalar(text: str) -> Any:
 def figures(values: ArrayLike) -> str:
     """Return a list of numbers with all their digits."""
     return "[" + ", ".join(repr(float(each)) for each in np.ravel(values)) + "]"
+
+
+def camera_info(
+    name: str,
+    size: tuple[int, int],
+    matrix: Floats,
+    lens: tuple[str, Sequence[float]],
+    turn: Floats | None = None,
+    projection: Floats | None = None,
+) -> bytes:
+    """Return a camera as ROS writes it (`sensor_msgs/CameraInfo`); turn and projection rectify it.
+
+    The lens is the distortion model with its coefficients.
+    """
+    escaped = name.replace("\\", "\\\\").replace('"', '\\"')
+    if projection is None:
+        projection = np.column_stack([matrix, np.zeros(3)])
+    lines = [
+        f"image_width: {size[0]}",
+        f"image_height: {size[1]}",
+        f'camera_name: "{escaped}"',
+        *matrix_lines("camera_matrix", matrix),
+        f"distortion_model: {lens[0]}",
+        *matrix_lines("distortion_coefficients", [lens[1]]),
+        *matrix_lines("rectification_matrix", np.eye(3) if turn is None else turn),
+        *matrix_lines("projection_matrix", projection),
+    ]
+    return "\n".join([*lines, ""]).encode()
 
 
 def matrix_lines(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +33,9 @@ from photogram.network.rigs import checked_mounts
 from photogram.network.tables import checked_cameras, different, numbered, photo_indices
 from photogram.words import Phrase, phrase
 
-Block = Any  # photogram.Block, which imports this file
+if TYPE_CHECKING:
+    from photogram import Block
+
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
 RULES: dict[str, Callable[[Floats], Bools]] = {
     "finite": np.isfinite,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,9 @@ from photogram.network.lens import Lens
 from photogram.network.trajectories import Clock, Polynomial, Readout, Table, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Block
 
 __all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
@@ -342,8 +345,8 @@ def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None
         seen.add(photo)
 
 
-def own_trajectories(block: Any) -> list[Trajectory]:
-    """Return the trajectory of each timed photo of a block: the given one, or uniform motion."""
+def own_trajectories(block: Block) -> list[Trajectory]:
+    """Return the trajectory of each timed photo: the given one, or uniform motion from its pose."""
     rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     return [
         _uniform(block, each, rows[each.photo]) if each.trajectory is None else each.trajectory
@@ -351,7 +354,7 @@ def own_trajectories(block: Any) -> list[Trajectory]:
     ]
 
 
-def _uniform(block: Any, own: Timed, row: int) -> Trajectory:
+def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
     """Return c_0 + (t - t_e) v and r_0 + (t - t_e) w about the pose of a photo."""
     if block.geographic:
         raise InputError(phrase("block.timed.geographic", photo=own.photo))

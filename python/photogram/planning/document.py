@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -13,20 +12,10 @@ from photogram.planning.pattern import Pattern
 from photogram.planning.plot import plan_sketch
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
-from photogram.show.page import (
-    Column,
-    Document,
-    Drawing,
-    Fact,
-    Judgement,
-    Layers,
-    Row,
-    Section,
-    significant,
-)
-from photogram.show.page import Table as Cells
+from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
 from photogram.statistics.reliability import TESTABLE, noncentrality
+from photogram.words import Phrase, phrase
 
 ALIKE = 1.05  # largest ratio of standard deviations of patterns that are called alike
 MIN_IMPROVEMENT = 1.1  # ratio of standard deviations from which a known readout time is recommended
@@ -55,7 +44,7 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
     return Document(
         what="Prediction of a network before it is flown",
         title=patterns[0].block.title,
-        judgements=[Judgement("Prediction", _comparison(patterns))],
+        judgements=[Judgement("Prediction", str(_comparison(patterns)))],
         advice=advice(patterns),
         highlights=_highlights(patterns),
         sections=[
@@ -90,7 +79,7 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
         "units": units,
         "noncentrality": noncentrality(),
         "unchecked_below": TESTABLE,
-        "next": advice(patterns),
+        "next": [str(sentence) for sentence in advice(patterns)],
         "patterns": [_pattern_members(pattern) for pattern in patterns],
     }
 
@@ -135,7 +124,6 @@ def points_table(pattern: Pattern) -> Table:
 
 
 def _present(table: Table) -> Table:
-    """Return the groups that have points."""
     count = next(column for column in table.columns if column.name == "points")
     return replace(table, columns=chosen(table.columns, np.flatnonzero(count.values)))
 
@@ -173,22 +161,26 @@ def _photos(pattern: Pattern) -> Table:
     return Table("", pattern.name, columns)
 
 
-def _motion(pattern: Pattern) -> Cells | None:
-    rows: list[Row] = []
+def _motion(pattern: Pattern) -> Table | None:
+    rows: list[tuple[str, float, float | None, float | None]] = []
     for quality in pattern.motion:
         factor, unit = MOTION_UNITS.get(quality.unit, (1.0, quality.unit))
-        rows.append([f"{quality.unknown}, {unit}", quality.rms_sd / factor, quality.max_sd / factor, None])
-    known = zip(pattern.axes, pattern.known_rms_sd or (), _improvements(pattern), strict=False)
-    for axis, sd, ratio in known:
+        rows.append((f"{quality.unknown}, {unit}", quality.rms_sd / factor, quality.max_sd / factor, None))
+    for axis, sd, ratio in zip(
+        pattern.axes, pattern.known_rms_sd or (), _improvements(pattern), strict=False
+    ):
         name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
-        rows.append([name, sd, None, ratio])
+        rows.append((name, sd, None, ratio))
+    if not rows:
+        return None
+    unknowns, rms, largest, ratios = zip(*rows, strict=True)
     columns = [
-        Column("Unknown", text=True),
-        Column("rms sd", figures=3),
-        Column("Largest sd", figures=3),
-        Column("Times better", decimals=2),
+        Quantity(unknowns, kind="name", head="Unknown"),
+        Quantity(rms, head="rms sd"),
+        Quantity(largest, head="Largest sd"),
+        Quantity(ratios, head="Times better", decimals=2),
     ]
-    return Cells(pattern.name, columns, rows) if rows else None
+    return Table("", pattern.name, columns)
 
 
 def _control(pattern: Pattern) -> Table:
@@ -214,29 +206,23 @@ def _layers(
     key: str,
     title: str,
     patterns: Sequence[Pattern],
-    table: Callable[[Pattern], Table | Cells | None],
+    table: Callable[[Pattern], Table | None],
     intro: str = "",
 ) -> Section:
-    """Return a section with the table of each pattern as a layer."""
     tables = [made for pattern in patterns if (made := table(pattern)) is not None]
-    return Section(key, title, [Layers(f"{key}-layers", tables)] if len(tables) > 1 else tables, intro)
+    return Section(key, title, layered_tables(key, tables), intro)
 
 
-def _comparison(patterns: Sequence[Pattern]) -> str:
-    """Return the sentence that names the better pattern, by the rms of new points in height."""
+def _comparison(patterns: Sequence[Pattern]) -> Phrase:
     if not all(pattern.new_points.any() for pattern in patterns):
-        return "There are no new points to be compared"
-    unit = patterns[0].block.linear_unit
+        return phrase("plan.compared.none")
     heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
     best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
-    if len(patterns) == 1:
-        return f"Heights of new points will have an rms of {significant(heights[best], 3)} {unit}"
+    figures = {"rms": significant(heights[best], 3), "unit": patterns[0].block.linear_unit}
     if heights[worst] <= ALIKE * heights[best]:
-        return f"The patterns are alike: heights with an rms of {significant(heights[best], 3)} {unit}"
-    return (
-        f"“{best}” gives heights {heights[worst] / heights[best]:.2f} times better than “{worst}”:"
-        f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}"
-    )
+        return phrase(f"plan.compared.{'alike' if len(patterns) > 1 else 'single'}", **figures)
+    figures |= {"best": best, "worst": worst, "other": significant(heights[worst], 3)}
+    return phrase("plan.compared.better", ratio=heights[worst] / heights[best], **figures)
 
 
 def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
@@ -252,83 +238,69 @@ def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
 
 
 def _comparison_section(patterns: Sequence[Pattern]) -> Section:
-    rows: list[Row] = []
-    if all(pattern.new_points.any() for pattern in patterns):
-        groups = [pattern.points[-1] for pattern in patterns]
-        for k, axis in enumerate(patterns[0].axes):
-            for kind, values in (
-                ("rms", [group.rms_sd[k] for group in groups]),
-                ("largest", [group.max_sd[k] for group in groups]),
-            ):
-                least, most = min(values), max(values)
-                best = patterns[values.index(least)].name if most > 1.005 * least else "no difference"
-                rows.append([f"{kind} {axis}", *values, best, most / least if least > 0 else math.nan])
+    if not all(pattern.new_points.any() for pattern in patterns):
+        return Section("comparison", "Side by side", [])
+    unit, axes = patterns[0].block.linear_unit, patterns[0].axes
+    groups = [pattern.points[-1] for pattern in patterns]
+    sd = (
+        np.array([[group.rms_sd, group.max_sd] for group in groups])
+        .transpose(0, 2, 1)
+        .reshape(len(groups), -1)
+    )
+    least, most = sd.min(axis=0), sd.max(axis=0)
+    names = [pattern.name for pattern in patterns]
+    differ = most > 1.005 * least
+    best = [names[k] if own else "no difference" for k, own in zip(sd.argmin(axis=0), differ, strict=True)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(least > 0, most / least, np.nan)
+    rows = [f"{kind} {axis}" for axis in axes for kind in ("rms", "largest")]
     columns = [
-        Column("Standard deviation", text=True),
-        *(Column(pattern.name, patterns[0].block.linear_unit, figures=3) for pattern in patterns),
-        Column("Best", text=True),
-        Column("Largest over smallest", decimals=2),
+        Quantity(rows, kind="name", head="Standard deviation"),
+        *(Quantity(own, head=f"{name} {unit}") for name, own in zip(names, sd, strict=True)),
+        Quantity(best, kind="name", head="Best"),
+        Quantity(ratios, head="Largest over smallest", decimals=2),
     ]
-    return Section("comparison", "Side by side", [Cells("All new points", columns, rows)] if rows else [])
+    return Section("comparison", "Side by side", [Table("", "All new points", columns)])
 
 
-def _size(patterns: Sequence[Pattern]) -> Cells:
+def _size(patterns: Sequence[Pattern]) -> Table:
     linear = patterns[0].block.linear_unit
-    columns = [
-        [
-            len(pattern.block.photo_ids),
-            int(pattern.new_points.sum()),
-            int((pattern.result.used_points & ~pattern.new_points).sum()),
-            len(pattern.result.dropped),
-            int(pattern.result.used_images.sum()),
-            significant(pattern.scale),
-            significant(pattern.unit, 3),
-        ]
-        for pattern in patterns
-    ]
     names = (
         *("Photos", "New points", "Control points", "Points left out", "Image points"),
         f"1 mm in the photo on the ground, {linear}",
         f"sd of image coordinates on the ground, {linear}",
     )
-    rows = [[name, *values] for name, *values in zip(names, *columns, strict=True)]
-    return Cells("How much", [Column("", text=True), *(Column(pattern.name) for pattern in patterns)], rows)
-
-
-def advice(patterns: Sequence[Pattern]) -> list[str]:
-    """Return what to do next: what would make the network check itself."""
-    sentences = []
+    columns = [Quantity(names, kind="name", head=" ")]
     for pattern in patterns:
+        result, new = pattern.result, pattern.new_points
+        counts = (
+            *(len(pattern.block.photo_ids), new.sum(), (result.used_points & ~new).sum()),
+            *(len(result.dropped), result.used_images.sum()),
+        )
+        sizes = significant(pattern.scale), significant(pattern.unit, 3)
+        columns.append(Quantity([*map(str, counts), *sizes], head=pattern.name))
+    return Table("", "How much", columns)
+
+
+def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
+    """Return the next steps that would make the network check itself."""
+    phrases = []
+    for pattern in patterns:
+        about = partial(phrase, pattern=pattern.name)
         unchecked = pattern.points[-1].unchecked
         if pattern.new_points.any() and unchecked > MAX_UNCHECKED:
-            sentences.append(
-                f"“{pattern.name}”: gross errors of {100 * unchecked:.0f} percent of the image coordinates"
-                " could not be detected. More rays for each point (more overlap) make them detectable."
-            )
-        weak = [
-            quality.component
-            for quality in pattern.control
-            if quality.held and quality.redundancy < MIN_REDUNDANCY
-        ]
+            phrases.append(about("plan.unchecked", percent=100 * unchecked))
+        weak = [each.component for each in pattern.control if each.held and each.redundancy < MIN_REDUNDANCY]
         if weak:
-            sentences.append(
-                f"“{pattern.name}”: the network hardly checks control in {', '.join(weak)}. More control"
-                " points, or check points, would reveal its errors."
-            )
+            phrases.append(about("plan.control", components=weak))
         readout = [quality for quality in pattern.motion if quality.unit == "s"]
         ratio = max(_improvements(pattern))
         if readout and ratio > MIN_IMPROVEMENT:
-            sentences.append(
-                f"“{pattern.name}”: the readout time has a standard deviation of"
-                f" {1e3 * readout[0].rms_sd:.2g} ms. Points would be up to {ratio:.1f} times better if it"
-                " were known: specify its value and standard deviation, or fly strips across, faster or at"
-                " another height."
-            )
-    return sentences
+            phrases.append(about("plan.readout", sd=1e3 * readout[0].rms_sd, ratio=ratio))
+    return phrases
 
 
 def _improvements(pattern: Pattern) -> list[float]:
-    """Return the ratios of standard deviations of new points without and with a known readout time."""
     known = pattern.known_rms_sd
     if known is None:
         return [1.0]

@@ -47,7 +47,6 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
 
 
 def _with_legend(panels: Sequence[Panel]) -> Panel:
-    """Return the last panel with a legend of the marks on all of them."""
     *_, last = panels
     known = {mark.label for mark in labelled(last)}
     every = {mark.label: mark for panel in panels for mark in labelled(panel) if isinstance(mark, Markers)}

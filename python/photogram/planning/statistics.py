@@ -53,8 +53,7 @@ def _axes(points: Floats) -> Floats:
     return np.asarray(frames[np.argmin(extents.prod(axis=1))])
 
 
-PLACES = 25
-"""Times at which a trajectory is looked at, evenly between its first image and its last."""
+PLACES = 25  # Evenly spaced times of a trajectory
 
 
 @dataclass(frozen=True)

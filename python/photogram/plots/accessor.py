@@ -31,7 +31,6 @@ PLOTS: dict[str, Callable[[Any], Plot]] = {
     "features": features,
     "films": films,
 }
-"""The plots of a report by name, in the order in which a reader looks at them."""
 
 
 class _Method(Generic[P]):

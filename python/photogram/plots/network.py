@@ -11,7 +11,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
 from photogram.show.pictures import round_length
-from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import (
     NOWHERE,
@@ -24,6 +23,8 @@ from photogram.show.sketch.marks import (
     Polygons,
     Shades,
     ellipse_axes,
+    hexadecimal,
+    rgb,
 )
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
@@ -136,7 +137,6 @@ def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = No
 
 
 def _size(limits: Floats) -> tuple[float, float]:
-    """Return width and height of a figure in inches, with room for legend, scales and remarks."""
     width, height = limits[1] - limits[0]
     longer = 6.5
     across = longer * min(1.0, width / height)
@@ -305,7 +305,6 @@ def _usual(differences: Floats) -> float:
 
 
 def _names(plan: Plan, seen: tuple[int, int, int], ends: Floats) -> list[Mark]:
-    """Name control and check points, and photos, where these are few."""
     held = np.flatnonzero((plan.kinds != "pass") & np.isfinite(plan.points).all(axis=1))
     held = held if len(held) <= MAX_NAMES else held[:0]
     photos = np.arange(len(plan.photos) if len(plan.photos) <= MAX_NAMES else 0)

@@ -90,7 +90,6 @@ def _shaded(places: Floats, values: Floats, size: float) -> Mark:
 
 
 def _mesh(grid: Cells, values: Floats, what: str) -> tuple[Mark, str]:
-    """Return the means of cells, and what they are."""
     means = grid.means(values).reshape(grid.rows, grid.columns)
     counts = grid.counts[grid.counts > 0]
     said = f"means of cells with {counts.min():,} to {counts.max():,} {what}"

@@ -70,7 +70,6 @@ def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
 
 
 def _field(images: Images, camera: int, left_out: str) -> Panel | None:
-    """Return the residuals of a camera, and what was left out."""
     own = images.cameras == camera
     xy, vectors = images.xy[own], images.residuals[own]
     factor, unit = images.shown_as
@@ -110,7 +109,6 @@ def _field(images: Images, camera: int, left_out: str) -> Panel | None:
 
 
 def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, list[str], list[str]]:
-    """Return places, mean vectors and colours of the cells of a frame, and what they are."""
     from photogram.statistics.distributions import critical_chi_square
 
     means = np.column_stack([grid.means(vectors[:, axis]) for axis in (0, 1)])

@@ -140,7 +140,6 @@ def _rows(n: int) -> Any:
 
 
 def _worst(groups: Sequence[Tested], outlying: list[Bools]) -> list[tuple[float, str]]:
-    """Return the values of outliers and their names, the largest first."""
     found = []
     for each, own in zip(groups, outlying, strict=True):
         sizes = np.where(own, np.nan_to_num(np.abs(each.values)), 0.0)

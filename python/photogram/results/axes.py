@@ -12,8 +12,7 @@ from photogram.network.block import Block
 from photogram.results.observation_kinds import ObservedKind
 from photogram.show.quantity import Axis, Quantity
 
-TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))
-"""Of attitudes."""
+TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))  # Of attitudes
 
 
 def point_axes(block: Block) -> tuple[Axis, ...]:

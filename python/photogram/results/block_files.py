@@ -39,6 +39,7 @@ from photogram.results.result_files import (
     written,
 )
 from photogram.results.tables import TABLES
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -56,7 +57,6 @@ _TABLES = {
     "features": "feature",
     "feature_deviations": "deviation",
 }
-"""Tables for people, and the kind that each is in `results.tables`."""
 
 
 def block_files(result: Result) -> dict[str, Content]:
@@ -187,13 +187,7 @@ class KeptTrajectory(Stand):
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 
     def original(self) -> Trajectory:
-        """Return the trajectory.
-
-        Raises
-        ------
-        InputError
-            Others than its coefficients.
-        """
+        """Return the trajectory; the coefficients in the file must be those of its table and bases."""
         own_parts = (self.table, self.position, self.rotation, self.body)
         made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (
@@ -201,7 +195,7 @@ class KeptTrajectory(Stand):
             for both in (made.coefficients, self.coefficients)
         )
         if own != kept:
-            raise InputError(f"the trajectory {self.name} has not the coefficients that stand with it")
+            raise InputError(phrase("adjusted.coefficients", name=self.name))
         object.__setattr__(made, "coefficients", self.coefficients)
         return made
 
@@ -209,4 +203,3 @@ class KeptTrajectory(Stand):
 CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
 """Classes that a document of a block with trajectories may name."""
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
-"""What is written in the place of others."""

@@ -30,16 +30,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
-LEVEL = 0.05
-"""Probability that a term that is not there is called significant."""
-CORRELATED = 0.95
-"""Larger correlations are named."""
-ASKED = 20
-"""Cameras whose correlations with the poses of photos are computed."""
-INSEPARABLE = 0.9999
-"""R^2 above this: nothing tells the parameter from the others."""
-FROM_PRIOR = 0.05
-"""A weight whose redundancy number is below this determines the parameter, not the images."""
+LEVEL = 0.05  # Significance level of terms
+CORRELATED = 0.95  # The report lists larger correlations
+ASKED = 20  # Largest number of cameras with correlations to the poses of photos
+INSEPARABLE = 0.9999  # Largest R^2 of a parameter that is separable from the others
+FROM_PRIOR = 0.05  # With a lower redundancy number the weight determines the parameter, not the images
 FAR = 5.0
 """A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
 
@@ -152,7 +147,7 @@ class Calibration:
     terms
         Terms as they are kept or left out together, tested at 1 percent, with what they do to images.
     removable
-        The term that may be left out: the least significant one that stands alone; None where all are needed.
+        The term that may be left out: the least significant one that stands alone; None if all are needed.
         Never several at once: without one of them the others have other tests.
     """
 
@@ -191,7 +186,6 @@ class Calibration:
         return said
 
     def _worth(self) -> list[str]:
-        """Say which terms are worth keeping."""
         kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
         others = [
             f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"

@@ -13,6 +13,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -22,37 +23,18 @@ __all__ = ["AdjustedCamera", "adjusted_cameras", "units"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustedCamera(Brief):
-    """A camera after the adjustment, with k parameters. Arrays cannot be written.
-
-    Attributes
-    ----------
-    name
-        What the block calls it.
-    given
-        The camera as it was given: initial values, observed where weighted.
-    camera
-        The same with the adjusted parameters.
-    cofactors
-        (k, k) for a priori unit weight; zero for held parameters, NaN without covariances.
-    covariance
-        (k, k) cofactors times the variance of unit weight.
-    redundancy
-        (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted.
-    information
-        (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
-        have if all other unknowns were known; 0 for held ones.
-    photos, images
-        How many photos have it, and how many images on these took part.
-    """
+    """A camera after the adjustment, with k parameters. Arrays cannot be written."""
 
     name: str
-    given: Camera
-    camera: Camera
-    cofactors: Floats
-    covariance: Floats
-    redundancy: Floats
+    given: Camera  # initial values, observed if weighted
+    camera: Camera  # with the adjusted parameters
+    cofactors: Floats  # (k, k) for a priori unit weight; zero for held parameters, NaN without covariances
+    covariance: Floats  # (k, k) cofactors times the variance of unit weight
+    redundancy: Floats  # (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted
+    # (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
+    # have if all other unknowns were known; 0 for held ones
     information: Floats
-    photos: int
+    photos: int  # number of its photos, and of their images in the adjustment
     images: int
 
     def __post_init__(self) -> None:
@@ -100,9 +82,7 @@ class AdjustedCamera(Brief):
             Its knots were estimated, too: their covariance has no place in a camera.
         """
         if self.given.knot_unknowns:
-            raise InputError(
-                f"the knots of {self.name} were estimated: they are no observations of another block"
-            )
+            raise InputError(phrase("adjusted.knots", camera=self.name))
         rows = self.estimated
         names = [self.names[k] for k in rows]
         covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from photogram.show.quantity import Axis
     from photogram.statistics.findings import Agreement
 
-MOST = 1000
-"""Check points that are tested together: of more every second, third ..."""
+MOST = 1000  # Check points of the joint test; of more points every second, third ... is used
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.components_table import components_table, statement
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Documented, Judged
 from photogram.show.quantity import members, records
@@ -58,7 +57,7 @@ class VarianceComponents(Judged, Documented, Brief):
 
     def plot(self) -> Plot:
         """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
-        from photogram.results.components_picture import components_sketch
+        from photogram.results.components_document import components_sketch
 
         return components_sketch(self.components)
 
@@ -71,6 +70,8 @@ class VarianceComponents(Judged, Documented, Brief):
 
     def table(self) -> pd.DataFrame:
         """Return the components as a data frame."""
+        from photogram.results.components_document import components_table
+
         return components_table(self).frame()
 
     def _findings(self) -> Findings:
@@ -90,13 +91,13 @@ class VarianceComponents(Judged, Documented, Brief):
             if not each.held
         ]
         given = self.first._findings()
-        first = statement(self)[0]
-        told = [f"{first[:1].upper()}{first[1:]}."]
+        from photogram.results.components_document import statement
+
         return replace(
             self.result._findings(),
             global_test=given.global_test,
             components=estimated,
-            if_usable=told,
+            if_usable=statement(self)[:1],
             if_withheld=(),
         )
 
@@ -108,6 +109,8 @@ class VarianceComponents(Judged, Documented, Brief):
 
     def to_json(self) -> bytes:
         """Return the components as a JSON document (UTF-8)."""
+        from photogram.results.components_document import components_table
+
         estimate, equality = self.estimate, self.estimate.equality
         of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
         of_step = ("factors", "squares", "redundancy")

@@ -23,14 +23,10 @@ POSES = (
     " of their images."
 )
 
-STEPS = 8
-"""Places in each interval of knots, or in each of as many parts as a polynomial has coefficients."""
-COEFFICIENTS = 24
-"""Up to which all are listed with the other common unknowns."""
-NOTABLE = 3.0
-"""Test values of coefficients above are listed where they are more."""
-LISTED = 20
-"""Coefficients and trajectories that are listed at most, where they are more."""
+STEPS = 8  # Places in each interval of knots, or for each coefficient of a polynomial
+COEFFICIENTS = 24  # Number up to which all coefficients are listed
+NOTABLE = 3.0  # Test value from which coefficients of longer lists are listed
+LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +120,7 @@ def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
     ]
 
 
-_MANY = (Coefficient, Knot)
-"""Types of which a block may have thousands."""
+_MANY = (Coefficient, Knot)  # Types with thousands of unknowns
 
 
 def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:

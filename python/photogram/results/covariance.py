@@ -20,13 +20,10 @@ __all__ = ["Covariances", "Failure", "Propagated"]
 T = TypeVar("T")
 Failure = _photocore.BlockError | _photocore.CollectionError
 
-STEP = 0.01
-"""Of differences, in standard deviations."""
-TOGETHER = 32
-"""Things whose joint covariance is computed for its diagonal."""
+STEP = 0.01  # Step of differences, in standard deviations
+TOGETHER = 32  # Size of groups with a joint covariance
 COMPLEX_STEP = 1e-30
-SPREAD = 0.1
-"""Of second differences, in standard deviations along the axes of the ellipsoid."""
+SPREAD = 0.1  # Step of second differences, in standard deviations along the axes of the ellipsoid
 
 
 @dataclass(frozen=True, eq=False)

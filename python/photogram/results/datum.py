@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 __all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
 
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
-TURNS = (*ANGLES, "rotation ")
-"""What names of unknowns begin with that are no coordinates."""
-NOTABLE_LOSS = 1e-9
-"""A larger part of a variance that is rounding is told."""
+TURNS = (*ANGLES, "rotation ")  # First words of names of rotations
+NOTABLE_LOSS = 1e-9  # Largest part of a variance by rounding without a message
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
-from photogram.results.result import Result, adjusted
+from photogram.results.result import Result
+from photogram.results.selection import adjusted
+from photogram.words import phrase
 
 __all__ = ["Differences", "Largest", "differences"]
 
@@ -88,7 +90,7 @@ def differences(first: Result, second: Result) -> Differences:
     """
     for each in (first, second):
         if not isinstance(each, Result):
-            raise InputError(f"results of blocks are compared, not what is of the type {type(each).__name__}")
+            raise InputError(phrase("adjusted.not-a-block", value=type(each).__name__))
     one, two = adjusted(first).things, adjusted(second).things
     values, deviations = Largest(), Largest()
     alone: dict[str, list[str]] = {}
@@ -124,7 +126,7 @@ def differences(first: Result, second: Result) -> Differences:
             values = _larger(values, steps / sd, kind, shared)
             deviations = _larger(deviations, np.where(other_sd == sd, 0.0, other_sd / sd - 1), kind, shared)
     if not compared:
-        raise InputError("the two results have nothing in common, by the names of photos and points")
+        raise InputError(phrase("adjusted.nothing-common"))
     variances = first.variance_of_unit_weight, second.variance_of_unit_weight
     ratio = None if not variances[0] or variances[1] is None else variances[1] / variances[0]
     return Differences(values, deviations, ratio, alone, compared)
@@ -140,7 +142,6 @@ def _picked(
 
 
 def _larger(before: Largest, sizes: Floats, kind: str, keys: Sequence[tuple[str, str]]) -> Largest:
-    """Return the largest of some sizes, where it is larger than that of other kinds."""
     found = np.where(np.isfinite(sizes), np.abs(sizes), 0.0)
     if not len(found) or not found.max() > before.size:
         return before

@@ -50,15 +50,11 @@ DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
 """Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
 
-RADIAL = re.compile(r"[KkA]\d|k")
-"""Names of radial terms."""
+RADIAL = re.compile(r"[KkA]\d|k")  # Radial terms
 
-BALANCED_AT = 2.0 / 3.0
-"""r0, of the largest observed radius."""
-BEYOND = 1.25
-"""How far the curve goes on, of the largest observed radius."""
-ROWS = 51
-"""Radii of a curve."""
+BALANCED_AT = 2.0 / 3.0  # r0 as a part of the largest observed radius
+BEYOND = 1.25  # End of a curve as a multiple of the largest observed radius
+ROWS = 51  # Radii of a curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,16 +173,9 @@ def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> 
 
 
 def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them.
+    """Return the (r,) curve of the radial terms alone, and its partials by these terms.
 
-    Parameters
-    ----------
-    camera, sd
-        With its parameters, and (k,) their standard deviations.
-    terms
-        Which of them are radial.
-    radii
-        (r,) in the unit of image coordinates.
+    `sd` are the (k,) standard deviations of all parameters, `terms` the indices of the radial ones.
     """
     own = radial_part(camera)
     bare = own.parameters
@@ -245,8 +234,7 @@ def _is_fisheye(camera: Camera) -> bool:
     return "fisheye" in camera.model.lower()
 
 
-GRID = 9
-"""Positions along either side of the observed part of the image."""
+GRID = 9  # Positions along either side of the observed part of the image
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,7 +79,6 @@ def block_document(result: Result) -> Document:
 
 
 def _accuracy(result: Result) -> list[Fact]:
-    """Return what check points say, and standard deviations of points."""
     axes, found = point_axes(result.block), list[Fact]()
     factors = np.array([axis.factor for axis in axes])
     check = result.used_points & (result.point_kinds == "check")
@@ -116,7 +115,6 @@ def _size_section(result: Result) -> Section:
 
 
 def _sums(result: Result) -> list[Fact]:
-    """Return the weighted sums of squares by group."""
     sums = result.sums_of_squares
     groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}

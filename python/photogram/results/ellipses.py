@@ -16,11 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["CONFIDENCE", "Ellipses", "ellipses", "fitting_scale", "metric_covariances"]
 
-CONFIDENCE = 0.95
-"""That an ellipse has unless another is asked for."""
+CONFIDENCE = 0.95  # Default probability of an ellipse
 VERTICES = 36
-SHARE = 0.3
-"""Of the distance between neighbours that a typical ellipse takes up when it is drawn."""
+SHARE = 0.3  # Size of a typical drawn ellipse as a part of the distance between neighbours
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest, unknown_name
+from photogram.messages import unknown_name
+from photogram.show import quantity
+from photogram.show.quantity import Axis
 from photogram.statistics.distributions import LEVEL
 from photogram.words import phrase
 
@@ -20,6 +25,9 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_points"]
 
 T = TypeVar("T", "Quantity", "Feature")
+_UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
+_EXPANDED = "expanded uncertainty, k times the standard deviation"
+MAX_SEARCHED_NAMES = 10_000
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
 Definition = tuple[str, str | Sequence[str]]
@@ -28,27 +36,17 @@ Definition = tuple[str, str | Sequence[str]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a feature.
+    """A quantity of a feature."""
 
-    Attributes
-    ----------
-    name
-        `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
-        `sphericity`, `cylindricity`.
-    value, sd
-        The value with its standard deviation; components of axes and normals are plain numbers, all others
-        are lengths.
-    expanded
-        U = k sd.
-    unit
-        The linear unit of the block; empty for plain numbers.
-    """
-
+    # `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
+    # `sphericity`, `cylindricity`
     name: str
+    # The value with its standard deviation; components of axes and normals are plain numbers, all others are
+    # lengths
     value: float
     sd: float
-    expanded: float
-    unit: str
+    expanded: float  # U = k sd
+    unit: str  # The linear unit of the block; empty for plain numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +85,11 @@ class Feature:
 
     def __getitem__(self, name: str) -> Quantity:
         """Return a quantity by its name."""
-        return _named(self.quantities, name, f"the {self.kind} {self.name} has no quantity")
+        return _named(self.quantities, name, "quantity")
 
     @property
     def form(self) -> str:
-        """What the test says of the deviations, in words; empty where there is none."""
+        """What the test says of the deviations, in words; empty if there is none."""
         if self.probability is None:
             return ""
         if self.probability < LEVEL:
@@ -126,7 +124,7 @@ class Features:
 
     def __getitem__(self, name: str) -> Feature:
         """Return a feature by its name."""
-        return _named(self.features, name, "there is no feature")
+        return _named(self.features, name, "feature")
 
     def __iter__(self) -> Iterator[Feature]:
         """Go through the features."""
@@ -143,33 +141,11 @@ class Features:
 
     def columns(self) -> dict[str, Any]:
         """Return a row for each quantity, as named columns."""
-        rows = [
-            (
-                each.name,
-                each.kind,
-                len(each.points),
-                *(own.name, own.unit, own.value, own.sd),
-                self.k,
-                own.expanded,
-            )
-            for each in self
-            for own in each.quantities
-        ]
-        names = ("feature", "kind", "points", "quantity", "unit", "value", "sd", "k", "expanded")
-        return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+        return quantity.frame(quantity_columns(self))
 
     def deviation_columns(self) -> dict[str, Any]:
         """Return a row for each deviation of a point, as named columns."""
-        rows = [
-            (each.name, point, across, each.quantities[0].unit, *numbers)
-            for each in self
-            for d, across in enumerate(directions(each.kind))
-            for point, *numbers in zip(
-                each.points, each.deviations[:, d].tolist(), each.deviation_sd[:, d].tolist(), strict=False
-            )
-        ]
-        names = ("feature", "point", "direction", "unit", "deviation", "sd")
-        return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+        return quantity.frame(deviation_quantities(self))
 
     def table(self) -> pd.DataFrame:
         """Return the quantities as a data frame: value, standard deviation, k and U = k sd of each."""
@@ -184,13 +160,67 @@ class Features:
         return pd.DataFrame(self.deviation_columns())
 
 
+def quantity_columns(features: Features) -> list[quantity.Quantity]:
+    """Return a row for each quantity."""
+    every = [(each, own) for each in features for own in each.quantities]
+    axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
+    text, number = (partial(quantity.Quantity, kind=kind) for kind in ("name", "number"))
+    value: Any = partial(quantity.Quantity, axes=axes, kind="value", of=of)
+    expanded = [own.expanded for _, own in every]
+    return [
+        text([each.name for each, _ in every], name="feature", about="name of the feature", head="Feature"),
+        text([each.kind for each, _ in every], name="kind", about="what it is"),
+        number([len(each.points) for each, _ in every], name="points", about="number of points"),
+        text([own.name for _, own in every], name="quantity", about="what is said of it", head="Quantity"),
+        text([own.unit for _, own in every], name="unit", about=_UNIT, head="Unit"),
+        value(np.array([own.value for _, own in every]), name="value", about="adjusted", head="Value"),
+        value(np.array([own.sd for _, own in every]), name="sd", about="standard deviation", head="sd"),
+        number([features.k] * len(every), name="k", about="coverage factor"),
+        value(np.array(expanded), name="expanded", about=_EXPANDED, head="U = k sd"),
+    ]
+
+
+def unit_deviations(features: Features) -> Floats:
+    """(1, q) the smallest standard deviation among the quantities of a feature with the same unit."""
+    smallest = [
+        min((one.sd for one in each.quantities if one.unit == own.unit and one.sd > 0), default=math.nan)
+        for each in features
+        for own in each.quantities
+    ]
+    return np.array([smallest])
+
+
+def deviation_quantities(features: Features) -> list[quantity.Quantity]:
+    """Return a row for each deviation of a point."""
+    rows = [
+        (each.name, point, across, each.quantities[0].unit, *numbers)
+        for each in features
+        for d, across in enumerate(directions(each.kind))
+        for point, *numbers in zip(
+            each.points, each.deviations[:, d].tolist(), each.deviation_sd[:, d].tolist(), strict=False
+        )
+    ]
+    columns: list[tuple[str, Any, str]] = [
+        ("feature", "name", "name of the feature"),
+        ("point", "name", "name of the point"),
+        ("direction", "name", "of the deviation"),
+        ("unit", "name", _UNIT),
+        ("deviation", "value", "distance of the point from the feature"),
+        ("sd", "value", "standard deviation"),
+    ]
+    return [
+        quantity.Quantity([row[k] for row in rows], kind=kind, name=name, about=about)
+        for k, (name, kind, about) in enumerate(columns)
+    ]
+
+
 def directions(kind: str) -> tuple[str, ...]:
     """Return in which directions points deviate from a feature."""
     return {"circle": ("outward", "axial"), "plane": ("axial",)}.get(kind, ("outward",))
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order in which they are asked for."""
+    """Return points by names and patterns, each once, in the order of the request."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:
@@ -198,15 +228,15 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
             continue
         matching = [name for name in names if fnmatchcase(name, each)]
         if not matching:
-            if {*"*?["} & {*each} or len(names) > 10_000:
-                raise InputError(phrase("error.absent", kind="point", name=each))
-            raise InputError(unknown_name("point", each, names))
+            searched = len(names) < MAX_SEARCHED_NAMES and not {*"*?["} & {*each}
+            absent = phrase("error.absent", kind="point", name=each)
+            raise InputError(unknown_name("point", each, names) if searched else absent)
         found |= dict.fromkeys(matching, True)
     return list(found)
 
 
-def _named(all_: Sequence[T], name: str, lacking: str) -> T:
+def _named(all_: Sequence[T], name: str, kind: str) -> T:
     for each in all_:
         if each.name == name:
             return each
-    raise KeyError(f"{lacking} {name!r}{nearest(name, [each.name for each in all_])}")
+    raise KeyError(str(unknown_name(kind, name, [each.name for each in all_])))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.results.features import Feature, Features, Quantity, directions
-from photogram.show.page import Cell, Column, Drawing, Part, Row, Section, Table, Text, decimals_of, fixed
-from photogram.show.quantity import members
+from photogram.results.features import Feature, Features, directions, quantity_columns, unit_deviations
+from photogram.show.page import Drawing, Part, Section, Text
+from photogram.show.quantity import Quantity, Table, members, of_each
 from photogram.words import Phrase
 
 
@@ -16,33 +16,21 @@ def features_section(features: Features | None, picture: Drawing | None = None) 
     """Return features with their quantities, and whether their form is more than errors."""
     if not features:
         return Section("features", "Features", [])
-    quantities: list[Row] = []
-    for each in features:
-        for k, own in enumerate(each.quantities):
-            numbers = zip(written(each, own), (own.value, own.sd, own.expanded), strict=True)
-            cells = [Cell(text, sorts=number) for text, number in numbers]
-            quantities.append([each.name if k == 0 else "", own.name, *cells, own.unit])
-    columns = [
-        *(Column(head, text=True) for head in ("Feature", "Quantity")),
-        *(Column(head) for head in ("Value", "sd", "U = k sd")),
-        Column("Unit", text=True),
-    ]
     note = f"Coverage factor k = {expansion(features)}."
-    parts: list[Part] = [Table("Quantities of features", columns, quantities, note)]
+    columns = quantity_columns(features)
+    title = "Quantities of features"
+    parts: list[Part] = [Table("features", title, columns, note, deviations=unit_deviations(features))]
     if tested := [each for each in features if each.statistic is not None]:
-        forms = Table.of(
-            "Whether form is more than errors of points",
-            tested,
-            [
-                (Column("Feature", text=True), lambda each: each.name),
-                (Column("What", text=True), lambda each: str(through(each))),
-                (Column("T", figures=4), lambda each: each.statistic),
-                (Column("of", decimals=0), lambda each: each.freedom),
-                (Column("p", figures=2), lambda each: each.probability),
-                (Column("Form", text=True), lambda each: each.form),
-            ],
-        )
-        parts += [forms, *([] if picture is None else [picture])]
+        forms = [
+            of_each(tested, "name", kind="name", head="Feature"),
+            Quantity([str(through(each)) for each in tested], kind="name", head="What"),
+            of_each(tested, "statistic", head="T", figures=4),
+            of_each(tested, "freedom", head="of", decimals=0),
+            of_each(tested, "probability", kind="probability", head="p"),
+            of_each(tested, "form", kind="name", head="Form"),
+        ]
+        parts.append(Table("forms", "Whether form is more than errors of points", forms))
+        parts += [] if picture is None else [picture]
     parts += [Text(each) for each in features.remarks]
     intro = (
         "Least-squares features through adjusted points, with what follows from the joint covariance of the"
@@ -68,16 +56,6 @@ def through(feature: Feature) -> Phrase:
         return Phrase("feature.distance", {"first": first, "last": last})
     form = Phrase(f"feature.{feature.kind}")
     return Phrase("feature.through", {"feature": form, "count": len(points), "points": points})
-
-
-def written(feature: Feature, quantity: Quantity) -> list[str]:
-    """Return value, standard deviation and U as they are written: two figures of the standard deviation.
-
-    Quantities of one unit have the same decimals, those that the smallest standard deviation takes.
-    """
-    alike = [each.sd for each in feature.quantities if each.unit == quantity.unit and each.sd > 0]
-    decimals = decimals_of(np.array([min(alike, default=np.nan)]))
-    return [fixed(each, decimals) for each in (quantity.value, quantity.sd, quantity.expanded)]
 
 
 def features_document(features: Features) -> dict[str, Any]:

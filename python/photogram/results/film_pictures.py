@@ -19,8 +19,7 @@ from photogram.results.suspects import observations_of_core
 if TYPE_CHECKING:
     from photogram import Result
 
-STEPS = 9
-"""Places of a pattern along a side of the format."""
+STEPS = 9  # Places of a pattern along a side of the format
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,10 +31,8 @@ HARMFUL = {
 """Reasons of the core for leaving out a point that would distort the others, and messages on its images."""
 
 
-DISTANCES = frozenset({"c", "f", "fx", "fy"})
-"""What principal distances are called."""
-UNKNOWN = 1 / 3
-"""A principal distance whose standard deviation is a larger part of it might be any."""
+DISTANCES = frozenset({"c", "f", "fx", "fy"})  # Names of principal distances
+UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, as a part of it
 
 
 def network_findings(

@@ -10,9 +10,9 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import value_field
 from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message
+from photogram.messages import Message, unknown_name
 from photogram.results.covariance import Covariances
 from photogram.results.features import (
     KINDS,
@@ -25,6 +25,7 @@ from photogram.results.features import (
 )
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_student, log_chi_square, log_fisher
+from photogram.words import phrase
 
 __all__ = ["features", "with_features"]
 
@@ -69,15 +70,26 @@ def with_features(result: Result, definitions: Mapping[str, Definition]) -> Resu
     try:
         fitted, empty = _fitting(result, 2.0, None)
     except (InputError, AdjustmentError) as error:
-        return replace(result, messages=[*result.messages, Message(f"no features: {error}")])
+        return replace(
+            result,
+            messages=[*result.messages, Message(phrase("fit.none", reason=error.phrase or str(error)))],
+        )
     found, messages = [], []
     for name, each in definitions.items():
         try:
             found.append(fitted(name, each))
         except InputError as error:
-            messages.append(Message(error.message))
+            messages.append(Message(error.phrase or error.message))
         except AdjustmentError as error:
-            messages.append(Message(f"feature {name}: {error}"))
+            messages.append(
+                Message(
+                    phrase(
+                        "error.at",
+                        what=phrase("fit.named", name=name),
+                        message=error.phrase or str(error),
+                    )
+                )
+            )
     told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
     return replace(result, messages=told, features=replace(empty, features=tuple(found)))
 
@@ -87,20 +99,21 @@ def _fitting(
 ) -> tuple[Callable[[str, Definition], Feature], Features]:
     """Return what fits a feature, and all that features have in common."""
     if result.geographic:
-        raise InputError("features have rectangular coordinates: these are longitudes and latitudes")
+        raise InputError(phrase("fit.geographic"))
     freedom = result.freedom_of_scale
     if coverage is not None:
         if not 0 < coverage < 1:
-            raise InputError(f"coverage is a probability between 0 and 1, not {coverage}")
+            raise InputError(
+                phrase(
+                    "error.at", what="coverage", message=phrase("error.range", value=coverage, low=0, high=1)
+                )
+            )
         k = critical_student(1.0 - coverage, freedom)
     if not 0 < k < math.inf:
-        raise InputError(f"k is a positive number, not {k}")
+        raise InputError(phrase("error.at", what="k", message=phrase("error.positive", value=k)))
     remarks: tuple[str, ...] = ()
     if result.datum.has_chosen_scale:
-        remarks = (
-            "nothing gives the network a scale: lengths of features, and their standard deviations, are only"
-            " those of its datum (a distance gives a scale)",
-        )
+        remarks = (str(phrase("fit.scale")),)
     covariances = result.covariances()
     return (
         lambda name, definition: _fitted(result, covariances, name, definition, k, freedom),
@@ -113,24 +126,30 @@ def _fitted(
 ) -> Feature:
     try:
         if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
-            raise InputError(f"{shown(definition)} is no kind with points: ('circle', ['hole-*'])")
+            raise InputError(phrase("fit.definition", value=value_field(definition)))
         kind, wanted = definition
         if kind not in KINDS:
-            raise InputError(f"{kind!r} is none of {', '.join(KINDS)}")
+            raise InputError(unknown_name("kind of feature", str(kind), KINDS))
         block = result.block
         points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
         if kind == "distance" and len(points) != 2:
-            raise InputError(f"a distance takes 2 points, not {len(points)}")
+            raise InputError(phrase("fit.two-points", count=len(points)))
         places = {point: row for row, point in enumerate(block.point_ids)}
         rows = np.array([places[point] for point in points], dtype=np.int64)
         for point, used in zip(points, result.used_points[rows].tolist(), strict=True):
             if not used:
-                raise InputError(f"the point {point} did not take part in the adjustment")
+                raise InputError(phrase("adjusted.unused-point", point=point))
         names, values, covariance, deviations, test = _photocore.measured_feature(
             kind, result.point_positions[rows], covariances.covariance(("point", points))
         )
     except InputError as error:
-        raise InputError(f"feature {name}: {error.message or error}") from None
+        raise InputError(
+            phrase(
+                "error.at",
+                what=phrase("fit.named", name=name),
+                message=error.phrase or error.message or str(error),
+            )
+        ) from None
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     quantities = tuple(
         Quantity(own, value, deviation, k * deviation, block.linear_unit if is_length else "")

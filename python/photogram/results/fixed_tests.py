@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.motion import focal_images
@@ -29,14 +29,9 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-HELD = Phrase("test.held")
-"""The kind of these tests."""
-SUSPECTED = 5
-"""Fixed stations and points that are tested at the most, those with the worst images."""
-STEP = 1e-6
-"""Of the coordinates, in distances between points and stations, and of attitudes, radians."""
-LEAST_IMAGES = 3
-"""Of a station."""
+HELD = Phrase("test.held")  # Type of these tests
+SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images
+LEAST_IMAGES = 3  # Of a tested station
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +51,7 @@ class Held:
 def held_tested(result: Result) -> list[Tested]:
     """Return tests of the fixed stations and points with the worst images, where residuals are too large.
 
-    None where the adjustment is accepted, has not converged, has no covariances, or was done in parts.
+    None if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
     if not result.WHOLE:
         return []
@@ -165,19 +160,12 @@ def station_partials(result: Result) -> Floats:
         return np.full((6, len(block.image_xy), 2), np.nan)
     rays = Rays.of(plain)
     places = rays.axes.positions(result.point_positions)[plain.image_points]
-    apart = np.linalg.norm(places - rays.centres[plain.image_photos], axis=1)
-    step = STEP * float(np.nanmedian(apart))
+    photos = plain.image_photos
+    by_position = rays.partials(places, np.arange(len(places)))
+    turned = np.cross(rays.cameras[photos].transpose(0, 2, 1), (places - rays.centres[photos])[:, np.newaxis])
+    by_turn = by_position @ turned.transpose(0, 2, 1)
     found = np.full((6, len(block.image_xy), 2), np.nan)
-    for k in range(3):
-        shift = np.zeros(3)
-        shift[k] = step
-        ends = [replace(rays, centres=rays.centres + sign * shift).residuals(places)[0] for sign in (1, -1)]
-        found[k, seen] = (ends[0] - ends[1]) / (2 * step)
-        turned = [
-            replace(rays, cameras=rays.cameras @ _turn(k, sign * STEP)).residuals(places)[0]
-            for sign in (1, -1)
-        ]
-        found[3 + k, seen] = (turned[0] - turned[1]) / (2 * STEP)
+    found[:, seen] = np.concatenate([by_position, by_turn], axis=2).transpose(2, 0, 1)
     # Without lenses y counts upwards.
     down = np.array([each.image_y == "down" for each in block.cameras], dtype=bool)
     if down.any():
@@ -199,20 +187,12 @@ def as_adjusted(result: Result) -> Block:
     return result.block.replace(**changes)
 
 
-def _turn(axis: int, angle: float) -> Floats:
-    """Rotation about an axis of the photo by a small angle."""
-    generator = np.zeros((3, 3))
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    generator[j, k], generator[k, j] = -angle, angle
-    return np.eye(3) + generator
-
-
 def fall_by_lens(result: Result, images: Bools) -> float:
     """Return by how much the weighted sum of squares would fall with a lens of their own for (m,) `images`.
 
     Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
     about the middle of the frame, whatever the model of the camera has; of the radial terms alone where
-    unknowns take up others. 0 where it is not known.
+    unknowns take up others. 0 if it is not known.
     """
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0

@@ -20,10 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Footprints", "footprints", "grounds", "picture_frames"]
 
-SIDE = 4
-"""Vertices of an outline on each side of the picture."""
-HORIZON = math.radians(80.0)
-"""From the vertical: what a picture shows beyond is cut off there."""
+SIDE = 4  # Vertices of an outline on each side of the picture
+HORIZON = math.radians(80.0)  # Limit of footprints from the vertical
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +50,8 @@ class Footprints:
 def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
     """Return the footprints of the adjusted photos on level planes, each at the height of its own points.
 
-    Parameters
-    ----------
-    result
-        The adjusted block.
-    sizes
-        Width and height of the pictures of each camera in the unit of image coordinates. Where they are not
-        known, pictures reach as far as measurements do on all photos with the camera.
+    `sizes` are width and height of the images of each camera in the unit of image coordinates. Without these
+    the images reach as far as the measurements on all photos of the camera.
     """
     block = result.block.replace(
         photo_positions=result.photo_positions,
@@ -97,15 +90,7 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
 
 
 def grounds(result: Result, heights: Floats) -> Floats:
-    """Return (P,) the median of the heights of the points that each photo shows; of all where it shows none.
-
-    Parameters
-    ----------
-    result
-        The adjusted block.
-    heights
-        (n,) of its points.
-    """
+    """Return (P,) median heights of the points in each photo, of all points for a photo without points."""
     block = result.block
     own = np.flatnonzero(result.used_images)
     photos, seen = block.image_photos[own], heights[block.image_points[own]]

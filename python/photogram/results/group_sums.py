@@ -51,13 +51,10 @@ __all__ = [
     "observables",
 ]
 
-TESTABLE = 0.5
-"""A group with less redundancy is not tested: the mixture is nearly singular."""
+TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
-SMALL = 1000
-"""Observations of a network all of whose groups are taken column by column."""
-TOGETHER = 32
-"""Groups beyond so many share the columns of others, which are far from them."""
+SMALL = 1000  # Largest number of observations with exact sums
+TOGETHER = 32  # Largest number of groups with columns of their own
 
 
 @dataclass(frozen=True)

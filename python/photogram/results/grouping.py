@@ -17,12 +17,9 @@ from photogram.statistics.components import GroupsOf
 GroupsArgument = str | Sequence[str] | Mapping[str, Any]
 """A basis, several of them (every combination is a group), or labels by part of the network."""
 
-BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")
-"""What groups can be made by."""
-PARTS = ("images", "control", "stations", "observations")
-"""What labels of the user's own can be of."""
-MANY_RAYS = 5
-"""As many rays or more are one group."""
+BASES = ("kind", "camera", "strip", "photo", "point class", "component", "rays")  # Bases of groups
+PARTS = ("images", "control", "stations", "observations")  # Parts with labels of the user
+MANY_RAYS = 5  # Smallest number of rays of the last group
 
 _Labels = NDArray[np.object_]
 

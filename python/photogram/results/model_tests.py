@@ -47,16 +47,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
 
-KEPT = 0.01
-"""Level of the test that a term must pass to be kept."""
-EFFECT = 0.2
-"""Standard deviations of an image: terms that move none by more are not worth having."""
-DECISIVE, POSITIVE = 10.0, 2.0
-"""Differences of BIC."""
-CHECKS = 10
-"""Check points from which they say something of models."""
-SEEN = 2000
-"""Images on which the effect of terms is looked at."""
+KEPT = 0.01  # Significance level of useful terms
+EFFECT = 0.2  # Smallest effect of useful terms on an image, in standard deviations
+DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC with decisive and positive evidence
+CHECKS = 10  # Smallest number of check points for their root mean square
+SEEN = 2000  # Number of images for the effect of terms
 
 
 @dataclass(frozen=True)

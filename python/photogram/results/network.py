@@ -45,31 +45,18 @@ if TYPE_CHECKING:
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
-JUDGED = 100_000
-"""Images of a network whose `repr` tells the verdict, at most."""
-REMARKS = 5
-"""That its `repr` tells at most."""
+JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
+REMARKS = 5  # Of a `repr`
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations of one kind, each with k components.
+    """Observations of one kind, each with k components."""
 
-    Attributes
-    ----------
-    rows
-        (r,) the points or photos that they are of.
-    residuals
-        (r, k) observed minus adjusted; 0 where fixed, NaN where nothing is observed.
-    sd
-        (r, k) standard deviations: 0 where fixed, infinite where nothing is observed.
-    redundancy, standardized
-        (r, k) redundancy numbers, and residual / (sd x root of redundancy number).
-    """
-
-    rows: Indices
-    residuals: Floats
-    sd: Floats
+    rows: Indices  # (r,) the points or photos that they are of
+    residuals: Floats  # (r, k) observed minus adjusted; 0 if fixed, NaN if not observed
+    sd: Floats  # (r, k) standard deviations: 0 if fixed, infinite if not observed
+    # (r, k) redundancy numbers, and residual / (sd x root of redundancy number)
     redundancy: Floats
     standardized: Floats
 
@@ -197,7 +184,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         if len(self.messages) > REMARKS:
             rows.append(("", f"and {len(self.messages) - REMARKS} more remarks"))
         rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
-        return f"Adjusted {self._what}", rows
+        title = getattr(self.given, "title", "")
+        return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
 
     @abstractmethod
     def _members(self) -> dict[str, Any]:
@@ -206,11 +194,6 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         return json.to_json(self._members())
-
-    @property
-    @abstractmethod
-    def _what(self) -> str:
-        """What was adjusted, with its title."""
 
     @property
     @abstractmethod

@@ -35,6 +35,7 @@ from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
 from photogram.show.quantity import Quantities, Quantity, members, records
 from photogram.statistics.evidence import GLOBAL
+from photogram.words import phrase
 
 ORDERINGS = {
     "input": "in input order",
@@ -44,11 +45,9 @@ ORDERINGS = {
     "graph-dissection": "by dissection of the graph",
     "parts": "in parts, and the separators between them",
 }
-NOTABLE = 3.0
-"""Test values above are counted; the limit of the tests, which decides, is in the verdict."""
+NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
-WORST = 25
-"""Observations in the table of the worst."""
+WORST = 25  # Observations in the table of the worst
 
 
 def network_document(
@@ -132,12 +131,12 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
     test = result.global_test
     problems = []
     if result.status != "converged":
-        problems.append(f"the adjustment has {result.status}: do not use these values")
+        problems.append(str(phrase("problem.status", status=result.status)))
     if test is not None and (failed := test.problem()):
         problems.append(failed)
     problems += [str(message) for message in (*result.verdict.outliers, *result.messages)]
     if result.variance_of_unit_weight is None:
-        problems.append("there are no degrees of freedom: covariances are scaled by 1")
+        problems.append(str(phrase("problem.no-redundancy")))
     return problems
 
 
@@ -181,7 +180,6 @@ def size_section(
 
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
-    """Return what a reader wants first of every network, with its number of photos."""
     used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     found = [
@@ -197,7 +195,6 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
 
 
 def _unit_weight(result: AdjustedNetwork) -> Fact:
-    """Return the standard deviation of unit weight with what it may be, where that was tested."""
     variance, name = result.variance_of_unit_weight, "Standard deviation of unit weight"
     if variance is None:
         return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
@@ -209,7 +206,6 @@ def _unit_weight(result: AdjustedNetwork) -> Fact:
 
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
-    """Return how well images fit and are checked."""
     used, (axis, _) = result.used_images, result._terms().image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
@@ -274,15 +270,12 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
 
 
 def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
-    """Return all tests, and the picture of single ones."""
-    table = verdict_table(result.verdict)
-    parts: list[Part] = [drawing, *([table] if table.rows else [])]
+    parts: list[Part] = [drawing, verdict_table(result.verdict)]
     intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
     return Section("tests", "Tests", parts, intro)
 
 
 def _iterations_section(result: AdjustedNetwork) -> Section:
-    """Return the history."""
     note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
     table = quantity.Table("iterations", "Iterations", iterations(result), note)
     course = [Fact("Status", result.status)]
@@ -368,7 +361,6 @@ CAPTIONS = {
         " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
     ),
 }
-"""Title and caption by name."""
 
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:

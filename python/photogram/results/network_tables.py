@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.results.axes import Terms
-from photogram.results.iteration_text import iteration_table
+from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity
 
@@ -162,6 +162,19 @@ def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)
 
 
+def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
+    """Return numbers, sums after the corrections, largest changes, damping; first the start, if given."""
+    first = [] if start is None else [(0, start, np.nan, np.nan)]
+    rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
+    number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T
+    return [
+        Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
+        Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),
+        Quantity(change, member="largest_change_sd", head="Largest change over sd"),
+        Quantity(damping, member="damping", head="Damping", figures=2),
+    ]
+
+
 TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
     "photo": photos,
     "point": points,
@@ -169,4 +182,3 @@ TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
     "control": control,
     "station": stations,
 }
-"""The tables of every network by the kind of things that have their rows."""

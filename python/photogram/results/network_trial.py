@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -28,12 +27,9 @@ KINDS = ("image", "control", "position", "attitude", "observation", "camera", "u
 """What the suspects of the core are of, by their numbers."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
-WHOLE = 1500
-"""Rows up to which R of all of them is had: an exact round takes as many solutions."""
-SUPPORT = 3
-"""Images that a photo whose pose is free needs."""
-HUBER, CAUCHY = 1.50, 2.55
-"""Scales of the losses of a robust start, in standard deviations of an image point."""
+WHOLE = 1500  # Largest number of rows with R of all of them; an exact round has as many solutions
+SUPPORT = 3  # Smallest number of images of a photo with a free pose
+HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
 ROBUST_ITERATIONS = 20
 
 
@@ -238,11 +234,11 @@ class NetworkTrial:
         return int(self._are_in(out, images).sum() - gone) < SUPPORT
 
 
-class NamedSuspects(ABC):
-    """The groups of observations of a network as the core has them, with what each is called.
+class NamedSuspects(Suspects):
+    """The groups of observations of a network as the core has them.
 
-    It keeps arrays, not the core, so that names last longer than what was tested. Classes of networks say
-    what may go alone, and what else than images, control and poses there is.
+    They contain arrays, not the core, so that names outlast the tests. Subclasses return the parts of groups,
+    and names of observations that are not images, control or poses.
     """
 
     def __init__(
@@ -250,70 +246,41 @@ class NamedSuspects(ABC):
         given: Given,
         core: _photocore.NetworkSuspects,
         *,
-        apart: bool,
+        apart: bool,  # Whether parts of a control point or of a station may go alone
+        # Components of coordinates of points, positions and attitudes; units of the first two
         components: tuple[Sequence[str], Sequence[str], Sequence[str]],
         lengths: Sequence[str],
     ) -> None:
-        self.kinds, self.subjects = core.subjects
-        self.starts, self.components = core.row_starts, core.components
-        self.given, self.apart = given, apart
-        self.image_points, self.image_photos = given.image_points, given.image_photos
+        kinds, subjects = (values.astype(np.int64) for values in core.subjects)
+        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
+        image, control = kinds == IMAGE, kinds == CONTROL
+        points[image] = given.image_points[subjects[image]]
+        photos[image] = given.image_photos[subjects[image]]
+        points[control] = subjects[control]
+        station = (kinds == POSITION) | (kinds == ATTITUDE)
+        photos[station] = subjects[station]
+        removable = np.asarray(kinds <= OBSERVATION)
+        super().__init__(core.row_starts, kinds, KINDS, subjects, points, photos, removable)
+        self.given, self.apart, self.components = given, apart, core.components
         self._names = dict(zip((CONTROL, POSITION, ATTITUDE), components, strict=True)) | {IMAGE: "xy"}
         images, angles = (given.image_unit,) * 2, ("rad",) * 3
         self._units = {IMAGE: images, CONTROL: lengths, POSITION: lengths, ATTITUDE: angles}
 
-    def suspects(self) -> Suspects:
-        """Return the groups."""
-        kinds, subjects = self.kinds, self.subjects
-        points, photos = np.full(len(kinds), -1), np.full(len(kinds), -1)
-        image, control = kinds == IMAGE, kinds == CONTROL
-        points[image] = self.image_points[subjects[image]]
-        photos[image] = self.image_photos[subjects[image]]
-        points[control] = subjects[control]
-        station = (kinds == POSITION) | (kinds == ATTITUDE)
-        photos[station] = subjects[station]
-        return Suspects(
-            row_starts=self.starts,
-            kinds=kinds.astype(np.int64),
-            kind_names=KINDS,
-            subjects=subjects.astype(np.int64),
-            points=points,
-            photos=photos,
-            loads=self.loads,
-            removable=np.asarray(kinds <= OBSERVATION),
-            parts=self.parts,
-            name=self.name,
-            row_name=self.row_name,
-            unit=self.unit,
-            photo_name=self.photo_name,
-        )
-
     def photos_of_point(self, point: int) -> Indices:
-        """Return the photos that a point is seen from."""
-        points, photos = self._by_point
-        first, last = np.searchsorted(points, [point, point + 1])
-        return np.asarray(photos[first:last])
-
-    @cached_property
-    def _by_point(self) -> tuple[Indices, Indices]:
-        """The images' points in their order, and their photos: not every test asks for them."""
-        order = np.argsort(self.image_points, kind="stable")
-        return self.image_points[order], self.image_photos[order]
+        """Return the photos of the images of a point."""
+        groups = self.on_point(point)
+        return np.asarray(self.photos[groups[self.kinds[groups] == IMAGE]])
 
     def loads(self, group: int) -> Indices:
         """Return the photos that a group has to do with."""
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
         if kind == IMAGE:
-            return self.photos_of_point(int(self.image_points[subject]))
+            return self.photos_of_point(int(self.points[group]))
         if kind == CONTROL:
             return self.photos_of_point(subject)
         if kind in (POSITION, ATTITUDE):
             return np.array([subject])
         return self.other_loads(kind, subject)
-
-    def group_of(self, row: int) -> int:
-        """Return the group of a row."""
-        return int(np.searchsorted(self.starts, row, "right")) - 1
 
     def photo_name(self, photo: int) -> Phrase:
         """Return the name of a photo."""
@@ -324,7 +291,7 @@ class NamedSuspects(ABC):
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
         points, photos = self.given.point_ids, self.given.photo_ids
         if kind == IMAGE:
-            point, photo = points[self.image_points[subject]], photos[self.image_photos[subject]]
+            point, photo = points[self.points[group]], photos[self.photos[group]]
             return Phrase("named.image", {"point": str(point), "photo": str(photo)})
         if kind == CONTROL:
             return Phrase("named.control", {"point": str(points[subject])})
@@ -341,15 +308,12 @@ class NamedSuspects(ABC):
         return self._row(row)[1]
 
     def _row(self, row: int) -> tuple[str, str]:
-        group, component = self.group_of(row), int(self.components[row])
+        group = int(np.searchsorted(self.row_starts, row, "right")) - 1
+        component = int(self.components[row])
         kind = int(self.kinds[group])
         if kind in self._names:
             return self._names[kind][component], self._units[kind][component]
         return self.other_row(kind, int(self.subjects[group]), component)
-
-    @abstractmethod
-    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return the rows that may go alone, of a group by its number; None where it goes as a whole."""
 
     @abstractmethod
     def other_loads(self, kind: int, subject: int) -> Indices:

@@ -31,10 +31,8 @@ from photogram.statistics.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram import Result
 
-CLIPPED = 3.0
-"""Larger test values count as this one."""
-TOGETHER = 20
-"""Draws that are projected at a time."""
+CLIPPED = 3.0  # Larger test values count as this one
+TOGETHER = 20  # Draws that are projected at a time
 
 
 @dataclass(frozen=True)

@@ -25,14 +25,10 @@ from photogram.words import Phrase
 
 LEVEL_OF_PATTERNS = 0.001
 """Patterns are looked for in many ways: only what is very unlikely by chance is told."""
-NOTABLE = 0.3
-"""Standard deviations: mean residuals below this harm nobody."""
-CLIPPED = 3.0
-"""Larger test values count as this one."""
-VISIBLE = 0.1
-"""Redundancy numbers of the coordinates whose distribution is looked at."""
-KURTOSIS = (-0.7, 1.0)
-"""Excess kurtosis that is remarked on beyond these."""
+NOTABLE = 0.3  # Smallest mean residual that matters, in standard deviations
+CLIPPED = 3.0  # Limit of test values
+VISIBLE = 0.1  # Smallest redundancy number in the test of normality
+KURTOSIS = (-0.7, 1.0)  # Limits of excess kurtosis without a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +59,7 @@ def patterns(
     factor = float(np.nanmedian(np.abs(w))) / MEDIAN
     if not factor > 0:
         return []
-    # ~v = w sqrt(r), of w that are clipped; 0 where nothing is tested.
+    # ~v = w sqrt(r), of w that are clipped; 0 if nothing is tested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
     given, (axis, _) = result.given, result._terms().image_axes
@@ -130,7 +126,6 @@ def _of_photos(
         value=float(statistics[worst]),
         probability=float(probabilities[worst]),
         level=bonferroni(LEVEL, tested),
-        large=False,
     )
 
 
@@ -160,7 +155,6 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
         if found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
         else max(found.probability, LEVEL_OF_PATTERNS),
         level=LEVEL_OF_PATTERNS,
-        large=False,
     )
 
 
@@ -170,10 +164,8 @@ def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systemat
     w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
     order = np.linspace(-1.0, 1.0, len(w))
     design = np.column_stack([np.ones(len(w)), order, order**2])
-    return [
-        _regressed("drift", regression(w[:, axis], design), axis=Phrase(f"axis.{name}"))
-        for axis, name in enumerate(names)
-    ]
+    axes = [Phrase(f"axis.{name}") for name in names]
+    return [_regressed("drift", regression(w[:, k], design), axis=axis) for k, axis in enumerate(axes)]
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
@@ -204,5 +196,4 @@ def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | N
         value=found.statistic,
         probability=found.probability,
         level=LEVEL_OF_PATTERNS,
-        large=False,
     )

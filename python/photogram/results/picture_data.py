@@ -88,13 +88,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
-
-    Parameters
-    ----------
-    result
-        The adjusted block.
-    """
+    """The data of an adjusted block: geographic space in axes to east, north and up amid its stations."""
 
     result: Result
 
@@ -125,7 +119,6 @@ class PicturedBlock(PicturedNetwork):
         )
 
     def _metric(self, positions: Floats) -> Floats:
-        """Return (n, 3) positions in metric axes: as they are in rectangular space."""
         return self._axes.positions(positions) if self.result.block.geographic else positions
 
     @cached_property

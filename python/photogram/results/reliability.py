@@ -30,7 +30,7 @@ from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Quantity, Table, members, records
 from photogram.statistics.distributions import lambda0
-from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
@@ -38,10 +38,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
-SEPARATED = 1.6448536269514722
-"""Of the normal distribution, 95 percent on one side."""
-SEARCHED = 100
-"""Observations of the largest norm whose effect on every unknown is looked into."""
+SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
+SEARCHED = 100  # Number of examined observations: those of the largest norm
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class Inseparable:
     # share
     correlation: float
     # How many minimal detectable errors an error must have to be attributed to the right one of the two in 95
-    # of 100 cases; infinite where nothing tells them apart
+    # of 100 cases; infinite if nothing tells them apart
     factor: float
 
     def __str__(self) -> str:
@@ -78,17 +76,6 @@ class Reliability:
 
     Arrays are over G groups of observations (`suspects`), or over their M rows, which stand one group after
     the other; rows are in the units of the observations.
-
-    Parameters
-    ----------
-    trial
-        The network as it stands.
-    covariances
-        What answers for its covariances.
-    level, power
-        Of the test of one observation or group (alpha0 and beta0).
-    known
-        Whether the unit weight is known; otherwise it is estimated, and lambda0 is that of the F test.
     """
 
     def __init__(
@@ -96,9 +83,9 @@ class Reliability:
         trial: NetworkTrial,
         covariances: Callable[[], Covariances],
         *,
-        level: float,
+        level: float,  # alpha0 and beta0 of the test of one observation or group
         power: float,
-        known: bool,
+        known: bool,  # whether the unit weight is known; otherwise lambda0 is that of the F test
     ) -> None:
         self._trial, self._covariances = trial, covariances
         self.level, self.power, self.known = level, power, known
@@ -135,14 +122,13 @@ class Reliability:
 
     @property
     def detectable(self) -> Floats:
-        """(M,) minimal detectable error of each row alone; infinite where it shows in no residual."""
-        return self._over(self.sd * math.sqrt(self.lambda0(1)), np.sqrt(_shown(self.redundancy)))
+        """(M,) minimal detectable error of each row alone; infinite if it shows in no residual."""
+        return minimal_detectable_error(self.sd, _shown(self.redundancy), self._delta)
 
     @property
     def external(self) -> Floats:
-        """(M,) by how many standard deviations it moves anything at the most when it is not found."""
-        r = _shown(self.redundancy)
-        return self._over(np.sqrt(self.lambda0(1) * (1 - r)), np.sqrt(r))
+        """(M,) largest effect of an undetected error on anything, in its standard deviations."""
+        return largest_effect(_shown(self.redundancy), self._delta)
 
     @property
     def group_detectable(self) -> Floats:
@@ -164,11 +150,6 @@ class Reliability:
     def untestable(self) -> Bools:
         """(G,) whether no error is found by its own residual: too little redundancy in every direction."""
         return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
-
-    @staticmethod
-    def _over(numerator: Floats, denominator: Floats) -> Floats:
-        with np.errstate(divide="ignore"):
-            return np.asarray(numerator / denominator)
 
     @cached_property
     def _effects(self) -> Floats:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.reliability import Inseparable, Reliability
 from photogram.show.page import Part, Remarks
-from photogram.show.quantity import Quantity, Table, members, of_each, records
+from photogram.show.quantity import Quantities, Quantity, Table, members, records
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests
 
@@ -23,43 +23,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-LISTED = 5
-"""Observations of each kind that are listed."""
-PAIRS = 10
-"""Pairs that cannot be told apart that are listed."""
-LOOKED_INTO = 2_000
-"""Points whose pairs are looked into, those of the least redundancy first."""
-LIMIT = 0.9
-"""Of the correlation of two tests, from which on errors cannot be told apart (Foerstner 1983)."""
+LISTED = 5  # Listed observations of each type
+PAIRS = 10  # Listed inseparable pairs
+LOOKED_INTO = 2_000  # Number of points with examined pairs: those of the least redundancy
+LIMIT = 0.9  # Largest correlation of separable tests (Foerstner 1983)
 APART = 1 / (1 + LIMIT)
 """Redundancy from which on that of a pair cannot be reached: rho^2 <= (1 - r)(1 - s) / (r s)."""
-
-
-@dataclass(frozen=True)
-class KindReliability:
-    """The groups of observations of one kind: images, control points, positions ..."""
-
-    kind: str
-    groups: int  # number of groups and of their rows
-    components: int
-    redundancy: float  # Sum of the redundancy numbers of these
-    unchecked: int  # groups that no other observation checks
-    # Groups with a direction in which an error shows in no residual, among those that are checked
-    one_sided: int
-
-
-@dataclass(frozen=True)
-class WeakObservation:
-    """A group of observations whose undetected error does most among those of its kind."""
-
-    kind: str
-    name: str
-    redundancy: float  # The least of a direction that shows
-    detectable_sd: float  # Largest half-axis of its minimal detectable error, in standard deviations
-    external_sd: float  # By how many standard deviations that moves anything at the most when it is not found
-    # By how much the minimal detectable error of its worst component moves its own point, in the unit of the
-    # object space (of geographic coordinates the height); NaN without one
-    own_point: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +38,8 @@ class ReliabilitySummary:
     level: float  # of the tests
     power: float
     known: bool
-    kinds: tuple[KindReliability, ...]
-    weakest: tuple[WeakObservation, ...]  # of each type those with the largest undetected effect
+    kinds: Quantities  # number, redundancy and checks of groups by type of observation
+    weakest: Quantities  # of each type the groups with the largest undetected effect
     two_rays: int  # points on two photos: the wrong image cannot be identified
     # Pairs of observations on other points that cannot be told apart, the most alike first
     pairs: tuple[Inseparable, ...]
@@ -87,37 +56,16 @@ class ReliabilitySummary:
 
     def kinds_table(self) -> Table:
         """Return the declared table of the kinds of observations."""
-        mean = [each.redundancy / max(each.components, 1) for each in self.kinds]
-        columns = [
-            of_each(self.kinds, "kind", kind="name", head="Kind"),
-            of_each(self.kinds, "groups", head="Groups", decimals=0),
-            of_each(self.kinds, "components", head="Components", decimals=0),
-            of_each(self.kinds, "redundancy", head="Redundancy", decimals=3),
-            Quantity(mean, head="Mean", decimals=3),
-            of_each(self.kinds, "unchecked", head="Unchecked", decimals=0),
-            of_each(self.kinds, "one_sided", head="One-sided", decimals=0),
-        ]
         note = (
             "No other observation checks the unchecked groups. An error of a one-sided group shows in no"
             " residual if it has some direction."
         )
-        return Table("reliability-kinds", "Redundancy of groups of observations", columns, note)
+        return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of the weakest observations; `unit` is that of the object space."""
-        heads = {"redundancy": "Least redundancy", "detectable_sd": "Detectable error, sd"}
-        heads["external_sd"] = "Moves up to, sd"
-        columns = [
-            of_each(self.weakest, "kind", kind="name", name="kind"),
-            of_each(self.weakest, "name", kind="name", name="name", head="Group"),
-            *(
-                of_each(self.weakest, name, name=name, head=head, decimals=3 if name == "redundancy" else 2)
-                for name, head in heads.items()
-            ),
-            of_each(
-                self.weakest, "own_point", name="own_point", head=f"Own point {unit}".rstrip(), decimals=4
-            ),
-        ]
+        *columns, own_point = self.weakest
+        columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
         about = (
             f"Tests of the level {self.level:g} find the detectable errors in {100 * self.power:.0f} of 100"
             f" cases, unit weight {'known' if self.known else 'estimated'}. They are the largest."
@@ -133,7 +81,7 @@ class ReliabilitySummary:
         sentences = []
         if self.two_rays:
             sentences.append(
-                f"{self.two_rays} points stand on two photos: which of their images is wrong nothing tells"
+                f"{self.two_rays} points have two images: a wrong one of these cannot be identified"
             )
         if self.pairs:
             more = self.pairs_found - len(self.pairs)
@@ -176,8 +124,8 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
         level=found.level,
         power=found.power,
         known=found.known,
-        kinds=tuple(_kinds(found)),
-        weakest=tuple(_weakest(found, heights=heights)),
+        kinds=_kinds(found),
+        weakest=_weakest(found, heights=heights),
         two_rays=two,
         pairs=tuple(map(found.named, pairs[:PAIRS])),
         pairs_found=len(pairs),
@@ -187,29 +135,33 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
     )
 
 
-def _kinds(found: Reliability) -> list[KindReliability]:
-    suspects, tests = found.suspects, found.tests
-    rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
-    redundancy = found.redundancy
-    kinds = []
+def _kinds(found: Reliability) -> list[Quantity]:
+    suspects, tests, redundancy = found.suspects, found.tests, found.redundancy
+    of_rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
+    rows = []
     for kind, name in enumerate(suspects.kind_names):
-        own, of_rows = tests.active & (suspects.kinds == kind), (rows == kind) & ~np.isnan(redundancy)
-        if own.any():
-            unchecked = own & found.untestable
-            kinds.append(
-                KindReliability(
-                    kind=name,
-                    groups=int(own.sum()),
-                    components=int(of_rows.sum()),
-                    redundancy=float(redundancy[of_rows].sum()),
-                    unchecked=int(unchecked.sum()),
-                    one_sided=int((own & found.invisible & ~unchecked).sum()),
-                )
-            )
-    return kinds
+        active = tests.active & (suspects.kinds == kind)
+        tested = (of_rows == kind) & ~np.isnan(redundancy)
+        if active.any():
+            untestable = active & found.untestable
+            invisible = active & found.invisible & ~untestable
+            numbers = [np.count_nonzero(each) for each in (active, tested, untestable, invisible)]
+            rows.append((name, *numbers, float(redundancy[tested].sum())))
+    names, *counts, sums = zip(*rows, strict=True) if rows else ((),) * 6
+    groups, components, unchecked, one_sided = map(np.array, counts)
+    mean = np.array(sums) / np.maximum(components, 1)
+    return [
+        Quantity(names, kind="name", member="kind", head="Kind"),
+        Quantity(groups, member="groups", head="Groups", decimals=0),
+        Quantity(components, member="components", head="Components", decimals=0),
+        Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
+        Quantity(mean, head="Mean", decimals=3),
+        Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
+        Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
+    ]
 
 
-def _weakest(found: Reliability, *, heights: bool) -> list[WeakObservation]:
+def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
     suspects, tests = found.suspects, found.tests
     external, detectable = found.group_external, found.group_detectable
     checked = tests.active & (tests.least > TESTABLE)
@@ -221,16 +173,22 @@ def _weakest(found: Reliability, *, heights: bool) -> list[WeakObservation]:
             least = np.partition(external[own], -LISTED)[-LISTED]
             own = own[external[own] >= least]
         groups += own[np.argsort(-external[own], kind="stable")[:LISTED]].tolist()
+    names = [[suspects.kind(group) for group in groups], [str(suspects.name(group)) for group in groups]]
+    least, moved = tests.least[groups], found.own_points(groups, heights=heights)
     return [
-        WeakObservation(
-            kind=suspects.kind_names[int(suspects.kinds[group])],
-            name=str(suspects.name(group)),
-            redundancy=float(tests.least[group]),
-            detectable_sd=float(detectable[group]),
-            external_sd=float(external[group]),
-            own_point=moved,
-        )
-        for group, moved in zip(groups, found.own_points(groups, heights=heights), strict=True)
+        *(
+            Quantity(texts, kind="name", name=name, member=name, head=head)
+            for texts, name, head in zip(names, ("kind", "name"), ("", "Group"), strict=True)
+        ),
+        *(
+            Quantity(values, name=name, member=name, head=head, decimals=decimals)
+            for values, name, head, decimals in (
+                (least, "redundancy", "Least redundancy", 3),
+                (detectable[groups], "detectable_sd", "Detectable error, sd", 2),
+                (external[groups], "external_sd", "Moves up to, sd", 2),
+                (np.array(moved), "own_point", "Own point", 4),
+            )
+        ),
     ]
 
 

@@ -32,7 +32,7 @@ from photogram.results.datum import (
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_kinds import ObservedKind, observed_kinds
-from photogram.results.selection import Adjusted, Things, photo_components, point_components
+from photogram.results.selection import Adjusted, adjusted
 from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.trajectories import (
     AdjustedTrajectory,
@@ -189,14 +189,9 @@ class Result(OnFilm, AdjustedNetwork):
         return block_files(self)
 
     def _members(self) -> dict[str, Any]:
-        """Return the members of the JSON document, without the sections that people read."""
         from photogram.results.document import block_members
 
         return block_members(self)
-
-    @property
-    def _what(self) -> str:
-        return f"block: {self.block.title}" if self.block.title else "block"
 
     @property
     def given(self) -> Block:
@@ -328,7 +323,6 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        """Return what the result says about one kind of thing; `attrs` name the datum."""
         import pandas as pd
 
         from photogram.results.tables import TABLES
@@ -491,36 +485,4 @@ class Result(OnFilm, AdjustedNetwork):
 
 
 def _least_turns(angles: Floats) -> Floats:
-    """Take away whole turns."""
     return np.asarray(angles - math.tau * np.round(angles / math.tau))
-
-
-def adjusted(result: Result) -> Adjusted:
-    """Return the adjusted values of a result by kinds and names."""
-    block = result.block
-    photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
-    places, count = point_components(block), len(photos)
-    steps = (*places, "rho x", "rho y", "rho z")
-    points = [places] * len(block.point_ids)
-    # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
-    cameras, unknowns = result.cameras, result.unknowns
-    return Adjusted(
-        network="block",
-        things={
-            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
-            "step": Things(block.photo_ids, [steps] * count, photos, sd),
-            "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
-            "camera": Things(
-                [each.name for each in cameras],
-                [each.names for each in cameras],
-                [each.values for each in cameras],
-                [each.sd for each in cameras],
-            ),
-            "unknown": Things(
-                [each.name for each in unknowns],
-                [each.components for each in unknowns],
-                [each.values for each in unknowns],
-                [each.sd for each in unknowns],
-            ),
-        },
-    )

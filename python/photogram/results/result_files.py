@@ -27,12 +27,12 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.frame import Frame
 from photogram.results.network import AdjustedNetwork
 from photogram.show.quantity import Quantities
+from photogram.words import phrase
 
 FORMAT = 2
 SUMMARY = "summary.json"
 _STATE = "state"
-_READ = ("photos", "points", "images", _STATE)
-"""Tables that are read again; the others are for people."""
+_READ = ("photos", "points", "images", _STATE)  # Tables that are read; the others are for people
 TRIANGLE = "covariances, lower triangle row by row, scaled by the variance of unit weight"
 REDUNDANCY = "redundancy number of {} as an observation; 0 unless weighted"
 GIVEN_SD = "standard deviation of {} that was given: infinite free, 0 fixed"
@@ -180,11 +180,13 @@ class Saved:
         try:
             return _photocore.BlockState(unknowns.tolist(), *rest)
         except (TypeError, ValueError) as error:
-            raise InputError(f"keeps no state ({error})", file=self.folder / SUMMARY) from None
+            raise InputError(
+                phrase("error.content", content="the state of an adjustment", reason=str(error)),
+                file=self.folder / SUMMARY,
+            ) from None
 
 
-_RENAMED = {"standardized": "test", "d": "difference"}
-"""What is called otherwise in Parquet."""
+_RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet
 
 
 def sheet(table: Quantities) -> list[Column]:
@@ -313,12 +315,12 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
     try:
         document = orjson.loads(read_bytes(path))
     except orjson.JSONDecodeError as error:
-        raise InputError(f"is no JSON document: {error}", file=path) from None
+        raise InputError(phrase("error.parse", format="JSON", reason=str(error)), file=path) from None
     if not isinstance(document, dict) or not {"kind", "format", "kept", "tables"} <= document.keys():
-        raise InputError("is not the summary of a result that was written by to_parquet", file=path)
+        raise InputError(phrase("adjusted.summary"), file=path)
     if document["format"] != FORMAT:
         raise InputError(
-            f"is of the format {document['format']}, which this version does not read", file=path
+            phrase("error.version", version=str(document["format"]), versions=[FORMAT]), file=path
         )
     check_sealed(document, path)
     return document
@@ -330,6 +332,6 @@ def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
     try:
         codes = np.array([places[name] for name in names.names], dtype=np.int64)
     except KeyError as error:
-        raise InputError(f"names {error.args[0]!r}, which is not in its own table", file=path) from None
+        raise InputError(phrase("adjusted.name", name=error.args[0]), file=path) from None
     found: np.ndarray = codes[names.rows] if len(codes) else np.zeros(0, dtype=np.int64)
     return found

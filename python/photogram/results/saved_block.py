@@ -99,7 +99,6 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
 
 
 def _observed(photos: Sheet) -> list[str]:
-    """Return which observed values a table of photos has."""
     first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
     return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
 

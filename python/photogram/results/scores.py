@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from photogram import _photocore
     from photogram.arguments.types import Floats, Indices
 
-TAKEN_UP = 1e-9
-"""Of the partials; what is left of them beside the unknowns is rounding below it."""
+TAKEN_UP = 1e-9  # Smaller parts of the partials are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +22,7 @@ class Scores:
 
     partials: Floats  # (k, m, 2) B, in standard deviations of the images
     projected: Floats  # (k, m, 2) R B
-    residuals: Floats  # (m, 2) v, in standard deviations; zero where an image takes no part
+    residuals: Floats  # (m, 2) v, in standard deviations; zero if an image takes no part
 
     @classmethod
     def of(cls, factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> Scores:
@@ -82,7 +81,7 @@ class Scores:
 
 
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
-    """Return T = c' C^-1 c; None where the unknowns take the partials up; see :meth:`Scores.of`."""
+    """Return T = c' C^-1 c; None if the unknowns take the partials up; see :meth:`Scores.of`."""
     found = Scores.of(factor, partials, residuals)
     return None if found.taken_up else quadratic(found.matrix, found.vector)
 

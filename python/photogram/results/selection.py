@@ -4,25 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import names, shown
+from photogram.arguments.arrays import names, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
 from photogram.network.tables import ATTITUDE_COLUMNS
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
 
-Item = tuple[str, Wanted]
-"""A kind (of blocks `photo`, `step`, `point`, `camera`, `unknown`) and what of it."""
+Item = tuple[str, Wanted]  # Kind (`photo`, `step`, `point`, `camera`, `unknown`) and names
 
-Selection = Item | Sequence[Item]
-"""One or several of these."""
+Selection = Item | Sequence[Item]  # One or several items
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +77,9 @@ class Adjusted:
         shapes: list[tuple[int, ...]] = []
         for item in items:
             if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.things:
-                kinds = ", ".join(self.things)
-                raise InputError(f"{shown(item)} is no kind ({kinds}) with a name, several, or None for all")
+                raise InputError(
+                    phrase("adjusted.selection", value=value_field(item), kinds=list(self.things))
+                )
             kind, wanted = str(item[0]), item[1]
             own = self.things[kind]
             chosen = self._indices(kind, wanted)
@@ -97,7 +100,6 @@ class Adjusted:
         return Selected(rows, labels, together[0], together[1], shapes)
 
     def _places(self, kind: str) -> dict[str, int]:
-        """Return where each name of a kind stands: large networks are asked more than once."""
         known: dict[str, dict[str, int]] = self.__dict__.setdefault("_known_places", {})
         if kind not in known:
             known[kind] = {name: i for i, name in enumerate(self.things[kind].ids)}
@@ -117,9 +119,7 @@ class Adjusted:
         asked = names(f"names of the kind {kind}", several)
         if missing := [name for name in asked if name not in index]:
             what = kind.replace("step", "photo")
-            raise InputError(
-                f"the {self.network} has no {what} {missing[0] if self.numbered else repr(missing[0])}"
-            )
+            raise InputError(phrase("error.absent", kind=what, name=missing[0]))
         return [index[name] for name in asked]
 
 
@@ -131,3 +131,34 @@ def photo_components(block: Block) -> tuple[str, ...]:
 def point_components(block: Block) -> tuple[str, ...]:
     """Name the three coordinates of a point."""
     return tuple(name.removesuffix("_deg") for name in position_columns(block))
+
+
+def adjusted(result: Result) -> Adjusted:
+    """Return the adjusted values of a result by kinds and names."""
+    block = result.block
+    photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
+    places, count = point_components(block), len(photos)
+    steps = (*places, "rho x", "rho y", "rho z")
+    points = [places] * len(block.point_ids)
+    # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
+    cameras, unknowns = result.cameras, result.unknowns
+    return Adjusted(
+        network="block",
+        things={
+            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
+            "step": Things(block.photo_ids, [steps] * count, photos, sd),
+            "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
+            "camera": Things(
+                [each.name for each in cameras],
+                [each.names for each in cameras],
+                [each.values for each in cameras],
+                [each.sd for each in cameras],
+            ),
+            "unknown": Things(
+                [each.name for each in unknowns],
+                [each.components for each in unknowns],
+                [each.values for each in unknowns],
+                [each.sd for each in unknowns],
+            ),
+        },
+    )

@@ -83,8 +83,8 @@ class Snooped(Brief, Documented):
         return [entry for entry in self.outcome.log if entry.is_out]
 
     @property
-    def rivals(self) -> list[str]:
-        """Sentences on what cannot be told apart from what was removed."""
+    def rivals(self) -> list[Phrase]:
+        """Messages on removed groups and their rivals."""
         return [entry.sentence for entry in self.removed if entry.in_dispute]
 
     def share_removed(self, kind: str) -> float:
@@ -110,12 +110,12 @@ class Snooped(Brief, Documented):
             "family_level" if not settings.fdr else "false_discovery_rate": settings.level,
             "unit_weight": "known" if settings.known else "unknown",
             "distribution": "chi2" if settings.known else "F",
-            **members(outcome, "tests", "remarks", robust_factors="factors"),
+            **members(outcome, "tests", robust_factors="factors"),
+            "remarks": [*map(str, outcome.remarks)],
             "before": _standing(outcome.before),
             "after": _standing(outcome.standing),
             "rounds": [
-                members(each, "number", *_STANDING, limit_p="limit")
-                | members(each, "removed", "returned", "remarks")
+                members(each, "number", *_STANDING, limit_p="limit") | members(each, "removed", "returned")
                 for each in outcome.rounds
             ],
             "log": records(log_table(self.log).columns),
@@ -144,7 +144,7 @@ class Snooped(Brief, Documented):
         consequences = [f"{each.name}: {line}" for each in self.log for line in each.consequences]
         remarks = [
             *([] if self.log else ["Nothing was taken out."]),
-            *self.outcome.remarks,
+            *map(str, self.outcome.remarks),
             *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
             *consequences,
         ]
@@ -206,15 +206,13 @@ _COLUMNS = (
 
 
 def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of the table: what the document has, but for what each component has of its own."""
-    log_p = member["prediction_log10_p"]
+    """Return a row for each component: the member of the document with its own values."""
     common = {
-        **member,
+        **{name: math.nan if value is None else value for name, value in member.items()},
         "rivals": rivals_of(entry.rivals, 3),
-        "consequences": "; ".join(entry.consequences),
-        "prediction_T": math.nan if entry.prediction is None else entry.prediction,
-        "prediction_log10_p": math.nan if log_p is None else log_p,
-        "kept": entry.kept,
+        "consequences": "; ".join(member["consequences"]),
+        "returned": entry.returned,
+        "kept": str(entry.kept),
     }
     names = ("component", "unit", "error", "error_sd", "predicted_error")
     predicted = entry.prediction_error or (math.nan,) * len(entry.rows)
@@ -242,11 +240,11 @@ def log_table(log: Sequence[Removal]) -> Table:
                 "units": "units",
                 "error": "estimated_error",
                 "error_sd": "estimated_error_sd",
-                "consequences": "consequences",
                 "prediction": "prediction_T",
                 "prediction_error": "predicted_error",
             }.items()
         ),
+        Quantity([[*map(str, each.consequences)] for each in log], member="consequences"),
         of_each(log, "dimension"),
         of_each(log, "first_statistic", member="first_T"),
         of_each(log, "statistic", member="T"),
@@ -258,7 +256,7 @@ def log_table(log: Sequence[Removal]) -> Table:
         Quantity(rivals, member="rivals"),
         Quantity([None if each is None else each / LN10 for each in after], member="prediction_log10_p"),
         of_each(log, "returned"),
-        Quantity([each.kept or None for each in log], member="kept"),
+        Quantity([str(each.kept) or None for each in log], member="kept"),
         Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
         Quantity([*map(_state, log)], kind="name", head="Now"),
     ]

@@ -22,24 +22,16 @@ from photogram.results.network_trial import (
     NetworkTrial,
 )
 from photogram.results.observation_kinds import named_observation
-from photogram.statistics.snooping.suspects import Suspects
 from photogram.words import Phrase
 
 ANGLES = ("omega", "phi", "kappa")
 
 
-def block_suspects(block: Block, core: _photocore.NetworkSuspects, *, parts: bool = True) -> Suspects:
-    """Return the groups of observations of a block as the core has them; `parts` of some may go alone."""
-    return _Named(block, core, parts).suspects()
-
-
 ROUGH = 2.0
 """Standard deviations: a step after which the next would move no unknown by more is the last of a round. The
 rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
-EXACT = 1e-7
-"""The same where R of all rows is used: a small network."""
-LOOSE = 0.1
-"""Standard deviation of positions, in the extent of the block, that hardly gives it a datum."""
+EXACT = 1e-7  # The same if R of all rows is used
+LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
@@ -50,7 +42,7 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
     on_shared = np.array([name in shared for name in block.photo_ids], dtype=bool)
     return NetworkTrial(
         core=core,
-        suspects=block_suspects(block, core.suspects, parts=parts),
+        suspects=BlockSuspects(block, core.suspects, parts),
         supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared),
         rough=EXACT if _datum_is_loose(block) else ROUGH,
         exact=EXACT,
@@ -74,8 +66,10 @@ def observations_of_core(block: Block) -> list[Observation]:
     return [block.observations[row] for rows, _ in block.observation_groups for row in rows]
 
 
-class _Named(NamedSuspects):
-    def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool) -> None:
+class BlockSuspects(NamedSuspects):
+    """The groups of observations of a block; `parts` of some may go alone."""
+
+    def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool = True) -> None:
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         plan = "rad" if block.geographic else block.linear_unit
         super().__init__(
@@ -99,7 +93,7 @@ class _Named(NamedSuspects):
         if not self.apart:
             return None
         kind = int(self.kinds[group])
-        components = self.components[self.starts[group] : self.starts[group + 1]].tolist()
+        components = self.components[self.row_starts[group] : self.row_starts[group + 1]].tolist()
         if kind == CONTROL and len(components) == 3:
             return [(0, 1, 2), (2,), (0, 1)]
         if kind in (CONTROL, POSITION, ATTITUDE) and len(components) > 1:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.results import tests
 from photogram.results.axes import component_axis, point_axes
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.features import Features
+from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.network_tables import (
@@ -25,28 +25,13 @@ from photogram.results.network_tables import (
 )
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity, component, joined, long
+from photogram.show.quantity import Axis, Quantity, attribute, component, joined, long
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram import Result
 
 _EITHER = "standard deviation that was given, or is assumed: {}"
-_FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
-    "feature": ("name", "name of the feature"),
-    "kind": ("name", "what it is"),
-    "points": ("number", "number of points"),
-    "point": ("name", "name of the point"),
-    "quantity": ("name", "what is said of it"),
-    "direction": ("name", "of the deviation"),
-    "unit": ("name", "unit of values, residuals and deviations of this row; empty if dimensionless"),
-    "value": ("value", "adjusted"),
-    "sd": ("value", "standard deviation"),
-    "k": ("number", "coverage factor"),
-    "expanded": ("value", "expanded uncertainty, k times the standard deviation"),
-    "deviation": ("value", "distance of the point from the feature"),
-}
-"""What the columns of features have."""
 
 
 def check_points(result: Result) -> list[Quantity]:
@@ -55,24 +40,11 @@ def check_points(result: Result) -> list[Quantity]:
     statistic, p = checks.statistics
     return [
         *_compared(result, checks.rows, checks.differences, checks.given_sd),
+        attribute(checks, "assumed", about="whether standard deviations of control are assumed"),
         Quantity(
-            checks.assumed,
-            name="assumed",
-            member="assumed",
-            about="whether nothing was given: standard deviations of control are assumed",
+            statistic, name="statistic", member="statistic", about="T, or F if the unit weight is estimated"
         ),
-        Quantity(
-            statistic,
-            name="statistic",
-            member="statistic",
-            about="of the test: T, or F where the unit weight is estimated",
-        ),
-        Quantity(
-            p,
-            name="probability",
-            member="p",
-            about="of a statistic as large where nothing is wrong",
-        ),
+        Quantity(p, name="probability", member="p", about="of a larger statistic without errors"),
     ]
 
 
@@ -223,22 +195,12 @@ def _each(every: Sequence[Any], what: str) -> Any:
     return np.repeat(np.array([*map(attrgetter(what), every)], dtype=object), counts)
 
 
-def _quantities(columns: Mapping[str, Any]) -> list[Quantity]:
-    """Return named columns of features as quantities."""
-    return [
-        Quantity(values, kind=kind, name=name, about=about)
-        for name, values in columns.items()
-        for kind, about in [_FEATURES[name]]
-    ]
-
-
 TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
     **tests.TABLES,
     "check": check_points,
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),
     "unknown": lambda result: unknowns(result.unknowns),
-    "feature": lambda result: _quantities((result.features or Features(())).columns()),
-    "deviation": lambda result: _quantities((result.features or Features(())).deviation_columns()),
+    "feature": lambda result: quantity_columns(result.features or Features(())),
+    "deviation": lambda result: deviation_quantities(result.features or Features(())),
 }
-"""The tables by the kind of things that have their rows."""

@@ -73,20 +73,29 @@ class Tests:
 
         return [
             _component_tests(
-                *(phrase("test.image_coordinates"), "image", terms.image_axes, image),
+                phrase("test.image_coordinates"),
+                "image",
+                terms.image_axes,
+                image,
                 of_network("", "image_given_sd"),
                 {"images": every},
                 of_photos,
                 of_points,
             ),
             _component_tests(
-                *(phrase("test.components_of_control"), "control", terms.point_axes, control),
+                phrase("test.components_of_control"),
+                "control",
+                terms.point_axes,
+                control,
                 of_network("point_", "point_given_sd"),
                 {"control": every},
                 points=np.arange(len(points)),
             ),
             _component_tests(
-                *(phrase("test.components_of_stations"), "station", terms.photo_axes, station),
+                phrase("test.components_of_stations"),
+                "station",
+                terms.photo_axes,
+                station,
                 of_network("photo_", "photo_given_sd"),
                 {"positions": slice(3), "attitudes": slice(3, None)},
                 photos=np.arange(len(photos)),
@@ -147,13 +156,11 @@ class Tests:
     @cached_property
     def outliers(self) -> list[Bools]:
         """The components of each type that are outliers of the verdict, or belong to groups that are."""
-        outlying, found = self._result.verdict.outlying, []
+        verdict, found = self._result.verdict, []
         for tests in self.normal:
-            marks = np.zeros(tests.values.shape, dtype=bool)
-            for place in outlying.get(tests.kind, ()):
-                marks[place] = True
+            marks = verdict.marks(tests.kind, tests.values.shape)
             for kind, components in tests.groups.items():
-                marks[[place[0] for place in outlying.get(kind, ())], components] = True
+                marks[[place[0] for place in verdict.outlying.get(kind, ())], components] = True
             found.append(marks)
         return found
 

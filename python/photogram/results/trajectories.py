@@ -13,6 +13,7 @@ from photogram.arguments.arrays import freeze_fields, shaped, standard_deviation
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import unknown_name
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
@@ -23,6 +24,7 @@ from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
+from photogram.words import phrase
 
 __all__ = [
     "AdjustedTrajectory",
@@ -33,29 +35,20 @@ __all__ = [
     "restarted_motion",
 ]
 
-Joint = Callable[[list[str]], Floats]
-"""Covariances of common unknowns, by their names, all with all."""
+Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by name
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPoses:
-    """Poses of a trajectory at n times. Arrays cannot be written.
+    """Poses of a trajectory at n times. Arrays cannot be written."""
 
-    Attributes
-    ----------
-    times
-        (n,) seconds.
-    positions, attitudes
-        (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is geographic), and
-        (n, 3, 3) matrices whose columns are the axes of the photo there.
-    covariances
-        (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the
-        photo's own axes, A Exp(rho), in radians.
-    """
-
-    times: Floats
+    times: Floats  # (n,) seconds
+    # (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is
+    # geographic), and (n, 3, 3) matrices whose columns are the axes of the photo there
     positions: Floats
     attitudes: Floats
+    # (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the photo's
+    # own axes, A Exp(rho), in radians
     covariances: Floats
 
     def __post_init__(self) -> None:
@@ -69,30 +62,19 @@ class TrajectoryPoses:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedTrajectory:
-    """A trajectory after the adjustment. Arrays cannot be written.
-
-    Attributes
-    ----------
-    given
-        The trajectory as it was given.
-    position, rotation
-        (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians.
-    position_sd, rotation_sd
-        (K, 3) their standard deviations; 0 for known ones.
-    position_redundancy, rotation_redundancy
-        (K, 3) redundancy numbers of what was given of them; 0 unless weighted.
-    joint
-        Gives covariances of common unknowns, by their names, all with all.
-    """
+    """A trajectory after the adjustment. Arrays cannot be written."""
 
     given: Trajectory
+    # (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians
     position: Floats
     rotation: Floats
-    position_sd: Floats
+    position_sd: Floats  # (K, 3) standard deviations; 0 if fixed
     rotation_sd: Floats
+    # (K, 3) redundancy numbers of the given values; 0 unless
+    # weighted
     position_redundancy: Floats
     rotation_redundancy: Floats
-    joint: Joint
+    joint: Joint  # Gives covariances of common unknowns, by their names, all with all
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -177,7 +159,7 @@ class AdjustedTrajectory:
         outside = ~((own >= first) & (own <= last))
         if own.ndim != 1 or outside.any():
             bad = own.ravel()[np.argmax(outside)] if outside.any() else times
-            raise InputError(f"the trajectory {self.name} reaches from {first} to {last} s, not to {bad}")
+            raise InputError(phrase("adjusted.time", name=self.name, first=first, last=last, time=bad))
         return own
 
 
@@ -209,7 +191,7 @@ def project(
     """
     timed = {each.photo: row for row, each in enumerate(block.timed)}
     if photo not in timed:
-        raise InputError(f"the photo {photo} is on no trajectory, or is not there")
+        raise InputError(unknown_name("photo on a trajectory", photo, timed))
     row = timed[photo]
     adjusted = {id(each.given): (each.position, each.attitude) for each in unknowns}
     index = block.photo_ids.index(photo)
@@ -265,17 +247,7 @@ def adjusted_trajectories(
 def restarted_motion(
     block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
 ) -> Block:
-    """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given.
-
-    Parameters
-    ----------
-    block
-        The block that was adjusted.
-    adjusted
-        All its trajectories.
-    turns
-        By their names what tables take over (:meth:`AdjustedTrajectory.restarted`).
-    """
+    """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given."""
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the value that its unknown was given.

@@ -36,49 +36,31 @@ _NUMBERS = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class AdjustedUnknown:
-    """An unknown of several observations after the adjustment, with k components. Arrays cannot be written.
-
-    Attributes
-    ----------
-    given
-        The unknown as it was given.
-    components, units
-        (k,) names and units: the linear unit, the linear unit a second, radians, radians a second, seconds,
-        or nothing.
-    change
-        (k,) adjusted minus given; of rotations the rotation vector r about the axes that are given,
-        R = R0 Exp(r).
-    position
-        (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor, a coefficient of a trajectory, a
-        gyroscope's bias, (d, 0, 0) of a clock, (T, 0, 0) of a readout time or a factor of line rates; of
-        levels, planes and lines a place on them.
-    attitude
-        (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal).
-    cofactors
-        (k, k) for a priori unit weight, of rotations about the adjusted axes and a line's place along these;
-        zero for held ones, NaN without covariances.
-    covariance
-        (k, k) cofactors times the variance of unit weight.
-    with_former
-        (k, j) cofactors with the unknown before it where both are adjusted as one: the size of a film with
-        its placement; j is 0 of all others.
-    redundancy
-        (k,) redundancy numbers of weighted components as observations; 0 unless weighted.
-    observations
-        How many observations, and images of photos on frames or trajectories, are of it.
-    """
+    """An adjusted unknown of several observations with k components. Arrays cannot be written."""
 
     given: Unknown
+    # (k,) names and units: the linear unit, the linear unit a second, radians, radians a
+    # second, seconds, or nothing
     components: tuple[str, ...]
     units: tuple[str, ...]
+    # (k,) adjusted minus given; of rotations the rotation vector r about the given axes, R = R0
+    # Exp(r)
     change: Floats
+    # (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor, a coefficient of a trajectory, a
+    # gyroscope's bias, (d, 0, 0) of a clock, (T, 0, 0) of a readout time or a factor of line rates; of
+    # levels, planes and lines a place on them
     position: Floats
+    # (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal)
     attitude: Floats
+    # (k, k) for a priori unit weight, of rotations about the adjusted axes and a line's place along these;
+    # zero for held ones, NaN without covariances
     cofactors: Floats
-    covariance: Floats
+    covariance: Floats  # (k, k) cofactors times the variance of unit weight
+    # (k, j) cofactors with the unknown before it where both are adjusted as one: the size of a film with its
+    # placement; j is 0 of all others
     with_former: Floats
-    redundancy: Floats
-    observations: int
+    redundancy: Floats  # (k,) redundancy numbers of weighted components as observations; 0 unless weighted
+    observations: int  # How many observations, and images of photos on frames or trajectories, are of it
 
     def __post_init__(self) -> None:
         # There may be as many as four times the photos: their fields are not looked for in each.

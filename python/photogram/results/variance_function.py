@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Bin", "VarianceFunction"]
 
-OUTSIDE = 0.025
-"""On each side of an interval."""
+OUTSIDE = 0.025  # Probability on each side of an interval
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from photogram.results.axes import Determined
 from photogram.results.network import AdjustedNetwork
 
 WORST = 10
-NEAR = 1e-3
-"""Distance from a station, in the median of such distances, below which a point stands first."""
+NEAR = 1e-3  # Points closer to a station, as a part of the median distance, are listed first
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class WeakestPoint:
     point: str  # Its name
     # The largest of its standard deviations over the smallest, in any directions: the root of the ratio
     # of the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
-    # parallel ones 10,000 and more. 1 where a component is held
+    # parallel ones 10,000 and more. 1 if a component is held
     ratio: float
     # From the nearest station that sees it, in the median of these distances; NaN where scanners alone
     # do

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-ARCSEC = math.pi / 648000.0
-"""One second of arc in radians."""
+ARCSEC = math.pi / 648000.0  # One second of arc in radians
 
 
 def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, float]:

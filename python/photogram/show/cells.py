@@ -28,8 +28,7 @@ _SIGNS = {
 }
 _MOST_OF_DEGREES = 9
 
-Written = Cell | str | float | None
-"""What stands in a cell."""
+Written = Cell | str | float | None  # Content of a cell
 
 
 def unit_written(unit: str) -> str:
@@ -59,7 +58,6 @@ def written(part: Any) -> Any:
 
 
 def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Written]]]:
-    """Return the columns of a quantity with their cells."""
     if each.of is not None and each.kind == "name":
         mixed = _mixed(each)
         names = [

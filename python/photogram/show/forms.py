@@ -63,7 +63,6 @@ def titled_lines(document: Document, *keys: str) -> list[tuple[str, list[str]]]:
 
 
 def _judged(document: Document) -> list[tuple[str, list[str]]]:
-    """Return the sentences of verdict and advice below their titles."""
     titled: list[tuple[str, list[object]]] = [
         (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
         for judgement in document.judgements
@@ -89,7 +88,6 @@ def _sentence(message: object) -> str:
 
 
 def _section_lines(section: Section) -> list[str]:
-    """Return the introduction and the parts of a section, with an empty line between them."""
     parts = [lines for part in section.visible if (lines := part_lines(part, section.title))]
     if not parts:
         return []

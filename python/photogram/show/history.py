@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from photogram.statistics.history import History, Series
     from photogram.statistics.verdict import Verdict
 
-ACROSS = 3
-"""Charts beside each other."""
+ACROSS = 3  # Charts beside each other
 
 
 def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
@@ -33,9 +32,6 @@ def history_part(history: History, whose: str, about: str = "", **members: objec
     return Document(
         what="",
         title=whose,
-        judgements=[],
-        advice=[],
-        highlights=[],
         sections=[Section.of(series(history, about)), Section.of(values(history))],
         members={
             **members,

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-LONG = 16
-"""Characters of a word that a table may break; shorter ones give the least width of their column."""
+LONG = 16  # Characters; longer words may be broken
 
 
 def page_html(page: Document) -> bytes:
@@ -112,7 +111,6 @@ def _content(column: Column, cell: Cell, known: set[str]) -> Markup:
 
 
 def _drawn(section: Section) -> Section:
-    """Return a section with its pictures drawn, without those that have nothing to show."""
     parts: list[Part] = []
     for part in section.visible:
         if isinstance(part, Drawing):

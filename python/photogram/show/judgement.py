@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table, Tone, probability_written
+import numpy as np
+
+from photogram.show.page import Judgement, Remarks, Section, Tone
+from photogram.show.quantity import Quantity, Table
+from photogram.words import Words, words_of
 
 if TYPE_CHECKING:
     from photogram.statistics.verdict import Verdict
@@ -16,7 +20,6 @@ MARKS: dict[Tone, str] = {
     "": "Not tested as a whole",
     "bad": "Not to be used as it is",
 }
-"""What stands above a verdict: colours alone say nothing."""
 
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
@@ -30,37 +33,25 @@ def judged(verdict: Verdict, on: str = "") -> Judgement:
     return Judgement(mark, verdict.headline, tuple(map(str, verdict.lines)), tone, on)
 
 
-def verdict_table(verdict: Verdict) -> Table:
-    """Return all tests of a verdict."""
-    note = (
-        "p is the probability of a value as far out where nothing is wrong. A test rejects where it is"
-        " below its"
-        " level. Of every kind of observation the least probable one stands here."
-    )
-    return Table.of(
-        "Tests",
-        verdict.tests,
-        [
-            (Column("Test", text=True), lambda test: test.name[:1].upper() + test.name[1:]),
-            (Column("Statistic", text=True), lambda test: signs_of(test.statistic)),
-            (Column("Value"), lambda test: test.value),
-            (Column("At least"), lambda test: test.limits[0]),
-            (Column("At most"), lambda test: test.limits[1]),
-            (Column("p", figures=2), lambda test: Cell(probability_written(test.p), sorts=test.p)),
-            (Column("Level", figures=2), lambda test: test.level),
-            (Column("Tests that share it", decimals=0), lambda test: test.tests),
-            (
-                Column("Outcome", text=True),
-                lambda test: Cell("passes") if test.accepted else Cell("rejects", tone="look"),
-            ),
-        ],
-        note,
-    )
-
-
-def signs_of(statistic: str) -> str:
-    """Return a statistic of a test in the signs of a page."""
-    return _STATISTICS.get(statistic, statistic)
+def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
+    """Return all tests of a verdict, in English or with the words of another language."""
+    words, tests = words or words_of("en"), verdict.tests
+    names = [f"{words.text(each.kind, '^')}: {words.text(each.subject)}".removesuffix(": ") for each in tests]
+    outcomes = [words("test.passes" if each.accepted else "test.rejects") for each in tests]
+    p, level = (np.array([getattr(each, name) for each in tests]) for name in ("p", "level"))
+    columns: list[tuple[str, Any, dict[str, Any]]] = [
+        ("test", names, {"kind": "name"}),
+        ("statistic", [_STATISTICS.get(each.statistic, each.statistic) for each in tests], {"kind": "name"}),
+        ("value", [each.value for each in tests], {"figures": 4}),
+        ("low", [each.limits[0] for each in tests], {"figures": 4}),
+        ("high", [each.limits[1] for each in tests], {"figures": 4}),
+        ("p", p, {"kind": "probability"}),
+        ("level", level, {"kind": "probability"}),
+        ("tests", [each.tests for each in tests], {"decimals": 0}),
+        ("outcome", outcomes, {"kind": "name", "marked": np.array([not each.accepted for each in tests])}),
+    ]
+    quantities = [Quantity(values, head=words(f"column.{key}"), **more) for key, values, more in columns]
+    return Table("tests", words("table.tests"), quantities, words("table.tests.note"))
 
 
 def tests_section(verdict: Verdict) -> Section:

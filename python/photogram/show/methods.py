@@ -25,7 +25,6 @@ class Judged:
         return verdict(self._findings())
 
     def _findings(self) -> Findings:
-        """Return what the verdict rests on."""
         raise NotImplementedError
 
 

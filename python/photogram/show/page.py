@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,15 +22,11 @@ if TYPE_CHECKING:
 
     from photogram.show.sketch.plot import Plot
 
-T = TypeVar("T")
-
 Tone = Literal["", "good", "look", "bad"]
 """How a thing is to be taken: no colour stands without words that say the same."""
 
-MOST_DECIMALS = 12
-"""Of a fixed-point column."""
-LEAST_PROBABILITY = 1e-99
-"""Smaller probabilities are not told apart."""
+MOST_DECIMALS = 12  # Of a fixed-point column
+LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
 @dataclass(frozen=True)
@@ -44,8 +40,7 @@ class Cell:
     sorts: float | None = None  # Sort key of a text
 
 
-Row = Sequence[Cell | str | float | None]
-"""Cells of a table."""
+Row = Sequence[Cell | str | float | None]  # Cells of a table
 
 
 @dataclass(frozen=True)
@@ -86,18 +81,6 @@ class Table:
     rows: Sequence[Row]
     note: str = ""
     kind: str = field(default="table", init=False)
-
-    @classmethod
-    def of(
-        cls,
-        caption: str,
-        things: Iterable[T],
-        columns: Sequence[tuple[Column, Callable[[T], Cell | str | float | None]]],
-        note: str = "",
-    ) -> Table:
-        """Return a table with a row for each thing: its columns, and what stands in each of a thing."""
-        rows = [[told(each) for _, told in columns] for each in things]
-        return cls(caption, [column for column, _ in columns], rows, note)
 
     def cells(self) -> Iterable[list[tuple[Column, Cell]]]:
         """Return the rows as cells with their columns."""
@@ -228,10 +211,10 @@ class Document:
     # Kind of the document, and title of the job
     what: str
     title: str
-    judgements: Sequence[Judgement]  # One for each adjusted thing
-    advice: Sequence[Phrase | str]  # Next steps
-    highlights: Sequence[Fact]  # Key figures
-    sections: Sequence[Section]
+    judgements: Sequence[Judgement] = ()  # One for each adjusted thing
+    advice: Sequence[Phrase | str] = ()  # Next steps
+    highlights: Sequence[Fact] = ()  # Key figures
+    sections: Sequence[Section] = ()
     members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON besides tables
     details: Sequence[Section] = ()  # Sections that pages omit
     phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine
@@ -265,6 +248,11 @@ class Document:
     def table(self, key: str) -> quantity.Table:
         """Return the table with a key, the first of several layers."""
         return next(table for table in self.tables(layers=True) if table.key == key)
+
+
+def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:
+    """Return several tables as layers, a single table as it is."""
+    return [Layers(f"{name}-layers", tables)] if len(tables) > 1 else tables
 
 
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:

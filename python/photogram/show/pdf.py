@@ -25,19 +25,13 @@ from photogram.words import Phrase
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts that the library contains; for other letters it searches the fonts of the machine."""
 
-LONGEST = 30
-"""Longest word that is not broken, characters."""
+LONGEST = 30  # Longest word that is not broken, characters
 
 
 def page_pdf(page: Document, *, author: str = "") -> bytes:
     """Return a document as PDF: tagged, with bookmarks, page numbers and embedded fonts.
 
-    Parameters
-    ----------
-    page : Document
-        The document.
-    author : str, optional
-        Author in the properties of the file.
+    `author` is a property of the file.
     """
     titled = replace(page, title=page.title or page.what, members={}, phases={})
     footer = f"{page.what} – {page.title}" if page.title else page.what
@@ -79,7 +73,6 @@ def _record(part: Any) -> Any:
 
 
 def _column(column: Column, texts: list[str]) -> dict[str, object]:
-    """Return the head of a column, and the text and the word from which its width follows."""
     words = [word for text in texts for word in text.split()] if column.text else texts
     size = partial(width, size=1.0)
     return {

@@ -116,8 +116,7 @@ class Quantity:
         return values
 
 
-Quantities = Sequence[Quantity]
-"""Quantities of the same things."""
+Quantities = Sequence[Quantity]  # Quantities of the same things
 
 
 @dataclass(frozen=True, eq=False)

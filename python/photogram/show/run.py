@@ -14,8 +14,7 @@ from photogram.messages import printable
 from photogram.show.page import Column, Fact, Facts, Part, Section, Table
 
 PIECE = 1 << 20
-LISTED = 200
-"""Input files that are listed at most."""
+LISTED = 200  # Listed input files
 
 
 @dataclass(frozen=True)
@@ -29,27 +28,13 @@ class InputFile:
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a command.
+    """A run of a command."""
 
-    Attributes
-    ----------
-    command
-        What was asked for, with the options that were given.
-    options
-        All options with their values, by name.
-    inputs
-        The files that were read.
-    began
-        When.
-    seconds
-        How long it took up to the report.
-    """
-
-    command: str
-    options: Mapping[str, str]
-    inputs: Sequence[InputFile]
+    command: str  # With its options
+    options: Mapping[str, str]  # All options with their values
+    inputs: Sequence[InputFile]  # The files that were read
     began: datetime
-    seconds: float
+    seconds: float  # Up to the report
     others: int = field(default=0)
     """Files that were read and are not among `inputs`."""
 

@@ -19,14 +19,12 @@ GREEN = "#009e73"
 PURPLE = "#cc79a7"
 ORANGE = "#e69f00"
 SKY = "#56b4e9"
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-"""Of kinds, in the order in which they are taken."""
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)  # Of kinds, in this order
 INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
 SOFT = "#5c5c5c"
 """Of letters that are not to stand out: 6.7 to 1 on white; FAINT, of lines, has 3.4."""
 """What is drawn as it is, what a reader should look at, and what only helps."""
-ORDERED = "cividis"
-"""Colour map of values from small to large."""
+ORDERED = "cividis"  # Colour map of values from small to large
 
 SETTINGS: dict[str, Any] = {
     "font.size": 9.0,

@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence, Sized
 from dataclasses import fields
 from textwrap import wrap
 
-Rows = list[tuple[str, str]]
-"""What is told, and the telling, each in a line."""
+Rows = list[tuple[str, str]]  # Names and texts
 
-WIDEST = 110
-"""Characters of a line at most."""
-MOST = 20
-"""Lines at most, so that all is seen on one screen."""
-WHOLE = "verdict"
-"""What is never cut."""
-NAMED = 6
-"""Names that are listed of many."""
+WIDEST = 110  # Characters of a line
+MOST = 20  # Lines of a `repr`
+WHOLE = "verdict"  # This row is never truncated
+NAMED = 6  # Of a list
 
 
 class Brief:
@@ -47,7 +42,6 @@ class Brief:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """Return what notebooks show."""
         from html import escape
 
         title, rows = self._lines()

@@ -22,8 +22,7 @@ from photogram.words import Phrase
 
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none: known without error, and held."""
-BORDER = 2.0 / SINGULAR
-"""More than T can be where C is not singular, over the squares of scaled differences."""
+BORDER = 2.0 / SINGULAR  # Exceeds T over the squares of scaled differences if C is regular
 
 
 def agreement(

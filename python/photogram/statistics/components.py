@@ -31,24 +31,17 @@ from photogram.words import Phrase
 
 __all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
 
-LEAST_REDUNDANCY = 5.0
-"""Of a group whose variance is estimated."""
-LEAST_SHARE = 0.01
-"""Of its redundancy in the number of its observations."""
-REFUSED = 1.0
-"""A redundancy below which nothing can be said of a variance."""
+LEAST_REDUNDANCY = 5.0  # Smallest redundancy of a group with an estimated variance
+LEAST_SHARE = 0.01  # Smallest ratio of its redundancy and its number of observations
+REFUSED = 1.0  # Smallest redundancy for any estimate of a variance
 MOST_CONDITION = 100.0
 """Of the Helmert matrix, scaled to unit diagonal: beyond it components cannot be told apart."""
-LIMIT_OF_STEP = 10.0
-"""By which a step changes a factor at the most, up or down."""
-LOWER_BOUND = 0.01
-"""Of a component, in the given variance."""
-BY_HELMERT = 5
-"""Every so many steps one is Helmert's, where it is positive: Foerstner's converge linearly."""
+LIMIT_OF_STEP = 10.0  # Largest ratio of factors in a step
+LOWER_BOUND = 0.01  # Smallest component, as a part of the given variance
+BY_HELMERT = 5  # Interval of Helmert steps, since Foerstner's converge linearly
 WORTH_CHANGING = (0.64, 1.56)
 """Components within these limits (standard deviations wrong by less than 25 percent) change nothing."""
-NODES = 4
-"""Of the integral that the likelihood ratio is."""
+NODES = 4  # Nodes of the integral of the likelihood ratio
 
 
 class Weighted(Protocol):
@@ -140,7 +133,7 @@ class Estimate:
 
     @property
     def reference(self) -> float:
-        """The component of all image coordinates together; 1 where there are none."""
+        """The component of all image coordinates together; 1 if there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
         weights = [each.redundancy for each in own]
         return float(np.average([each.factor for each in own], weights=weights)) if own else 1.0
@@ -305,7 +298,7 @@ class _Run:
         self.state = self.adjust(self.factors)
 
     def iterate(self) -> bool:
-        """Go on until nothing changes; False where a component had to be held on the way."""
+        """Go on until nothing changes; False if a component had to be held on the way."""
         while True:
             free = self.free
             squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)

@@ -100,7 +100,7 @@ def log_chi_square(x: ArrayLike, dof: ArrayLike) -> NDArray[np.float64]:
 
     Returns
     -------
-    Natural logarithms, finite also where the probability is no number; NaN where there is no degree of
+    Natural logarithms, finite also where the probability is no number; NaN if there is no degree of
     freedom, or a value is negative or NaN.
     """
     both = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(dof, dtype=np.float64))
@@ -130,11 +130,11 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
         Degrees of freedom of the tested group.
     dof
         f of the adjustment where the unit weight is estimated from it: the test is F with `dimension` and
-        f - `dimension`. Infinite where the unit weight is known.
+        f - `dimension`. Infinite if the unit weight is known.
 
     Returns
     -------
-    17.0746 for Baarda's choice, the default; infinite where f is no more than the dimension.
+    17.0746 for Baarda's choice, the default; infinite if f is no more than the dimension.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def benjamini_hochberg(
     Parameters
     ----------
     probabilities
-        (n,) p-values; NaN where nothing is tested.
+        (n,) p-values; NaN if nothing is tested.
     level
         False discovery rate.
     dependent

@@ -43,8 +43,7 @@ __all__ = [
     "upper_order",
 ]
 
-INDEFINITE = 1e-9
-"""Of the largest variance: a more negative one, or a larger asymmetry, is no rounding error."""
+INDEFINITE = 1e-9  # Largest negative variance or asymmetry by rounding, as a part of the largest variance
 
 
 def linear_error(sd: ArrayLike, probability: float) -> Floats:
@@ -79,11 +78,11 @@ def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLik
     probability
         Between 0 and 1.
     offsets
-        (n, 2) means of the errors; zero where it is not given.
+        (n, 2) means of the errors; zero if it is not given.
 
     Returns
     -------
-    (n,) in the unit of the standard deviations; NaN where a covariance or an offset is.
+    (n,) in the unit of the standard deviations; NaN if a covariance or an offset is.
 
     Raises
     ------
@@ -251,18 +250,14 @@ def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> 
     return sds, np.einsum("nij,ni->nj", vectors[:, :, ::-1], means)
 
 
-REACH = 8.6
-"""In standard deviations: what lies beyond is less than the rounding of 1, in the plane, too."""
-CENTRED_NODES = 24
-"""Of an integral over no more than `REACH` standard deviations: right to 1e-12."""
-NODES = 40
-"""Of one over twice as many."""
+REACH = 8.6  # In standard deviations; the probability beyond is less than the rounding of 1
+CENTRED_NODES = 24  # For an integral over at most `REACH` standard deviations, accurate to 1e-12
+NODES = 40  # For an integral over twice as many
 LEAST_RATIO = 1e-7
 """Of an axis to the largest. One without error counts as that long: from a probability of 0.01 no radius
 changes by 1e-10 of it."""
 STEPS = 100
-CONVERGED = 1e-11
-"""Of a radius: a smaller step is the last one, and leaves much less."""
+CONVERGED = 1e-11  # Largest relative size of the last step of a radius
 
 
 def _radii(sds: Floats, means: Floats, probability: float) -> Floats:
@@ -373,7 +368,7 @@ def _rule(count: int) -> tuple[Floats, Floats]:
 
 
 def _leg(hypotenuse: Floats, other: Floats) -> Floats:
-    """Return the other leg of right triangles; 0 where there is none."""
+    """Return the other leg of right triangles; 0 if there is none."""
     return np.asarray(np.sqrt(np.maximum((hypotenuse - other) * (hypotenuse + other), 0.0)))
 
 

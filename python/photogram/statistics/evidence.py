@@ -21,23 +21,18 @@ from photogram.statistics.findings import Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
-FEW = 5
-"""With fewer degrees of freedom only gross disagreement can be seen."""
+FEW = 5  # With fewer degrees of freedom tests detect large disagreement only
 
-ENOUGH = 20
-"""Tested observations that the median of their test values needs."""
+ENOUGH = 20  # Smallest number of test values for a median
 
 EXPLAINED, SINGLE = 0.8, 0.2
 """Of what residuals are too large by: what a lens explains at least, and one observation at most."""
 
-WITHHELD = 0.001
-"""Level of check points below which a result is withheld: one good block in a thousand."""
+WITHHELD = 0.001  # Significance level of check points that forbid the use
 
-MEDIAN = 0.6744897501960817
-"""Of the absolute value of a standard normal variable."""
+MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
-GLOBAL = Phrase("test.global")
-"""The kind of the test of all residuals together."""
+GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
 """Logarithm of the probability, kind, and place of an observation whose test rejects."""
@@ -53,7 +48,7 @@ class Test:
     distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
-    # What it may be at least and at most; None where there is no such side
+    # What it may be at least and at most; None if there is no such side
     limits: tuple[float | None, float | None]
     # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
     p: float
@@ -249,7 +244,7 @@ class Evidence:
 
     @cached_property
     def factor(self) -> float:
-        """By how much residuals are larger than expected; NaN where that is not known."""
+        """By how much residuals are larger than expected; NaN if that is not known."""
         return self.test.factor if self.test is not None else math.nan
 
     def interval(self) -> Phrase:
@@ -391,7 +386,7 @@ def _log10(p: float) -> float:
 
 
 def _largest(tested: Tested, level: float, number: int) -> Test | None:
-    """Return the test of the kind with the least probability; None where nothing is tested."""
+    """Return the test of the kind with the least probability; None if nothing is tested."""
     place = tested.largest()
     return None if place is None else _test_at(tested, place, level, number)
 

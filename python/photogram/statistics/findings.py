@@ -28,7 +28,7 @@ class Tested:
     """Tests of the observations of one type: of single components, or of groups that may err together."""
 
     kind: Text  # What they are, in the plural
-    values: Floats  # Test values in any shape; NaN where nothing is tested
+    values: Floats  # Test values in any shape; NaN if nothing is tested
     name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
     # `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with `dimension`)
     # or `F` (`dimension` and `second`)
@@ -147,7 +147,7 @@ class Systematic:
     probability: float  # p-value
     level: float
     # Whether the pattern is large enough to matter: with a small probability the model is likely wrong
-    large: bool
+    large: bool = False
     # By how much the weighted sum of squares would fall without it, where that was asked for
     fall: float = 0.0
     subject: Text = ""

@@ -85,7 +85,5 @@ class Fit:
         return left.T @ self.whitened / squares, 1 / np.sqrt(squares)
 
 
-BLIND = 1e-8
-"""A column that the others explain up to this part of its length cannot be tested."""
-UNCHECKED = 1e-10
-"""Share of its weight that the others leave an observation, below which nothing checks it."""
+BLIND = 1e-8  # Smallest part of a column that is independent of the others
+UNCHECKED = 1e-10  # Smallest redundancy number of a checked observation

@@ -37,7 +37,7 @@ def effective_freedom(covariance: ArrayLike) -> float:
 
     Returns
     -------
-    Between 1 and m; NaN where there is no error, or one is not known.
+    Between 1 and m; NaN if there is no error, or one is not known.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
 
     Returns
     -------
-    Lower and upper end in the same unit; NaN where the degrees of freedom are.
+    Lower and upper end in the same unit; NaN if the degrees of freedom are.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
 
     Returns
     -------
-    Infinite where nothing was estimated.
+    Infinite if nothing was estimated.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
 
     Returns
     -------
-    Infinite where nothing was estimated.
+    Infinite if nothing was estimated.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
     probability
         Of the interval: 0.95 gives 1.96 where u is known.
     freedom
-        Degrees of freedom of u, infinite where it is known.
+        Degrees of freedom of u, infinite if it is known.
     truncated
         Whether they are truncated to a whole number first, as the GUM does.
 

@@ -36,14 +36,14 @@ class GroupTests:
     Attributes
     ----------
     dimension
-        (n,) m', the number of directions in which an error shows; 0 where nothing is tested.
+        (n,) m', the number of directions in which an error shows; 0 if nothing is tested.
     statistic
         (n,) T; 0 without a direction.
     fisher
-        (n,) F; NaN where the unit weight is known, or f is no more than m'.
+        (n,) F; NaN if the unit weight is known, or f is no more than m'.
     log_probability
         (n,) logarithms of the probability that a good group has a value as large, by the test that decides:
-        chi-square with a known unit weight, else F. NaN where nothing is tested.
+        chi-square with a known unit weight, else F. NaN if nothing is tested.
     error
         (n, m) estimated errors in standard deviations.
     cofactors
@@ -98,7 +98,7 @@ def group_tests(
     blocks
         (n, m, m) blocks of R = I - A Q A', rows divided by standard deviations.
     residuals
-        (n, m) observed minus computed over standard deviation; NaN where a group has no such row.
+        (n, m) observed minus computed over standard deviation; NaN if a group has no such row.
     weighted_sum_of_squares, degrees_of_freedom
         Omega and f of the adjustment, of all or of each group (n,); not needed where the unit weight is
         known.

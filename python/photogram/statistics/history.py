@@ -35,10 +35,8 @@ from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase, phrase
 
-YEAR = 365.2425
-"""Days."""
-MOST = 3
-"""Changes of one quantity that are told apart."""
+YEAR = 365.2425  # days
+MOST = 3  # Largest number of changes of one quantity
 
 
 @dataclass(frozen=True)
@@ -70,31 +68,21 @@ class Series:
     off_sd: Floats
     drift: float  # per unit of time; NaN if all times are equal
     drift_sd: float
-    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN where there is none
+    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN if there is none
     test: GlobalTest | None  # Chi-square of the residuals about the mean
     changes: tuple[Change, ...]  # accepted changes, the most certain first
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Values on several occasions, compared.
+    """Values on several occasions, compared."""
 
-    Attributes
-    ----------
-    occasions, times
-        What the occasions are called, and when they were (in the unit of time).
-    series
-        The quantities.
-    constancy
-        Test of all together, with all covariances: nothing changes.
-    tests, level, limit
-        Number of single tests, level of all together, and the |t| that is accepted.
-    """
-
+    # Names of the occasions, and their times in the unit of time
     occasions: tuple[str, ...]
     times: Floats
-    series: tuple[Series, ...]
-    constancy: GlobalTest
+    series: tuple[Series, ...]  # The quantities
+    constancy: GlobalTest  # Test of all together, with all covariances: nothing changes
+    # Number of single tests, their level together, and the largest accepted |t|
     tests: int
     level: float
     limit: float
@@ -124,7 +112,6 @@ class History:
             value=test.variance,
             probability=test.probability_above,
             level=self.level,
-            large=False,
         )
 
 
@@ -192,28 +179,10 @@ def history(
 ) -> History:
     """Compare values that were determined on several occasions: constancy, drift, steps, single ones.
 
-    Parameters
-    ----------
-    values
-        (k, m) of m quantities on k occasions, in the order of time.
-    covariance
-        (k, m, m) of each occasion, or (k, m, k, m) of all where they have something in common.
-    times
-        (k,) that do not fall; None: 0, 1, 2 ...
-    occasions, names, units, unit_of_time
-        What occasions and quantities are called in sentences, units of quantities and of times.
-    regressors
-        Other causes by name: (k,) values and their unit.
-    freedom
-        Degrees of freedom from which the covariance was estimated; infinite where it is known.
-    level
-        Probability that anything is found where nothing changes: of the test of constancy, and of all single
-        tests together.
-
-    Raises
-    ------
-    InputError
-        Fewer than two occasions, shapes that do not fit, times that fall, a covariance that is none.
+    `values` (k, m) are m quantities on k occasions in ascending order of `times`. `covariance` is that of one
+    occasion (k, m, m), or of all values (k, m, k, m), estimated with `freedom` degrees of freedom.
+    `regressors` are other causes by name: (k,) values and their unit. `level` is the probability of a false
+    alarm of the test of constancy, and of all single tests together.
     """
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
@@ -276,7 +245,7 @@ def _hypotheses(
         if k > 2 and np.ptp(u) > 0:
             found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
     if not found:
-        raise InputError(phrase("history.one-time"))
+        raise InputError(phrase("history.equal-times"))
     return _Hypotheses(
         np.column_stack([column for column, _, _ in found]),
         tuple(kind for _, kind, _ in found),

@@ -8,6 +8,14 @@ degrees of freedom. With an unknown unit weight the logarithm of the likelihood 
 A mistake is made out by trying it and improving much: Omega_h passes its global test or is 25 times smaller
 than Omega_0, Lambda exceeds 2 ln(n / 1e-4) for n hypotheses tried, and the next best is behind by 10. A
 parameter that is fitted besides costs ln f.
+
+With chi-square of two named things, and with their names exchanged, in a variance s^2 of unit weight, names
+are exchanged if
+
+    named - exchanged > 2 s^2 ln(k / 0.0001),    exchanged < u s^2 chi2(0.999; m)
+
+for k examined pairs and m degrees of freedom; u is the uncertainty of the compared values beyond their
+covariances.
 """
 
 from __future__ import annotations
@@ -17,18 +25,15 @@ import sys
 from collections.abc import Sequence
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.limits import global_test
 
-IMPROVEMENT = 25.0
-"""The sum of squares must fall by this factor, residuals to a fifth."""
-CHANCE = 1e-4
-"""Probability that any of the hypotheses tried is accepted by chance, about."""
-RIVAL = 10.0
-"""And all others must be less likely by this difference of Lambda."""
-PASSES = 0.01
-"""Level of the global test that a hypothesis passes, on both sides."""
-TESTED = 4.0
-"""Degrees of freedom from which a hypothesis can be accepted and not only be possible."""
+IMPROVEMENT = 25.0  # Required ratio of the sums of squares
+CHANCE = 1e-4  # Probability of an accepted wrong hypothesis, approximately
+RIVAL = 10.0  # Required difference of Lambda to all other hypotheses
+PASSES = 0.01  # Significance level of the global test of a hypothesis
+EXCHANGE_LEVEL = 0.001  # Significance level of exchanged names
+TESTED = 4.0  # Smallest degrees of freedom of an accepted hypothesis
 
 
 @dataclass(frozen=True)
@@ -68,17 +73,17 @@ def judged(
     given
         Omega of the data as given, positive.
     changed
-        Omega of each hypothesis, positive; infinite where it cannot be fitted.
+        Omega of each hypothesis, positive; infinite if it cannot be fitted.
     degrees_of_freedom
         f.
     parameters
-        How many parameters each fits besides; one more must gain ln f. None where they fit none.
+        How many parameters each fits besides; one more must gain ln f. None if they fit none.
     known_weight
         Whether Omega has the unit weight of given standard deviations, so that it can pass its global test.
 
     Returns
     -------
-    None where no hypothesis improves as much as a mistake would.
+    None if no hypothesis improves as much as a mistake would.
     """
     f = degrees_of_freedom
     counts = [0] * len(changed) if parameters is None else parameters
@@ -99,3 +104,19 @@ def judged(
     equal = tuple(each for each in order if ratios[first] - ratios[each] <= RIVAL)
     fall = math.sqrt(given / max(least, sys.float_info.min))
     return Judged(equal, ratios[first], fall, f >= TESTED and ratios[first] > bound)
+
+
+def are_exchanged(
+    named: float,
+    exchanged: float,
+    dimension: int,
+    *,
+    pairs: int,
+    variance: float = 1.0,
+    uncertain: float = 1.0,
+) -> bool:
+    """Return whether two things are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
+    if not (math.isfinite(exchanged) and dimension > 0):
+        return False
+    fits = exchanged < uncertain * variance * critical_chi_square(EXCHANGE_LEVEL, dimension)
+    return fits and named - exchanged > 2 * variance * math.log(pairs / CHANCE)

@@ -30,6 +30,7 @@ from photogram.statistics.distributions import (
     log_chi_square,
     log_fisher,
 )
+from photogram.words import phrase
 
 NOTABLE_FACTOR = 1.25
 """With many degrees of freedom the test finds disagreements that harm nobody: residuals larger than the
@@ -51,7 +52,7 @@ class GlobalTest:
     probability_below, probability_above
         Of a sum as small as this, and of one as large, where the standard deviations are right.
     reference_dof
-        Degrees of freedom of the unit weight that it is compared with; infinite where that is known. The test
+        Degrees of freedom of the unit weight that it is compared with; infinite if that is known. The test
         is then chi-square, else F.
     """
 
@@ -106,14 +107,11 @@ class GlobalTest:
         return (float(log_p) + math.log(2)) / math.log(10)
 
     def problem(self) -> str | None:
-        """Return a sentence for the report when residuals are too large by a factor that matters."""
+        """Return a sentence for the report if residuals are too large by a factor that matters."""
         if not self.rejected_high or self.factor <= NOTABLE_FACTOR:
             return None
-        return (
-            f"the global test fails: residuals are {self.factor:.3g} times larger than their standard"
-            f" deviations allow (variance of unit weight {self.variance:.4g},"
-            f" expected {self.limits[0]:.3g} to {self.limits[1]:.3g}; level {100 * self.level:g} percent)"
-        )
+        limits = {"low": self.limits[0], "high": self.limits[1], "level": 100 * self.level}
+        return str(phrase("problem.global-test", factor=self.factor, variance=self.variance, **limits))
 
 
 def global_test(
@@ -175,7 +173,7 @@ def externally_studentized(
     Returns
     -------
     t of the same shape: Student with f - 1 degrees of freedom. Unbounded: where an observation makes up all
-    of Omega, it is very large. NaN where w is, and everywhere with less than two degrees of freedom.
+    of Omega, it is very large. NaN if w is, and everywhere with less than two degrees of freedom.
     """
     w = np.asarray(standardized, dtype=np.float64)
     omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)

@@ -16,23 +16,17 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-MOST = 20_000
-"""Values whose distribution is looked at; of more every so many-th."""
+MOST = 20_000  # Largest number of values in the test of normality
 
-BINS = 5
-"""Of the frame in each direction."""
+BINS = 5  # Bins of the frame in each direction
 
-FULL = 10.0
-"""Redundancy that a bin of the frame needs."""
+FULL = 10.0  # Smallest redundancy of a bin
 
-SINGULAR = 1e-6
-"""Determinant, in the product of the diagonal, below which a matrix may be singular."""
+SINGULAR = 1e-6  # Smallest determinant of a regular matrix, as a part of the product of its diagonal
 
-SPEAKING = 1e-3
-"""Standardized residuals that are all smaller belong to weights of nothing, and say nothing."""
+SPEAKING = 1e-3  # Smallest maximum of standardized residuals that are tested
 
-CELLS = 10
-"""Of the frame in each direction: images in one cell are neighbours."""
+CELLS = 10  # Cells of the frame in each direction; images in one cell are neighbours
 
 
 @dataclass(frozen=True)
@@ -143,8 +137,7 @@ def _summed(groups: Indices, values: Floats) -> Floats:
     return np.stack([np.bincount(groups, weights=column, minlength=BINS**2) for column in values.T], axis=1)
 
 
-_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Elements of a symmetric matrix."""
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # Upper triangle of a symmetric matrix
 
 
 def group_patterns(
@@ -230,7 +223,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
 
     summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
     since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
-    0 without a pattern; NaN where nothing has a neighbour.
+    0 without a pattern; NaN if nothing has a neighbour.
     """
     if not len(xy):
         return math.nan

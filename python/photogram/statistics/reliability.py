@@ -39,8 +39,7 @@ TESTABLE = 0.01
 """With less redundancy a gross error hides in the unknowns, and the test value repeats that of another
 observation."""
 
-ROUNDING = 1e-10
-"""Redundancy numbers below this are rounding errors of zero."""
+ROUNDING = 1e-10  # Redundancy numbers below this are rounding errors of zero
 
 
 def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:

@@ -23,10 +23,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 
-LEAST = 1e-6
-"""A redundancy number below this takes no part."""
-CLOSE = 0.01
-"""Steps end when no coefficient moves by more than this part of its standard deviation."""
+LEAST = 1e-6  # Smallest redundancy number of a coordinate that takes part
+CLOSE = 0.01  # Largest change of a coefficient in the last step, in standard deviations
 
 
 class Residuals(Protocol):

@@ -11,9 +11,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
-from photogram.statistics.findings import Findings, Text
+from photogram.statistics.findings import Findings, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
@@ -24,59 +27,34 @@ WRONG_ALIKE = 1.5
 """Where the median is larger than expected by more, and the mean square by no more than this beside it, all
 residuals are too large, not a few."""
 
-MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3
-"""Shares of images and of control without which a network may be used."""
+MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3  # Largest shares of removed images and control
 
-_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
-"""Exit codes, the worst last."""
+_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)  # Exit codes, the worst last
 
-LARGEST_FACTOR = 3.0
-"""Standard deviations wrong by more than this are no matter of weights."""
+LARGEST_FACTOR = 3.0  # Largest factor of standard deviations that weights explain
 
-_LISTED = ("lines", "next", "outliers", "rivals", "hints")
-"""Members of a verdict that list messages."""
+_LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdict that list messages
 
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """Whether a result can be used.
+    """Whether a result can be used."""
 
-    Attributes
-    ----------
-    code
-        Name of the rule that fits first: the table is in `docs/command-line.md`.
-    message
-        Its message: a code with fields.
-    exit
-        Exit code of the command: 0, 3 or 4.
-    warning
-        Whether a user should look although the exit code is 0; `--strict` makes it 4.
-    lines
-        Messages of the other rules, and remarks.
-    next
-        Messages on the next steps.
-    tests
-        The global test, the largest test value of every kind of observation, tests of patterns.
-    outliers
-        A message for each kind of observations with outliers: how many, and the worst.
-    removed, rivals, hints
-        Observations that snooping removed, those that cannot be told apart from them, accepted hypotheses.
-    outlying
-        The outliers by kind, which tables and plots mark: the row of an observation, and the number of a
-        single component behind it.
-    """
-
-    code: str
-    message: Phrase
-    exit: int
-    warning: bool
-    lines: tuple[Phrase, ...]
-    next: tuple[Phrase, ...]
+    code: str  # Name of the rule that fits first: the table is in `docs/command-line.md`
+    message: Phrase  # Its message: a code with fields
+    exit: int  # Exit code of the command: 0, 3 or 4
+    warning: bool  # Whether a user should look although the exit code is 0; `--strict` makes it 4
+    lines: tuple[Phrase, ...]  # Messages of the other rules, and remarks
+    next: tuple[Phrase, ...]  # Messages on the next steps
+    # The global test, the largest test value of every kind of observation, tests of patterns
     tests: tuple[Test, ...]
+    # A message for each type of observation with outliers: their number, and the worst
     outliers: tuple[Phrase, ...] = ()
+    # Observations that snooping removed, those that are inseparable from them, accepted hypotheses
     removed: tuple[Any, ...] = ()
     rivals: tuple[Text, ...] = ()
     hints: tuple[Text, ...] = ()
+    # The outliers by type, which tables and plots mark: row of an observation, or row and component
     outlying: Mapping[Text, Sequence[tuple[int, ...]]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -96,6 +74,13 @@ class Verdict:
     def usable(self) -> bool:
         """Whether the result can be used."""
         return self.exit == 0
+
+    def marks(self, kind: Text, shape: tuple[int, ...]) -> Bools:
+        """Return which observations of one type (of the shape of their test values) are outliers."""
+        marks = np.zeros(shape, dtype=bool)
+        for place in self.outlying.get(kind, ()):
+            marks[place] = True
+        return marks
 
     def exit_code(self, *, strict: bool = False) -> int:
         """Return the exit code of a command; `strict` lets warnings count."""
@@ -126,24 +111,34 @@ class Rule:
     """A rule of verdicts."""
 
     code: str
-    message: Callable[[Evidence], Phrase | None]  # On the evidence; None if the rule does not fit
+    message: Callable[[Any], Phrase | None]  # On the evidence; None if the rule does not fit
     exit: int  # Exit code, if `grave` holds of the evidence
     advice: tuple[str, ...]  # Codes of the next steps, if it gives the headline
     warning: bool = False  # Whether a user should look although the exit code is 0
-    grave: Callable[[Evidence], bool] = lambda _: True  # Whether it forbids the use
+    grave: Callable[[Any], bool] = lambda _: True  # Whether it forbids the use
     also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
+
+
+def fitting_rules(
+    rules: Iterable[Rule], evidence: Any, codes: list[str] | None = None
+) -> list[tuple[Rule, Phrase, int]]:
+    """Return the rules that fit, with messages and exit codes; rules that forbid the use are first.
+
+    `codes` receives the codes of these rules, for the conditions of those that follow.
+    """
+    fitting: list[tuple[Rule, Phrase, int]] = []
+    for rule in rules:
+        if (message := rule.message(evidence)) is not None:
+            if codes is not None:
+                codes.append(rule.code)
+            fitting.append((rule, message, rule.exit if rule.grave(evidence) else 0))
+    return sorted(fitting, key=lambda each: each[2] == 0)
 
 
 def verdict(found: Findings) -> Verdict:
     """Judge an adjustment by all that was found about it."""
     evidence = Evidence(found)
-    fitting: list[tuple[Rule, Phrase, int]] = []
-    for rule in RULES:
-        if (message := rule.message(evidence)) is not None:
-            evidence.codes.append(rule.code)
-            fitting.append((rule, message, rule.exit if rule.grave(evidence) else 0))
-    # Rules that forbid the use are first: no green headline above a line that says so.
-    fitting.sort(key=lambda each: each[2] == 0)
+    fitting = fitting_rules(RULES, evidence, evidence.codes)
     usable = not fitting[0][2]
     messages = [
         replace(message, code=f"verdict.{rule.code}.also") if rule.also and not usable else message
@@ -388,8 +383,7 @@ def _not_tested(e: Evidence) -> Phrase | None:
     return Phrase(f"verdict.not-tested{'.pattern' if pattern else ''}", {"reason": e.found.untested})
 
 
-CONTROL = "named.control"
-"""Code of the name of a control point."""
+CONTROL = "named.control"  # Code of the name of a control point
 
 _WITH_CHECK = frozenset(
     {

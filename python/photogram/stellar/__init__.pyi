@@ -7,7 +7,6 @@ from .cameras import SkyCamera as SkyCamera
 from .cameras import camera_document as camera_document
 from .catalogue import Catalogue as Catalogue
 from .deck import read_deck as read_deck
-from .landmarks import landmark as landmark
 from .lenses import LENSES as LENSES
 from .night_calibration import calibrate_night as calibrate_night
 from .night_file import read_night as read_night
@@ -31,6 +30,7 @@ from .sky import ARCSEC as ARCSEC
 from .sky import Air as Air
 from .sky import Effects as Effects
 from .sky import Site as Site
+from .sky import landmark as landmark
 from .sky import refraction as refraction
 from .sky_calibration import Exposure as Exposure
 from .sky_calibration import calibrate_exposures as calibrate_exposures

@@ -16,9 +16,10 @@ from photogram.stellar.movement import combine, movement, pairs_to_combine
 from photogram.stellar.options import core_threads
 from photogram.stellar.outliers import culprits, harm, outliers
 from photogram.stellar.parameters import GROUPS, INDEX
-from photogram.stellar.problem import Problem, degrees_of_freedom
-from photogram.stellar.result import PreRun, Result, Stage
-from photogram.stellar.state import Solved
+from photogram.stellar.problem import Problem
+from photogram.stellar.result import Result
+from photogram.stellar.state import PreRun, Solved, Stage
+from photogram.words import Phrase, phrase
 
 
 def calibrate(
@@ -52,64 +53,63 @@ def calibrate(
     KeyboardInterrupt
         Ctrl-C.
     """
-    core_threads(threads)  # refused here, whatever iterates
+    core_threads(threads)  # checked for both iterations
+    options, initial = problem.options, problem.initial.copy()
     iterate = (
         report_iteration.iterate
-        if problem.options.as_published
+        if options.as_published
         else partial(strict.iterate, threads=threads, progress=progress)
     )
-    initial = problem.initial.copy()
     stages: tuple[Stage, ...] = ()
-    if problem.options.minimum_stars:
-        smallest = _minimum_problem(problem)
-        solved = iterate(
-            smallest,
-            initial,
-            _free_minimum(problem),
-            solution="minimum",
-            limit=problem.options.max_iterations_minimum,
-        )
-        stages = (_stage(smallest, solved),)
+    if options.minimum_stars:
+        smallest, limit = _minimum_problem(problem), options.max_iterations_minimum
+        solved = iterate(smallest, initial, _free_minimum(problem), solution="minimum", limit=limit)
+        stages = (Stage.of(smallest, solved),)
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
-        if problem.options.pre_run:
-            residuals = _pre_run(problem, smallest, initial, solved)
+        if options.pre_run:
             # The minimum solution has neither distortion nor refraction: their curves would be zeros.
-            without = replace(smallest.options, curves=False, refraction=False)
-            smallest = replace(smallest, options=without)
-            return _result(problem, smallest, solved, stages, pre_run=residuals)
+            without = replace(smallest, options=replace(smallest.options, curves=False, refraction=False))
+            residuals = _pre_run(problem, smallest, initial)
+            counts = stages[-1].counts
+            return _remarked(Result(without, solved, counts, (), problem, stages, residuals), [])
     free = free_parameters(problem)
     _check_groups(problem)
-    limit = problem.options.max_iterations
-    remarks: list[str] = []
-    if problem.options.as_published:
+    limit = options.max_iterations
+    remarks: list[Phrase] = []
+    if options.as_published:
         solved, remarks = _from_far(problem, initial, free)
     else:
         solved = iterate(problem, initial, free, solution="maximum", limit=limit)
-    stages = (*stages, _stage(problem, solved))
-    if problem.options.refraction and solved.converged:
+    stages = (*stages, Stage.of(problem, solved))
+    if options.refraction and solved.converged:
         solved = _refraction(problem, iterate, solved)
-        stages = (*stages, _stage(problem, solved))
-    elif problem.options.refraction:
-        remarks = ["REFRACTION SOLUTION ELIMINATED FROM PROBLEM"]
+        stages = (*stages, Stage.of(problem, solved))
+    elif options.refraction:
+        remarks = [phrase("stars.no-refraction-solution")]
 
-    def again(left: Problem) -> Solved:
+    def solve(left: Problem) -> Solved:
         found = iterate(left, initial, free_parameters(left), solution="maximum", limit=limit)
-        return _refraction(left, iterate, found) if problem.options.refraction and found.converged else found
+        return _refraction(left, iterate, found) if options.refraction and found.converged else found
 
-    if not stages[-1].converged:
-        remarks += culprits(problem, solved, again)
-    result = _result(problem, problem, solved, stages, remarks=remarks)
+    def solution(left: Problem) -> Result:
+        stage = Stage.of(left, found := solve(left))
+        return Result(left, found, stage.counts, (), left, (stage,))
+
+    if not solved.converged:
+        remarks += culprits(problem, solved, solve)
+    result = Result(problem, solved, stages[-1].counts, (), problem, stages)
     if result.converged:
-        result = replace(result, spoiled=harm(result, lambda left: _solution(left, again(left))))
-    return _combined(result, threads) if problem.options.movement_factor > 0 else result
+        result = replace(result, spoiled=harm(result, solution) or "")
+    result = _remarked(result, remarks)
+    return _combined(result, threads) if options.movement_factor > 0 else result
 
 
-def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[str]]:
-    """Iterate as published; where its steps, which nothing damps, lead astray, from better attitudes.
+def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[Phrase]]:
+    """Iterate as published; if its undamped steps diverge, from better attitudes.
 
-    A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera
-    held, begin where the report's steps lead to its solution, which does not depend on the beginning.
+    A deck has the attitude of the event for all groups. The strict iteration with a fixed camera gives
+    attitudes from which the steps of the report converge to its solution, which does not depend on them.
     """
     run = partial(report_iteration.iterate, solution="maximum", limit=problem.options.max_iterations)
     failed: AdjustmentError | None = None
@@ -124,7 +124,7 @@ def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, l
         start = strict.iterate(problem, initial, attitudes, solution="maximum", limit=0).parameters
         again = run(problem, start, free)
         if again.converged:
-            return again, ["the initial attitudes are far: the iteration began with those of a damped one"]
+            return again, [phrase("stars.far-attitudes")]
     except AdjustmentError:
         pass
     if failed is not None:
@@ -133,7 +133,7 @@ def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, l
 
 
 def free_parameters(problem: Problem) -> Bools:
-    """Say which of the 26 parameters are estimated in the maximum solution."""
+    """Return which of the 26 parameters are estimated in the maximum solution."""
     free = ~problem.fixed
     for group in range(3):
         if not (problem.known[problem.image_stars] & (problem.image_groups == group)).any():
@@ -155,13 +155,13 @@ def _free_minimum(problem: Problem) -> Bools:
 def _minimum_problem(problem: Problem) -> Problem:
     """Take the stars of the minimum solution, all images with the attitude of the event."""
     names = set(problem.options.minimum_stars)
-    missing = names - set(problem.star_ids)
-    if missing:
-        raise InputError(f"incorrect stars specified for minimum solution: {', '.join(sorted(missing))}")
+    if missing := sorted(names - set(problem.star_ids)):
+        raise InputError(phrase("stars.minimum-unknown", names=missing))
     others = np.array([star not in names for star in problem.star_ids])
     chosen = problem.without(others, np.zeros(len(problem.image_points), bool))
     if not chosen.known.all():
-        raise InputError("incorrect stars specified for minimum solution: a direction that is not known")
+        unknown = [star for star, known in zip(chosen.star_ids, chosen.known, strict=True) if not known]
+        raise InputError(phrase("stars.minimum-direction", names=unknown))
     return replace(chosen, image_groups=np.full_like(chosen.image_groups, 2))
 
 
@@ -169,20 +169,14 @@ def _check_groups(problem: Problem) -> None:
     """Refuse a group that has images of unknown directions but too few known stars for an attitude."""
     known = problem.known[problem.image_stars]
     for group, name in enumerate(GROUPS):
-        of_group = problem.image_groups == group
-        if of_group.any() and len(np.unique(problem.image_stars[of_group & known])) < 2:
-            weighted = (
-                problem.weighted[3 * group : 3 * group + 3].all()
-                or problem.fixed[3 * group : 3 * group + 3].all()
-            )
-            if not weighted:
-                raise AdjustmentError(
-                    f"insufficient type 2 stars for individual orientation: {name} needs two known stars"
-                )
+        of_group, rows = problem.image_groups == group, slice(3 * group, 3 * group + 3)
+        given = problem.weighted[rows].all() or problem.fixed[rows].all()
+        if of_group.any() and not given and len(np.unique(problem.image_stars[of_group & known])) < 2:
+            raise AdjustmentError(phrase("stars.few-known-stars", group=name))
 
 
-def _pre_run(problem: Problem, smallest: Problem, initial: Floats, solved: Solved) -> PreRun:
-    """Compute residuals of all images that took no part in the minimum solution."""
+def _pre_run(problem: Problem, smallest: Problem, initial: Floats) -> PreRun:
+    """Compute residuals of all images without a part in the minimum solution."""
     used = set(smallest.star_ids)
     rest = problem.without(
         np.array([star in used for star in problem.star_ids]), np.zeros(len(problem.image_points), bool)
@@ -205,45 +199,19 @@ def _refraction(problem: Problem, iterate: Callable[..., Solved], solved: Solved
     )
 
 
-def _stage(problem: Problem, solved: Solved) -> Stage:
-    counts = degrees_of_freedom(problem, solved.free)
-    return Stage(
-        solved.levels[0].solution,
-        counts,
-        solved.levels,
-        solved.stop,
-        solved.converged,
-        solved.log_determinant,
-    )
-
-
-def _solution(problem: Problem, solved: Solved) -> Result:
-    """Return the result of one solution, without remarks."""
-    stage = _stage(problem, solved)
-    return Result(problem, solved, stage.counts, (), problem, (stage,))
-
-
-def _result(
-    problem: Problem,
-    solved_problem: Problem,
-    solved: Solved,
-    stages: tuple[Stage, ...],
-    *,
-    remarks: Sequence[str] = (),
-    pre_run: PreRun | None = None,
-) -> Result:
-    unsettled = [] if solved.converged else [f"the solution has not converged: {solved.stop}"]
-    result = Result(solved_problem, solved, stages[-1].counts, (), problem, stages, pre_run)
+def _remarked(result: Result, remarks: Sequence[Phrase]) -> Result:
+    """Return a result with its messages: convergence, global test, outliers, remarks, weak parameters."""
+    solved = result.solved
     failed = result.test.problem() if result.test else None
-    texts = (
-        *unsettled,
+    messages: list[str | Phrase] = [
+        *([] if solved.converged else [phrase("stars.plate-not-converged", stop=solved.stop)]),
         *([failed] if failed else []),
         *outliers(result),
         *remarks,
         *solved.remarks,
         *result.doubtful(),
-    )
-    return replace(result, messages=tuple(Message(text) for text in texts))
+    ]
+    return replace(result, messages=tuple(map(Message, messages)))
 
 
 def _combined(result: Result, threads: int | None) -> Result:
@@ -254,10 +222,9 @@ def _combined(result: Result, threads: int | None) -> Result:
     if not test:
         return result
     if not pairs:
-        text = "no combined solution: the camera has moved between any two of its attitudes"
-        return replace(result, messages=(*result.messages, Message(text)))
+        return replace(result, messages=(*result.messages, Message(phrase("stars.moved-between-all"))))
     combined = combine(result, pairs, threads=threads)
     if not combined.converged:
-        text = f"the combined solution has not converged: {combined.solved.stop}"
-        result = replace(result, messages=(Message(text), *result.messages))
+        message = Message(phrase("stars.combined-not-converged", stop=combined.solved.stop))
+        result = replace(result, messages=(message, *result.messages))
     return replace(result, combined=combined)

@@ -17,46 +17,29 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.places import Earth, station_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
+from photogram.words import Phrase, phrase
 
-ATTITUDE, FIELD = math.radians(1.5), 0.05
-"""What attitudes and principal distances that are found so may be wrong: radians, and a share."""
+ATTITUDE_ERROR, FIELD_ERROR = math.radians(1.5), 0.05
+"""Largest errors of attitudes (radians) and of the principal distance (a share)."""
 _STEP = 1.3
-"""From one field of view that is tried to the next; each reaches half way."""
-_IMAGES = 200
-"""Brightest images that are looked at."""
-_SECONDS = 5000
+"""Ratio of consecutive fields of view; each covers half of the distance to the next."""
+_MAX_IMAGES = 200
+_TIMEOUT_MS = 5000
 _MAGNITUDES = (6.0, 9.0)
 """Faintest stars of the data base for fields of 40 degrees and more, and of 5 and less."""
 
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Where an exposure looks."""
+    """The direction of an exposure."""
 
-    attitude: Floats  # (3,) alpha, omega, kappa, radians; NaN where it was not found
-    field: float  # Horizontal field of view, radians; NaN where it was not found
-    # Whether its images are found only when they are mirrored: then there is no attitude
-    mirrored: bool = False
-
-    @property
-    def found(self) -> bool:
-        """Whether there is an attitude."""
-        return bool(np.isfinite(self.attitude).all())
-
-    def reason(self) -> str:
-        """Say why there is none."""
-        return (
-            "its images are mirrored (x counts right, y down)"
-            if self.mirrored
-            else "its images are found nowhere in the sky, with no field of view that was tried"
-        )
-
-
-_NOWHERE = Located(np.full(3, np.nan), math.nan)
+    attitude: Floats  # (3,) alpha, omega, kappa, radians
+    field: float  # Horizontal field of view, radians; NaN if the exposure was not found
+    reason: Phrase | None = None  # Why it was not found
 
 
 def locate(
@@ -66,34 +49,32 @@ def locate(
     fields: tuple[float, float],
     earth: Earth | None = None,
 ) -> list[Located]:
-    """Find where exposures look, whose images stand with the brightest first; attitudes do not count.
+    """Find the directions of exposures, whose images are sorted by brightness; their attitudes are not used.
 
-    The frame is in pixels; fields are the smallest and largest horizontal field of view that the camera may
-    have, radians.
+    The frame is in pixels; fields are the smallest and largest horizontal field of view of the camera,
+    radians.
 
-    Raises InputError: fields of view that cannot be. ModuleNotFoundError: tetra3rs is not installed.
+    Raises InputError: fields of view out of range. ModuleNotFoundError: tetra3rs is not installed.
     """
     low, high = (math.degrees(field) for field in fields)
     if not 0.5 <= low <= high <= 100:
-        raise InputError(
-            f"fields of view are looked for from 0.5 to 100 degrees, not from {low:g} to {high:g} degrees"
-        )
+        raise InputError(phrase("stars.blind-fields", low=low, high=high))
     base = _database(low, high)
     count = max(1, math.ceil(math.log(high / low) / math.log(_STEP)))
     tried = [low * (high / low) ** ((k + 0.5) / count) for k in range(count)]
-    found = []
+    directions = []
     for exposure in exposures:
         located = _located(base, exposure, site, frame, tried, earth or Earth())
-        if located.found:
-            # One camera took them all: its field of view comes first.
+        if located.reason is None:
+            # All exposures have one camera: its field of view is tried first.
             tried.sort(key=lambda field: abs(math.log(math.radians(field) / located.field)))
-        found.append(located)
-    return found
+        directions.append(located)
+    return directions
 
 
 @lru_cache(maxsize=2)
 def _database(low: float, high: float) -> Any:
-    """Make the data base of patterns, which takes a second."""
+    """Return the data base of patterns, which takes a second."""
     import tetra3rs
 
     faint, bright = math.log(5.0), math.log(40.0)
@@ -112,8 +93,8 @@ def _located(
     fields: Sequence[float],
     earth: Earth,
 ) -> Located:
-    xy = exposure.xy[:_IMAGES] - 0.5 * np.array(frame)
-    # The order is that of brightness.
+    xy = exposure.xy[:_MAX_IMAGES] - 0.5 * np.array(frame)
+    # The weights decrease in the order of brightness.
     images = np.column_stack([xy, np.arange(len(xy), 0, -1.0)])
     mirrored = False
     for field in fields:
@@ -123,7 +104,7 @@ def _located(
             fov_max_error_deg=field * (math.sqrt(_STEP) - 1),
             image_width=round(frame[0]),
             image_height=round(frame[1]),
-            solve_timeout_ms=_SECONDS,
+            solve_timeout_ms=_TIMEOUT_MS,
         )
         if not solved:
             continue
@@ -133,4 +114,4 @@ def _located(
         matrix = np.asarray(solved.rotation_matrix_icrs_to_camera, float)
         attitude = station_attitude(matrix, site, exposure.utc, earth)
         return Located(attitude, math.radians(solved.fov_deg))
-    return replace(_NOWHERE, mirrored=mirrored)
+    return Located(np.full(3, math.nan), math.nan, phrase("stars.mirrored" if mirrored else "stars.nowhere"))

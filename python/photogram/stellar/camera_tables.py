@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
+from photogram.words import Phrase, phrase
 
 CORRELATED = 0.95
-"""Correlations above this are named."""
+"""Correlations above this are remarked on."""
 
 Unit = tuple[str, str, float]
 """The unit of values, the unit that people read, and the factor between them."""
@@ -40,8 +41,8 @@ def column(
     **more: Any,
 ) -> Quantity:
     """Return numbers (n,), or (n, k) of k parts whose names are separated by commas; None: without a unit."""
-    own, small, factor = unit or ("", "", 1.0)
-    axes = tuple(Axis(part, own, small=small, factor=factor) for part in parts.split(", "))
+    large, small, factor = unit or ("", "", 1.0)
+    axes = tuple(Axis(part, large, small=small, factor=factor) for part in parts.split(", "))
     numbers = np.reshape(np.asarray(values, dtype=float), (-1, len(axes)) if len(axes) > 1 else -1)
     kind: Kind = "deviation" if unit else "number"
     texts = {"name": member or None, "member": member, "head": head, "decimals": decimals}
@@ -57,9 +58,15 @@ def correlations(covariance: Floats) -> Floats:
 
 def correlated(names: Sequence[str], covariance: Floats) -> list[tuple[str, str, float]]:
     """Return the pairs of parameters whose correlation exceeds 0.95, with the correlation."""
-    found = correlations(covariance)
-    pairs = np.argwhere(np.triu(np.abs(found) > CORRELATED, 1)).tolist()
-    return [(names[i], names[j], float(found[i, j])) for i, j in pairs]
+    matrix = correlations(covariance)
+    pairs = np.argwhere(np.triu(np.abs(matrix) > CORRELATED, 1)).tolist()
+    return [(names[i], names[j], float(matrix[i, j])) for i, j in pairs]
+
+
+def correlation_remarks(pairs: Sequence[tuple[str, str, float]]) -> Iterator[Phrase]:
+    """Return a remark on each pair of correlated parameters."""
+    for first, second, correlation in pairs:
+        yield phrase("stars.correlation", first=first, second=second, correlation=correlation)
 
 
 def significance(names: Sequence[str], values: Floats, covariance: Floats) -> dict[str, float]:
@@ -85,20 +92,10 @@ def parameter_table(
     note: str = "",
     about: str = "",
 ) -> Table:
-    """Return the parameters of a camera.
+    """Return the parameters of a camera by names and units (n,), with mean errors: 0 if fixed.
 
-    Parameters
-    ----------
-    axes
-        (n,) names and units of the parameters.
-    values, errors
-        (n,) with mean errors, 0 of fixed parameters.
-    given
-        (2, n) values and mean errors before the adjustment: infinite if free, 0 if fixed.
-    ratios
-        Terms over their mean errors by name.
-    more, note, about
-        Further columns; remarks of the table.
+    `given` are (2, n) values and mean errors before the adjustment, infinite if free and 0 if fixed; `ratios`
+    terms over their mean errors by name; `more` further columns.
     """
     of = np.arange(len(axes))
     before = []

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.io.json import Tree, unknown
-from photogram.io.yaml_text import matrix_lines, read_yaml_text
-from photogram.messages import quoted
+from photogram.io.json import Tree
+from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
+from photogram.words import phrase
 
 YamlForm = Literal["opencv", "ros"]
 """What the file is for."""
@@ -50,9 +49,7 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
         The lens has no such form.
     """
     if camera.lens not in _LENSES:
-        raise InputError(
-            f"a camera of the lens {camera.lens} has no YAML form; lenses that have are {', '.join(_LENSES)}"
-        )
+        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_LENSES)))
     model, terms = _LENSES[camera.lens]
     values = dict(zip(camera.names, camera.values.tolist(), strict=True))
     sd = np.sqrt(np.diag(camera.covariance))
@@ -60,40 +57,23 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
     if camera.common_scale:
         errors["fy"] = errors["fx"]
     matrix = np.array([[values["fx"], 0, values["cx"]], [0, values["fy"], values["cy"]], [0, 0, 1]], float)
-    coefficients = np.array([[values.get(term, 0.0) for term in terms]])
+    coefficients = [values.get(term, 0.0) for term in terms]
     width, height = round(frame[0]), round(frame[1])
     if form == "ros":
-        lines = [
-            f"image_width: {width}",
-            f"image_height: {height}",
-            f"camera_name: {_word(name)}",
-            *matrix_lines("camera_matrix", matrix),
-            f"distortion_model: {model}",
-            *matrix_lines("distortion_coefficients", coefficients),
-            *matrix_lines("rectification_matrix", np.eye(3)),
-            *matrix_lines("projection_matrix", np.column_stack([matrix, np.zeros(3)])),
-        ]
-    else:
-        order = ("fx", "fy", "cx", "cy", *terms)
-        deviations = np.array([[errors.get(each, 0.0) for each in order]])
-        lines = [
-            "%YAML:1.0",
-            "---",
-            f"image_width: {width}",
-            f"image_height: {height}",
-            f"fisheye_model: {int(model == 'equidistant')}",
-            *matrix_lines("camera_matrix", matrix, opencv=True),
-            *matrix_lines("distortion_coefficients", coefficients, opencv=True),
-            f"# of {', '.join(order)}",
-            *matrix_lines("standard_deviations", deviations, opencv=True),
-        ]
+        return camera_info(name, (width, height), matrix, (model, coefficients))
+    order = ("fx", "fy", "cx", "cy", *terms)
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {width}",
+        f"image_height: {height}",
+        f"fisheye_model: {int(model == 'equidistant')}",
+        *matrix_lines("camera_matrix", matrix, opencv=True),
+        *matrix_lines("distortion_coefficients", [coefficients], opencv=True),
+        f"# of {', '.join(order)}",
+        *matrix_lines("standard_deviations", [[errors.get(term, 0.0) for term in order]], opencv=True),
+    ]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _word(name: str) -> str:
-    if not re.fullmatch(r"[\w.-]+", name):
-        raise InputError(f"the name of a camera has letters, digits, dots and hyphens, not {quoted(name)}")
-    return name
 
 
 def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
@@ -113,21 +93,19 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     matrix = _member(content, *_MATRIX)
     values = matrix.get("data", None).numbers(9).reshape(3, 3)
     distortion = _member(content, *_DISTORTION)
-    given = [each.number() for each in distortion.get("data", None)]
+    coefficients = [value.number() for value in distortion.get("data", None)]
     frame = (
         float(_member(content, "image_width", "image_Width", "width").whole(1)),
         float(_member(content, "image_height", "image_Height", "height").whole(1)),
     )
     if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
-        raise matrix.error("must be a camera matrix without skew")
+        raise matrix.error(phrase("stars.camera-matrix"))
     fisheye = _is_fisheye(content)
     terms = _FISHEYE if fisheye else _BROWN
-    if any(given[len(terms) :]):
-        raise distortion.error(
-            f"has more terms than {', '.join(terms)}: `photogram.Camera` has rational and prism ones"
-        )
+    if any(coefficients[len(terms) :]):
+        raise distortion.error(phrase("stars.more-terms", terms=list(terms)))
     parameters = {"fx": values[0, 0], "fy": values[1, 1], "cx": values[0, 2], "cy": values[1, 2]}
-    parameters |= dict(zip(terms, [*given, *[0.0] * len(terms)][: len(terms)], strict=True))
+    parameters |= dict(zip(terms, [*coefficients, *[0.0] * len(terms)], strict=False))
     of, lens = (SkyCamera, "kannala_brandt") if fisheye else (BrownCamera, "brown")
     empty = of.of_field(*frame, 1.0, lens)
     return of(np.array([parameters[name] for name in empty.names]), empty.covariance, lens), frame
@@ -143,6 +121,6 @@ def _is_fisheye(content: Tree) -> bool:
     if "distortion_model" in content:
         model = content["distortion_model"]
         if model.value not in _ROS:
-            raise unknown(model, "the model", _ROS)
+            raise model.error(phrase("error.choice", value=str(model.value), names=list(_ROS)))
         return bool(model.value == "equidistant")
     return content.get("fisheye_model", 0).value not in (0, False)

@@ -12,29 +12,23 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io import json
+from photogram.io.json import read_json, to_json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
-from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
-from photogram.stellar.plate_model import plate_camera
+from photogram.stellar.parameters import GROUPS, INDEX, INTERIOR, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import Problem
-from photogram.stellar.sky_cameras import (
-    BrownCamera,
-    SkyCamera,
-    read_any,
-    read_camera,
-    read_document,
-    weight_of,
-)
+from photogram.stellar.sky_cameras import BrownCamera, SkyCamera, of_kind, read_camera, weight_of
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
 __all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 
-
-_INTERIOR = NAMES[9:22]
+_IN_MODEL = {"cx": "c", "cy": "c_y"}
+_METRE = 1000.0  # in mm
+_POWERS = {"rad": 0, "m": 1, "m^-1": -1, "m^-2": -2, "m^-3": -3, "m^-4": -4, "m^-6": -6}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,23 +81,20 @@ class PlateCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        document = read_document(path, ("stellar camera",))
-        values, covariance = read_camera(path, document, _INTERIOR)
-        try:
-            return cls(
-                values,
-                covariance,
-                float(document["m"]),
-                int(document["degrees_of_freedom"]),
-                bool(document["common_scale"]),
-                float(document["reference_principal_distance"] or 0.0),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is not a camera: {error}", file=path) from None
+        document = of_kind(read_json(path), ("stellar camera",))
+        values, covariance = read_camera(document, INTERIOR)
+        return cls(
+            values,
+            covariance,
+            document["m"].number(),
+            document["degrees_of_freedom"].whole(),
+            document["common_scale"].value is True,
+            document.get("reference_principal_distance", 0.0).number(),
+        )
 
     def document(self) -> dict[str, Any]:
         """Return the camera as it is written."""
-        chosen = [i for i in range(len(_INTERIOR)) if self.covariance[i, i] > 0]
+        chosen = [i for i in range(len(INTERIOR)) if self.covariance[i, i] > 0]
         return {
             "program": f"photogram {_photocore.__version__}",
             "kind": "stellar camera",
@@ -112,10 +103,10 @@ class PlateCamera:
             "common_scale": self.common_scale,
             "parameters": {
                 name: {"value": value, "unit": UNITS[name]}
-                for name, value in zip(_INTERIOR, self.values.tolist(), strict=True)
+                for name, value in zip(INTERIOR, self.values.tolist(), strict=True)
             },
             "covariance": {
-                "order": [_INTERIOR[i] for i in chosen],
+                "order": [INTERIOR[i] for i in chosen],
                 "matrix": self.covariance[np.ix_(chosen, chosen)],
             },
             "m": self.mean_error,
@@ -124,7 +115,7 @@ class PlateCamera:
 
     def to_json(self) -> bytes:
         """Return the camera as a JSON document."""
-        return json.to_json(self.document())
+        return to_json(self.document())
 
     def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
         """Return the camera as blocks take it: the model `plate`, in mm, with the parameters of this one.
@@ -139,14 +130,17 @@ class PlateCamera:
             Whether its parameters are observations with their full covariance; otherwise they are known. What
             was held here is held there.
         """
-        return plate_camera(
-            self.values,
-            self.covariance,
-            name,
-            weighted=weighted,
-            common_scale=self.common_scale,
-            distortion_first=self.distortion_first,
-        )
+        scale = np.array([_METRE ** _POWERS[UNITS[each]] for each in INTERIOR])
+        values, covariance = self.values * scale, self.covariance * np.outer(scale, scale)
+        if self.common_scale:
+            values[INTERIOR.index("cy")] = 0.0
+        names = [_IN_MODEL.get(each, each) for each in INTERIOR]
+        parameters = dict(zip(names, values.tolist(), strict=True)) | {"c0": _METRE * self.distortion_first}
+        known = np.flatnonzero(np.diag(covariance) > 0)
+        if not (weighted and known.size):
+            return Camera("plate", parameters, name=name)
+        observed = [names[row] for row in known], covariance[np.ix_(known, known)]
+        return Camera("plate", parameters, covariance=observed, name=name)
 
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
         """Return a calibration that begins with this camera and gives it the weight of its covariance.
@@ -166,14 +160,11 @@ class PlateCamera:
         """
         options = problem.options
         if (self.common_scale, self.distortion_first) != (options.common_scale, options.distortion_first):
-            raise InputError("the camera has another form: common scale, or order of scale and distortion")
+            raise InputError(phrase("stars.other-form"))
         known = np.diag(self.covariance) > 0
         place = 9 + np.flatnonzero(known)
-        weights, initial, fixed = (
-            problem.parameter_weights.copy(),
-            problem.initial.copy(),
-            problem.fixed.copy(),
-        )
+        weights, initial = problem.parameter_weights.copy(), problem.initial.copy()
+        fixed = problem.fixed.copy()
         weights[9:22, :] = weights[:, 9:22] = 0.0
         part = self.covariance[np.ix_(known, known)]
         weights[np.ix_(place, place)] = (unit or self.mean_error) ** 2 * weight_of(part)
@@ -204,14 +195,11 @@ def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> C
         The file cannot be read, or is no camera.
     """
     file = Path(path)
-    document = read_any(file)
-    if {"nonorthogonality_rad", "correction"} & document.keys():
-        raise InputError(
-            "holds the correction of a comparator: comparator.Correction.read(path).as_camera(camera) lays a"
-            " camera on it",
-            file=file,
-        )
-    reader = PlateCamera if document.get("kind") == "stellar camera" else SkyCamera
+    document = read_json(file)
+    if "nonorthogonality_rad" in document or "correction" in document:
+        raise InputError(phrase("stars.correction"), file=file)
+    plate = document.get("kind", "").value == "stellar camera"
+    reader: type[PlateCamera | SkyCamera] = PlateCamera if plate else SkyCamera
     return reader.read(file).as_camera(name, weighted=weighted)
 
 
@@ -253,7 +241,7 @@ def camera_document(result: Result) -> bytes:
             "matrix": result.covariance[np.ix_(chosen, chosen)],
         },
     }
-    return json.to_json(document)
+    return to_json(document)
 
 
 check_arguments(globals(), ["camera_from"])

@@ -14,6 +14,7 @@ from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
+from photogram.words import phrase
 
 _MAS = 1e-3 * ARCSEC
 _ERRORS = ("ra_error_mas", "dec_error_mas", "pm_ra_error_mas", "pm_dec_error_mas")
@@ -74,7 +75,8 @@ class Catalogue:
         for name, shape in shapes.items():
             array = getattr(self, name)
             if array is not None and array.shape != shape:
-                raise InputError(f"{name} has the shape {array.shape}, not {shape}")
+                fields = {"shape": str(shape), "actual": str(array.shape)}
+                raise InputError(phrase("error.at", what=name, message=phrase("error.shape", **fields)))
 
     @classmethod
     def hipparcos(cls) -> Self:
@@ -112,9 +114,10 @@ class Catalogue:
         for row in rows:
             name = row.cells.get("id", "")
             if first.setdefault(name, row) is not row:
-                raise row.place.error(f"star {name} is listed twice")
+                raise row.place.error(phrase("error.repeated", kind="star", name=name))
             if not abs(row.required("dec_deg")) <= 90:
-                raise row.place.error("dec_deg is not between -90 and 90")
+                limits = phrase("error.range", low=-90, high=90, value=row.required("dec_deg"))
+                raise row.place.error(phrase("error.column", column="dec_deg", message=limits))
         values = [[row.required(name) if name in row.cells else 0.0 for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(

@@ -28,31 +28,26 @@ from photogram.stellar.places import Earth
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
-__all__ = ["Standstill", "fewer_stars", "held_out", "stood_still"]
-
-
 LEVEL = 0.05
-"""Probability that any exposure of a good night is found unlike the others, or moved where none has."""
+"""Probability that any exposure of a good night fails a test of all exposures."""
 
 
 @dataclass(frozen=True, eq=False)
 class Standstill:
-    """The test of a camera that is said to have stood still."""
+    """The test of one attitude for all exposures of a camera on a tripod."""
 
     statistic: float  # Of all attitudes about their mean: chi-squared
     dimension: int
     probability: float
-    # (E,) probability of the difference of each exposure from the others; of those that moved, when
-    # they were found, of the rest without them
+    # (E,) probability of the difference of each exposure from the others, without those that moved more
     own: Floats
-    turns: Floats  # (E,) the turn of each against the mean of the others, radians
-    # Exposures that differ from the others (Bonferroni over all), the worst first, each found without
-    # those before it
+    turns: Floats  # (E,) rotation of each against the mean of the others, radians
+    # Exposures that differ from the others (Bonferroni over all), the worst first
     moved: tuple[int, ...]
 
 
 def stood_still(found: SkyCalibration) -> Standstill | None:
-    """Test whether all attitudes are one; None of a single exposure, and where there is no mean error."""
+    """Test whether all attitudes are one; None for a single exposure, or without degrees of freedom."""
     count = len(found.attitudes)
     if count < 2 or found.degrees_of_freedom < 1:
         return None
@@ -69,7 +64,9 @@ def stood_still(found: SkyCalibration) -> Standstill | None:
             others = [k for k in left if k != number]
             rest = _about_mean(angles, covariance, others)
             own[number] = _photocore.chi_square(max(whole - rest, 0.0), 3.0, upper=True)
-            turns[number] = _turn(angles[number], angles[others].mean(axis=0))
+            turn = _photocore.pointing_matrix(angles[number])
+            turn = turn @ _photocore.pointing_matrix(angles[others].mean(axis=0)).T
+            turns[number] = np.linalg.norm(_photocore.rotation_vectors(turn[None])[0])
         worst = min(left, key=lambda number: own[number])
         if own[worst] >= LEVEL / count:
             break
@@ -78,12 +75,6 @@ def stood_still(found: SkyCalibration) -> Standstill | None:
     dimension = 3 * (count - 1)
     probability = _photocore.chi_square(statistic, float(dimension), upper=True)
     return Standstill(statistic, dimension, probability, own, turns, tuple(moved))
-
-
-def _turn(angles: Floats, others: Floats) -> float:
-    """Return the turn between two attitudes, radians."""
-    matrix = _photocore.pointing_matrix(angles) @ _photocore.pointing_matrix(others).T
-    return float(np.linalg.norm(_photocore.rotation_vectors(matrix[None])[0]))
 
 
 def _covariance(found: SkyCalibration, known: Indices) -> Floats:
@@ -122,10 +113,10 @@ _ATTITUDE = 3
 class HeldOut:
     """How an exposure fits the camera of the others."""
 
-    # Root mean square of its residuals under that camera over what the others' residuals foretell; NaN
-    # where that cannot be told
+    # Root mean square of its residuals under that camera over the prediction by the residuals of the others;
+    # NaN if the others do not determine it
     factor: float
-    probability: float  # Of a sum of squares as large, the unit weight of the others taken as known
+    probability: float  # Of a sum of squares as large, if the unit weight of the others is right
 
     def unlike(self, exposures: int) -> bool:
         """Whether one of so many exposures does not fit the others."""
@@ -141,17 +132,7 @@ def held_out(
     pixel_sd: float,
     earth: Earth,
 ) -> list[HeldOut]:
-    """Hold each exposure out.
-
-    Parameters
-    ----------
-    exposures
-        Those that were adjusted, with the adjusted attitudes.
-    found
-        What came out.
-    site, catalogue, pixel_sd, earth
-        As for `calibrate_exposures`; the pole is that of the adjustment.
-    """
+    """Test each exposure of a calibration (with the adjusted attitudes) against the camera of the others."""
     sd = np.sqrt(np.diag(found.camera.covariance))
     free = np.flatnonzero(sd > 0)
     unit, freedom = found.mean_error, found.degrees_of_freedom
@@ -171,20 +152,23 @@ def held_out(
         of = found.exposures == number
         rows = camera[of].reshape(-1, len(free)), attitude[of].reshape(-1, _ATTITUDE)
         total, rank = _held_out(*rows, residuals[of].ravel())
-        tests.append(_test(total, rank, omega - total, freedom - rank))
+        left = freedom - rank
+        if rank < 1 or left < 1:
+            tests.append(HeldOut(np.nan, 1.0))
+            continue
+        # The sum of the others is negative only if the model is not linear.
+        variance = max(omega - total, 1e-12 * total) / left
+        probability = _photocore.chi_square(total / variance, float(rank), upper=True)
+        tests.append(HeldOut(float(np.sqrt(total / rank / variance)), probability))
     return tests
 
 
 def fewer_stars(images: Indices, matched: Indices) -> list[int]:
     """Return the exposures in which far fewer images have a star than in the others, the worst first.
 
-    Less than half of the share of the others, and that beyond chance: the probability of so few among so
-    many, binomial, is below 5 % for all exposures together.
-
-    Parameters
-    ----------
-    images, matched
-        (E,) of each exposure.
+    The share of their images with a star is less than half of the share of the others, and that is beyond
+    chance: the binomial probability of so few among so many is below 5 % for all exposures together. Both
+    arguments are counts (E,).
     """
     found = []
     for number, (count, few) in enumerate(zip(images.tolist(), matched.tolist(), strict=True)):
@@ -208,12 +192,3 @@ def _held_out(camera: Floats, attitude: Floats, residuals: Floats) -> tuple[floa
     gradient = directions[:, seen].T @ (own.T @ residuals)
     total = float(residuals @ residuals + np.sum(gradient**2 / share[seen]))
     return total, len(residuals) - _ATTITUDE - int((~seen).sum())
-
-
-def _test(total: float, rank: int, others: float, freedom: int) -> HeldOut:
-    if rank < 1 or freedom < 1:
-        return HeldOut(np.nan, 1.0)
-    # The sum of the others is not negative, but for what is not linear.
-    variance = max(others, 1e-12 * total) / freedom
-    probability = _photocore.chi_square(total / variance, float(rank), upper=True)
-    return HeldOut(float(np.sqrt(total / rank / variance)), probability)

@@ -14,8 +14,13 @@ from photogram.show.page import Document, Fact, Facts, Layers, Remarks, Section,
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
 from photogram.stellar.camera_tables import correlated_members, matrix_table
-from photogram.stellar.comparator_frame import comparator_frame
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
+from photogram.stellar.curves import (
+    comparator_frame,
+    distortion_curves,
+    histogram,
+    refraction_curves,
+    residual_classes,
+)
 from photogram.stellar.lens_choice import LEVEL, equal
 from photogram.stellar.night_document import pictures
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX

@@ -35,16 +35,9 @@ def curves(marks: Sequence[Mark], across: str, up: str, title: str = "", legend:
 def vectors(
     places: Floats, residuals: Floats, groups: list[tuple[str, Any]], unit: str
 ) -> tuple[list[Arrows], ScaleBar]:
-    """Return residual vectors, and their scale.
+    """Return residual vectors (m, 2) in a unit, and their scale.
 
-    Parameters
-    ----------
-    places, residuals
-        (m, 2) in the unit of the axes, and in `unit`.
-    groups
-        Names, and which residuals are theirs: each has a colour.
-    unit
-        Of the residuals.
+    Places have the unit of the axes; groups are names and the residuals of each, which have one colour.
     """
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     size = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) or 1.0

@@ -1,8 +1,7 @@
-"""What the verdicts on a plate of stars and on exposures of the sky rest on."""
+"""Tests of plates with stars and of exposures of the sky, and the findings of their verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,88 +9,92 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
-from photogram.stellar.outliers import studentized
-from photogram.stellar.result import SIGNIFICANT
-from photogram.words import Phrase
+from photogram.stellar.parameters import SIGNIFICANT
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Result
 
-Named = Callable[[tuple[int, ...]], str]
+_PLACES = phrase("stars.places")
+_AXES = ("right ascension", "declination")
+
+
+def _testable(values: Floats, redundancy: Floats, unit: float) -> Floats:
+    return np.where(np.nan_to_num(redundancy) > TESTABLE, values * unit, np.nan)
+
+
+def plate_tests(result: Result) -> list[Tested]:
+    """Return the tests of a plate: w if the mean error of unit weight is given (option 14), else t."""
+    problem, solved, given = result.problem, result.solved, result.problem.options.mean_error
+
+    def image(index: tuple[int, ...]) -> Phrase:
+        star = problem.star_ids[problem.image_stars[index[0]]]
+        point = problem.image_points[index[0]]
+        return phrase("stars.plate-coordinate", axis="xy"[index[1]], point=point, star=star)
+
+    def star(index: tuple[int, ...]) -> Phrase:
+        return phrase("stars.place", axis=_AXES[index[1]], star=problem.star_ids[index[0]])
+
+    unit = 1 / given if given else 1.0
+    images = np.abs(_testable(solved.standardized, solved.redundancy, unit))
+    stars = np.abs(_testable(solved.star_standardized, solved.star_redundancy, unit))
+    tests = [Tested(phrase("stars.plate-coordinates"), images, image), Tested(_PLACES, stars, star)]
+    if given:
+        return tests
+    return [each.studentized(sum(solved.sums), result.degrees_of_freedom) for each in tests]
 
 
 def plate_findings(result: Result) -> Findings:
-    """Return the tests of a plate: w where the mean error of unit weight is given (option 14), else t."""
-    problem, tests = result.problem, studentized(result)
-    statistic, second = ("w", np.inf) if tests.known else ("t", max(result.degrees_of_freedom - 1, 1))
-
-    def image(index: tuple[int, ...]) -> str:
-        star = problem.star_ids[problem.image_stars[index[0]]]
-        return f"{'xy'[index[1]]} of point {problem.image_points[index[0]]} of star {star}"
-
-    def star(index: tuple[int, ...]) -> str:
-        return f"{('right ascension', 'declination')[index[1]]} of star {problem.star_ids[index[0]]}"
-
+    """Return the findings on a plate."""
+    given = bool(result.problem.options.mean_error)
+    weak = [name for name, ratio in result.significance().items() if ratio < SIGNIFICANT]
     return Findings(
         status="converged" if result.converged else "not converged",
-        observations=[
-            Tested("plate coordinates", tests.images, image, statistic, second=second),
-            Tested("places of stars", tests.stars, star, statistic, second=second),
-        ],
+        observations=plate_tests(result),
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=result.test,
-        untested=Phrase("untested.freedom" if problem.options.mean_error else "untested.mean-error"),
-        scaled=not problem.options.mean_error,
+        untested=Phrase("untested.freedom" if given else "untested.mean-error"),
+        scaled=not given,
         spoiled=result.spoiled,
         if_usable=[
-            *_not_significant(result),
+            *([Phrase("advice.weak-terms", {"names": weak})] if weak else []),
             Phrase("advice.camera-of-plate"),
         ],
         if_withheld=[Phrase("advice.camera-withheld")],
     )
 
 
-def _not_significant(result: Result) -> list[Phrase]:
-    """Name terms of the distortion that a calibration does better without."""
-    weak = [name for name, ratio in result.significance().items() if ratio < SIGNIFICANT]
-    return [Phrase("advice.weak-terms", {"names": weak})] if weak else []
+def night_tests(result: CalibratedNight) -> list[Tested]:
+    """Return the tests of exposures: t, since the standard deviation of a pixel is an assumption."""
+    found, freedom = result.calibration, result.calibration.degrees_of_freedom
+
+    def image(index: tuple[int, ...]) -> Phrase:
+        (x, y), exposure = found.xy[index[0]].tolist(), result.names[found.exposures[index[0]]]
+        return phrase("stars.pixel-coordinate", axis="xy"[index[1]], x=x, y=y, exposure=exposure)
+
+    def star(index: tuple[int, ...]) -> Phrase:
+        name = result.night.catalogue.ids[found.catalogue[index[0]]]
+        return phrase("stars.place", axis=_AXES[index[1]], star=name)
+
+    images = _testable(found.standardized, found.redundancy, found.mean_error)
+    stars = _testable(found.star_standardized, found.star_redundancy, found.mean_error)
+    tests = [Tested(phrase("stars.image-coordinates"), images, image), Tested(_PLACES, stars, star)]
+    return [each.studentized(found.mean_error**2 * freedom, freedom) for each in tests]
 
 
 def night_findings(result: CalibratedNight) -> Findings:
-    """Return the tests of exposures of the sky against the standard deviation of their images."""
-    found, freedom = result.calibration, result.calibration.degrees_of_freedom
-    omega = found.mean_error**2 * freedom
-
-    def image(index: tuple[int, ...]) -> str:
-        exposure = result.names[found.exposures[index[0]]]
-        x, y = found.xy[index[0]]
-        return f"{'xy'[index[1]]} of the image at {x:.1f}, {y:.1f} of exposure {exposure}"
-
-    def star(index: tuple[int, ...]) -> str:
-        name = result.night.catalogue.ids[found.catalogue[index[0]]]
-        return f"{('right ascension', 'declination')[index[1]]} of star {name}"
-
-    def tested(kind: str, values: Floats, redundancy: Floats, name: Named) -> Tested:
-        # The values are over mean errors a posteriori; the standard deviation of a pixel is a guess.
-        w = np.where(np.nan_to_num(redundancy) > TESTABLE, values * found.mean_error, np.nan)
-        return Tested(kind, w, name).studentized(omega, freedom)
-
+    """Return the findings on exposures of the sky."""
+    doubtful = [
+        Phrase("part.exposure", {"name": str(name), "odds": float(odds)})
+        for name, odds in result.doubtful.items()
+    ]
     return Findings(
-        status=found.status,
-        observations=[
-            tested("image coordinates", found.standardized, found.redundancy, image),
-            tested("places of stars", found.star_standardized, found.star_redundancy, star),
-        ],
-        degrees_of_freedom=freedom,
+        status=result.calibration.status,
+        observations=night_tests(result),
+        degrees_of_freedom=result.calibration.degrees_of_freedom,
         global_test=result.test,
         untested=Phrase("untested.freedom"),
-        doubtful=[
-            *(
-                Phrase("part.exposure", {"name": str(name), "odds": float(odds)})
-                for name, odds in result.doubtful.items()
-            ),
-            *([Phrase("part.mostly-left-out")] if result.mostly_left_out else []),
-        ],
+        doubtful=[*doubtful, *([Phrase("part.mostly-left-out")] if result.mostly_left_out else [])],
         if_usable=[Phrase("advice.camera-of-night")],
         if_withheld=[Phrase("advice.cameras-withheld")],
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,15 +18,16 @@ from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, project_sky, stars_near
 from photogram.stellar.sky_cameras import SkyCamera
+from photogram.words import Phrase, phrase
 
-__all__ = ["Found", "identify", "identify_again"]
+if TYPE_CHECKING:
+    from photogram.stellar import Night
 
 
-_GRID = (24, 16)
-"""Places of the frame that are looked through."""
+_GRID = (24, 16)  # points of the frame at which the sky is looked for
 _LEAST = 0.02
-_STILL = Earth()
 STARS_OF_AN_ATTITUDE = 2
+_STARS_OF_FIRST_ATTITUDE = 3
 
 
 def local_directions(standard: Floats) -> Floats:
@@ -35,21 +37,12 @@ def local_directions(standard: Floats) -> Floats:
 
 
 def turned_to(rays: Floats, directions: Floats) -> Floats:
-    """Return alpha, omega, kappa of the camera that sees directions along rays, by least squares.
+    """Return alpha, omega, kappa of the camera that sees directions (n, 3) along rays (n, 3).
 
-    Parameters
-    ----------
-    rays
-        (n, 3) unit directions in the camera: x right, y down, z along the axis; what is not finite does not
-        count.
-    directions
-        (n, 3) the same north, east, zenith.
-
-    Notes
-    -----
+    Rays have x right, y down and z along the axis, directions are north, east, zenith; finite rows count.
     The matrix that maximizes the sum of ray' M direction is U diag(1, 1, d) V' of the singular value
-    decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991), with d = -1 or 1 so that det
-    M = -1: the local triad is left-handed.
+    decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991), with d = -1 or 1 so that
+    det M = -1: the local triad is left-handed.
     """
     finite = np.isfinite(rays).all(axis=1) & np.isfinite(directions).all(axis=1)
     left, _, right = np.linalg.svd(rays[finite].T @ directions[finite])
@@ -64,7 +57,7 @@ def has_named_stars(exposure: Exposure) -> bool:
 
 
 def attitude_of_stars(
-    exposure: Exposure, camera: SkyCamera, site: Site, catalogue: Catalogue, earth: Earth = _STILL
+    exposure: Exposure, camera: SkyCamera, site: Site, catalogue: Catalogue, earth: Earth
 ) -> tuple[Floats, float]:
     """Return alpha, omega, kappa of an exposure with named stars, and the sum of squared misfits.
 
@@ -82,7 +75,7 @@ def attitude_of_stars(
 
 
 def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -> float:
-    """Return what of a frame (width, height) shows the sky: not the ground, nor what no ray reaches."""
+    """Return the part of a frame (width, height) that shows the sky, not the ground."""
     x, y = ((np.arange(count) + 0.5) / count * size for count, size in zip(_GRID, frame, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     zenith = camera.rays(grid) @ _photocore.pointing_matrix(np.asarray(attitude, float))[:, 2]
@@ -90,100 +83,63 @@ def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -
         return max(float(np.mean(zenith > 0)), _LEAST)
 
 
-_FOR_ATTITUDE = 3
-"""Stars that a first attitude is computed from at least."""
+def attitude_radius(night: Night) -> float:
+    """Return the largest displacement of an image by the error of the approximate attitude, pixels."""
+    return float(night.camera.values[0]) * math.tan(night.attitude_error)
 
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
     """Stars of the images of an exposure, and what speaks for them."""
 
-    # (k,) index in the catalogue; -1 where there is none, and everywhere where chance would have found
-    # as much
-    stars: Indices
-    match: Match  # The count that was made
-    found: Indices  # (k,) the stars that the best hypothesis gives, whatever speaks for it
+    match: Match
+    stars: Indices  # (k,) index in the catalogue by the best hypothesis, accepted or not; -1 for none
     attitude: Floats  # (3,) alpha, omega, kappa that go with them; the given one where there are not enough
 
     @property
-    def accepted(self) -> bool:
-        """Whether chance would not have found as much."""
-        return self.match.accepted
-
-    @property
     def doubtful(self) -> bool:
-        """Whether chance may or may not have found as much."""
-        return not self.accepted and self.match.expected <= DOUBTFUL
+        """Whether it is not accepted, but may be right."""
+        return not self.match.accepted and self.match.expected <= DOUBTFUL
 
-    def reason(self) -> str:
-        """Say why an exposure is not accepted."""
+    def reason(self) -> Phrase:
+        """Return why an exposure is not accepted."""
         if self.match.crowded:
-            return (
-                "so many stars of the catalogue are within the tolerance that none can be told from another:"
-                " give a smaller tolerance_px"
-            )
+            return phrase("stars.crowded")
         if len(self.stars) < FEWEST:
-            return f"it has {len(self.stars)} images of the {FEWEST} that are needed"
+            return phrase("stars.few-images", n=len(self.stars), least=FEWEST)
         if self.match.stars < FEWEST:
-            return f"the catalogue has {self.match.stars} stars in its field, of the {FEWEST} that are needed"
+            return phrase("stars.few-stars", n=self.match.stars, least=FEWEST)
         if not math.isfinite(self.match.expected):
-            return f"no two of its {len(self.stars)} images lie to each other as two stars of its field do"
-        return (
-            f"only {self.match.matched} of {self.match.images} images have a star; chance finds as many"
-            f" {_times(self.match.expected)} (accepted below {ACCEPTED:g})"
-        )
-
-
-def _times(expected: float) -> str:
-    return f"{expected:.2g} times" if expected < 1 else "at least once"
+            return phrase("stars.no-pair", images=len(self.stars))
+        count = {"matched": self.match.matched, "images": self.match.images}
+        return phrase("stars.by-chance", **count, expected=self.match.expected, limit=ACCEPTED)
 
 
 def identify(
     exposure: Exposure,
+    night: Night,
     camera: SkyCamera,
-    site: Site,
-    catalogue: Catalogue,
     *,
-    frame: tuple[float, float],
-    radius: float,
-    tolerance: float = 3.0,
-    earth: Earth = _STILL,
-    stretch: float = STRETCH,
-    roll_known: bool = True,
+    tolerance: float,
+    stretch: float,
     tried: float = 0.0,
 ) -> Sighting:
-    """Find the catalogue star of each image.
+    """Find the catalogue star of each image of an exposure with an approximate attitude.
 
-    Parameters
-    ----------
-    exposure
-        With its approximate attitude; the brightest images first.
-    camera
-        Approximate, such as `SkyCamera.of_field`.
-    site, catalogue
-        Where, and which stars; the brightest first (`Catalogue.brighter`).
-    frame
-        Width and height in pixels.
-    radius, tolerance
-        Largest error of the approximate attitude, and of an image after the best polynomials, pixels.
-    earth
-        UT1 - UTC, and the pole.
-    stretch
-        Share by which the principal distance of the camera may be wrong.
-    roll_known
-        Whether the camera is turned about its axis as the attitude says.
-    tried
-        Hypotheses about this exposure that were counted before: they count with those of this one.
+    The camera is known but for a share `stretch` of its principal distance; the tolerance is the largest
+    distance of image and star after the best polynomials, pixels; `tried` is the number of hypotheses about
+    this exposure that were counted before.
     """
+    frame, catalogue, dut1, radius = night.frame, night.catalogue, night.earth.dut1, attitude_radius(night)
     if stretch > STRETCH:
         # The corners are as far away from where they should be.
         radius += stretch * max(frame)
-    site = earth.site_of_date(site)
-    time = sidereal_time(site, exposure.utc, earth.dut1)
-    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], earth.dut1)
+    site = night.earth.site_of_date(night.site)
+    time = sidereal_time(site, exposure.utc, dut1)
+    near = stars_near(exposure, camera, site, catalogue, frame, radius / camera.values[0], dut1)
     places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
     predicted = project_sky(camera, exposure.attitude, site, places, time)
-    axis = None if roll_known else camera.values[2:4]
+    axis = None if night.roll_known else camera.values[2:4]
     with np.errstate(invalid="ignore"):
         if axis is None:
             inside = ((predicted >= -radius) & (predicted <= np.array(frame) + radius)).all(axis=1)
@@ -192,23 +148,22 @@ def identify(
     seen = np.flatnonzero(inside)
     share = sky_share(camera, exposure.attitude, frame)
     search = Search(frame, radius, stretch, axis, share, tried)
-    made = match(exposure.xy, predicted[seen], search, tolerance=tolerance)
-    local = np.where(made.found >= 0, seen[made.found], -1) if len(seen) else made.found
-    has = np.flatnonzero(local >= 0)
+    matched = match(exposure.xy, predicted[seen], search, tolerance=tolerance)
+    local = np.where(matched.found >= 0, seen[matched.found], -1) if len(seen) else matched.found
+    rows = np.flatnonzero(local >= 0)
     attitude = exposure.attitude
-    if len(has) >= _FOR_ATTITUDE:
+    if len(rows) >= _STARS_OF_FIRST_ATTITUDE:
         values = camera.values.copy()
-        values[:2] /= made.scale
-        rays = replace(camera, values=values).rays(exposure.xy[has])
-        standard = site.standard_coordinates(places[local[has]], time)
+        values[:2] /= matched.scale
+        rays = replace(camera, values=values).rays(exposure.xy[rows])
+        standard = site.standard_coordinates(places[local[rows]], time)
         attitude = turned_to(rays, local_directions(standard))
     stars = np.where(local >= 0, near[local], -1) if len(near) else local
-    accepted = stars if made.accepted else np.full(len(stars), -1, np.int64)
-    return Sighting(accepted, made, stars, attitude)
+    return Sighting(matched, stars, attitude)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StarImages:
     """Stars of an exposure under a calibrated camera."""
 
     stars: Indices  # (k,) catalogue star of each image, -1 for none
@@ -252,35 +207,18 @@ class Found:
         return expected_false(len(self.stars), 2, mu, matched, attitudes)
 
 
-def identify_again(
-    exposure: Exposure,
-    camera: SkyCamera,
-    site: Site,
-    catalogue: Catalogue,
-    *,
-    frame: tuple[float, float],
-    reach: float,
-    earth: Earth = _STILL,
-) -> Found:
-    """Find the nearest star of each image under a calibrated camera and attitude.
+def identify_again(exposure: Exposure, night: Night, camera: SkyCamera, reach: float) -> StarImages:
+    """Find the nearest star within a reach (pixels) of each image under a calibrated camera and attitude.
 
     Images that name their star keep it.
-
-    Parameters
-    ----------
-    exposure, camera, site, catalogue, frame, earth
-        As for `identify`; the attitude is the adjusted one.
-    reach
-        Largest distance, pixels.
     """
-    near = stars_near(exposure, camera, site, catalogue, frame, 0.0, earth.dut1)
+    frame, site, catalogue, dut1 = night.frame, night.site, night.catalogue, night.earth.dut1
+    near = stars_near(exposure, camera, site, catalogue, frame, 0.0, dut1)
     named = exposure.stars
     if named is not None:
         near = np.union1d(near, named[named >= 0])
     places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
-    predicted = project_sky(
-        camera, exposure.attitude, site, places, sidereal_time(site, exposure.utc, earth.dut1)
-    )
+    predicted = project_sky(camera, exposure.attitude, site, places, sidereal_time(site, exposure.utc, dut1))
     with np.errstate(invalid="ignore"):
         seen = ((predicted > -reach) & (predicted < np.array(frame) + reach)).all(axis=1)
         in_frame = ((predicted >= 0) & (predicted <= frame)).all(axis=1)
@@ -297,6 +235,6 @@ def identify_again(
     has = local >= 0
     off[has] = np.abs(exposure.xy[has] - predicted[local[has]]).max(axis=1)
     area = frame[0] * frame[1] * sky_share(camera, exposure.attitude, frame)
-    return Found(
+    return StarImages(
         stars, off, int(in_frame.sum()), predicted[inside], nearest, area, exposure.xy, named is not None
     )

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import unknown_name
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,7 @@ LENSES: dict[str, Lens] = {
 
 
 def lens_named(name: str) -> Lens:
-    """Return a lens.
-
-    Raises InputError: there is none of the name.
-    """
+    """Return a lens; InputError: an unknown name."""
     if name not in LENSES:
-        raise InputError(f"there is no lens {name!r}; lenses are {', '.join(LENSES)}")
+        raise InputError(unknown_name("lens", name, LENSES))
     return LENSES[name]

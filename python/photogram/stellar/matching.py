@@ -13,37 +13,35 @@ from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
 _SEEDS = 25
-"""Brightest images that make hypotheses; three times as many vote for them."""
+"""Brightest images that make hypotheses; three times as many support them."""
 _EXACT = 20
-"""Hypotheses with the most votes that are counted exactly."""
+"""Hypotheses with the most support, which are counted exactly."""
 _CANDIDATES, _TURNED = 1500, 800
-"""Pairs of an image and a star that make hypotheses at most, and where the roll is not known: they are
-compared two by two."""
+"""Largest numbers of pairs of an image and a star that make hypotheses, with known and unknown roll."""
 _DEEPER = 2
-"""Stars in the frame for each image: where the catalogue has more, the faint ones only match by chance."""
+"""Stars in the frame for each image; fainter ones of the catalogue would match by chance only."""
 FEWEST = 3
-"""Images, and stars, that a match needs."""
+"""Images, and stars, that a match requires."""
 STRETCH = 0.01
-"""Share by which the scale of the approximate camera may be wrong."""
+"""Largest error of the scale of the approximate camera, as a share."""
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """What was matched, and how likely chance would have done as well."""
+    """Matched images, and the probability of an equally good match by chance."""
 
-    found: Indices  # (m,) index of the predicted image of each image; -1 where there is none
-    # Expected number of equally good matches among all hypotheses if every one of them is wrong
-    expected: float
-    matched: int  # Of how many images the count was made that this rests on, and how many of them matched
+    found: Indices  # (m,) index of the predicted image of each image; -1 for none
+    expected: float  # Number of equally good matches among all hypotheses if all are wrong
+    matched: int  # Images of the count, and those of them that matched
     images: int
-    crowded: bool = False  # Whether there are so many stars in a tolerance area that counting cannot tell
+    crowded: bool = False  # Whether so many stars are in a tolerance area that counting is impossible
     scale: float = 1.0  # Of the predicted images over the measured ones
-    hypotheses: float = 0.0  # How many were counted
-    stars: int = 0  # Predicted images that there are to be matched
+    hypotheses: float = 0.0
+    stars: int = 0  # Predicted images
 
     @property
     def accepted(self) -> bool:
-        """Whether chance would not have found as much."""
+        """Whether chance does not explain the match."""
         return self.expected < ACCEPTED
 
 
@@ -52,13 +50,10 @@ class Search:
     """Where the images of stars may be."""
 
     frame: tuple[float, float]  # Width and height
-    # Largest distance between an image and its prediction; where the roll is not known, of their
-    # distances from the axis
-    radius: float
-    stretch: float = STRETCH  # Share by which the scale may be wrong
-    # (2,) the point about which the camera may be turned; None where its roll is known
-    axis: Floats | None = None
-    share: float = 1.0  # What of the frame shows the sky
+    radius: float  # Largest distance of an image from its prediction; of distances from an unknown roll axis
+    stretch: float = STRETCH  # Largest error of the scale, as a share
+    axis: Floats | None = None  # (2,) the image of the axis if the roll is unknown
+    share: float = 1.0  # Part of the frame that shows the sky
     tried: float = 0.0  # Hypotheses that were counted before in the same exposure
 
     def regions(self, predicted: Floats) -> tuple[Bools, float, float]:
@@ -104,31 +99,14 @@ class _Sky:
         return self.density * math.pi * tolerance**2
 
 
-def match(
-    measured: Floats,
-    predicted: Floats,
-    search: Search,
-    *,
-    tolerance: float,
-) -> Match:
-    """Match measured star images to predicted ones.
+def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: float) -> Match:
+    """Match measured star images (m, 2) to predicted ones (n, 2), both sorted by brightness.
 
-    Pairs of bright images vote for a similarity between the two sets; the best one is refined by cubic
-    polynomials. Two counts say whether that is more than chance (`photogram.stellar.odds`): of the bright
-    images near a star under the best similarity; and of every second image under polynomials that were fitted
-    to the others. Either holds for all hypotheses together, so both take part in their number.
-
-    Parameters
-    ----------
-    measured
-        (m, 2) images, the brightest first.
-    predicted
-        (n, 2) images of catalogue stars under the approximate attitude, the brightest first. Of many, the
-        brightest are taken, two for each image.
-    search
-        Where the images may be.
-    tolerance
-        Largest distance that is left after the polynomials.
+    Pairs of bright images support a similarity between the two sets; the best one is refined by cubic
+    polynomials. The tolerance is the largest distance after these. Two counts show whether that is more than
+    chance (`photogram.stellar.odds`): of the bright images near a star under the best similarity; and of
+    every second image under polynomials that were fitted to the others. Either holds for all hypotheses
+    together, so both take part in their number.
     """
     none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured), stars=len(predicted))
     if min(len(measured), len(predicted)) < FEWEST:

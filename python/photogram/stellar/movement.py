@@ -9,14 +9,41 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar import report_iteration, strict
 from photogram.stellar.parameters import GROUPS, NAMES
-from photogram.stellar.problem import Problem
-from photogram.stellar.result import FictitiousPoint, Movement
+from photogram.stellar.problem import Problem, core_problem
 from photogram.stellar.state import Solved
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A fictitious point under two attitudes."""
+
+    first: str  # The groups
+    second: str
+    xy: float  # x = y of the point, metres
+    angle: float  # Angle between its two directions, radians
+    mean_error: float
+    # Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
+    # distance), elevation; radians
+    differences: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FictitiousPoint:
+    """A plate point as a direction under one attitude."""
+
+    group: str  # Of the attitude
+    xy: float  # x = y of the point, metres
+    place: tuple[float, float]  # Apparent right ascension and declination, radians
+    azimuth: float  # Observed (refracted), from south, positive west; radians
+    elevation: float
+    covariance: Floats  # (2, 2) of the place by the orientation, radians squared
+
 
 _DIAGONAL = np.arange(9) * 0.01
 """x = y of the fictitious points, metres."""
@@ -27,44 +54,36 @@ PAIRS = ((0, 1), (1, 2), (0, 2))
 def movement(result: Result) -> tuple[Movement, ...]:
     """Compare the directions of nine points on the diagonal under every two attitudes.
 
-    The mean error rests on the covariance of all parameters, in which both attitudes share the camera.
+    The mean error follows from the covariance of all parameters, since both attitudes share the camera.
     """
     directions = {g: _directions(result, g) for g in _solved(result)}
-    cofactors = result.solved.cofactors
-    found = []
+    tests = []
     for first, second in PAIRS:
         if first not in directions or second not in directions:
             continue
-        (a, local_a, by_a), (b, local_b, by_b) = directions[first], directions[second]
-        for k, xy in enumerate(_DIAGONAL):
-            angle, row = _angle(a[k], b[k])
-            total = row @ np.vstack([by_a[k], by_b[k]])
-            error = result.mean_error * float(np.sqrt(total @ cofactors @ total))
-            found.append(
-                Movement(
-                    GROUPS[first],
-                    GROUPS[second],
-                    float(xy),
-                    angle,
-                    error,
-                    _differences(a[k], b[k], local_a[k], local_b[k]),
-                )
-            )
-    return tuple(found)
+        for xy, a, local_a, by_a, b, local_b, by_b in zip(
+            _DIAGONAL.tolist(), *directions[first], *directions[second], strict=True
+        ):
+            angle, row = _angle(a, b)
+            total = row @ np.vstack([by_a, by_b])
+            error = result.mean_error * float(np.sqrt(total @ result.solved.cofactors @ total))
+            differences = _differences(a, b, local_a, local_b)
+            tests.append(Movement(GROUPS[first], GROUPS[second], xy, angle, error, differences))
+    return tuple(tests)
 
 
 def fictitious_points(result: Result) -> tuple[FictitiousPoint, ...]:
     """Compute the directions of the nine points under every attitude, with their covariances."""
-    found = []
+    points = []
     for group in _solved(result):
         places, local, by = _directions(result, group)
         covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)
         rows = zip(_DIAGONAL.tolist(), places.tolist(), local.tolist(), covariances, strict=True)
-        found += [
+        points += [
             FictitiousPoint(GROUPS[group], xy, (ra, dec), azimuth % (2 * np.pi), elevation, covariance)
             for xy, (ra, dec), (azimuth, elevation), covariance in rows
         ]
-    return tuple(found)
+    return tuple(points)
 
 
 def _solved(result: Result) -> list[int]:
@@ -79,61 +98,41 @@ def pairs_to_combine(test: tuple[Movement, ...], factor: float) -> tuple[tuple[s
 def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
     """Return places, azimuths and elevations of the points, and partials of the places by the parameters."""
     problem, parameters = result.problem, result.solved.parameters
-    count = len(_DIAGONAL)
+    count, index, kind = len(_DIAGONAL), np.arange(len(_DIAGONAL)), problem.options.camera_kind
     xy = np.column_stack([_DIAGONAL, _DIAGONAL])
     time = np.full(count, problem.options.movement_time)
-    found = _photocore.plate_directions(
-        xy,
-        parameters[3 * group : 3 * group + 3],
-        parameters[9:22],
-        problem.options.camera_kind,
-        tolerance=1e-15,
-        passes=100,
-    )
-    standard = found[:, :2]
+    standard = _photocore.plate_directions(
+        xy, parameters[3 * group : 3 * group + 3], parameters[9:22], kind, tolerance=1e-15, passes=100
+    )[:, :2]
     places = problem.site.places(standard, time, parameters[22:])
     azimuth = np.arctan2(-standard[:, 1], -standard[:, 0])
     elevation = np.arctan2(1.0, np.hypot(standard[:, 0], standard[:, 1]))
-    equations = _equations(result, group, xy, places, time)
-    rows = np.zeros((count, 2, len(parameters)))
-    rows[:, :, 3 * group : 3 * group + 3] = equations["pointing"]
-    rows[:, :, 9:] = equations["common"]
-    # The image stays where it is: B_x d(place) = -B_o d(parameters).
-    local = np.column_stack([azimuth, elevation])
-    return places, local, np.asarray(-np.linalg.solve(equations["star"], rows), float)
-
-
-def _equations(result: Result, group: int, xy: Floats, places: Floats, time: Floats) -> dict[str, Floats]:
-    parameters, count = result.solved.parameters, len(xy)
-    unit = np.broadcast_to(np.eye(2), (count, 2, 2)).copy()
-    index = np.arange(count)
-    return _photocore.StellarProblem(
-        station=result.problem.site.core,
-        camera=result.problem.options.camera_kind,
-        pointings=parameters[:9].reshape(3, 3),
-        common=parameters[9:],
-        fixed=[False] * len(parameters),
-        weighted=np.zeros(0, np.int64),
-        weighted_values=np.zeros(0),
-        weight_root=np.zeros((0, 0)),
-        star_places=places,
-        star_catalogue=places,
+    equations = core_problem(
+        problem.site,
+        kind,
+        parameters,
+        np.zeros(len(parameters), bool),
+        places=places,
         star_weights=np.zeros((count, 2, 2)),
-        star_fixed=[False] * count,
+        star_fixed=np.zeros(count, bool),
         image_stars=index,
         image_pointings=np.full(count, group),
         image_xy=xy,
-        image_weights=unit,
+        image_weights=np.broadcast_to(np.eye(2), (count, 2, 2)).copy(),
         image_times=time,
-        image_shifts=np.zeros((count, 2)),
-        axis=None,
     ).equations()
+    rows = np.zeros((count, 2, len(parameters)))
+    rows[:, :, 3 * group : 3 * group + 3] = equations["pointing"]
+    rows[:, :, 9:] = equations["common"]
+    # The image does not move: B_x d(place) = -B_o d(parameters).
+    local = np.column_stack([azimuth, elevation])
+    return places, local, np.asarray(-np.linalg.solve(equations["star"], rows), float)
 
 
 def _angle(a: Floats, b: Floats) -> tuple[float, Floats]:
     """Return the angle between two directions, and its partials by both (equations 100 and 102).
 
-    Directions that coincide have no partials; those of a movement along the meridian stand for them.
+    Equal directions have no partials; those of a movement along the meridian replace them.
     """
     (sa, ca), (sb, cb) = (np.sin(a[1]), np.cos(a[1])), (np.sin(b[1]), np.cos(b[1]))
     sd, cd = np.sin(b[0] - a[0]), np.cos(b[0] - a[0])
@@ -151,11 +150,10 @@ def _differences(a: Floats, b: Floats, local_a: Floats, local_b: Floats) -> tupl
     def turn(angle: float) -> float:
         return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
-    zenith = np.cos(local_a[1])
     return (
         turn(b[0] - a[0]) * float(np.cos(a[1])),
         float(b[1] - a[1]),
-        turn(local_b[0] - local_a[0]) * float(zenith),
+        turn(local_b[0] - local_a[0]) * float(np.cos(local_a[1])),
         float(local_b[1] - local_a[1]),
     )
 
@@ -174,8 +172,8 @@ def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:
 def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> tuple[Floats, Floats]:
     """Return corrections and cofactors under constraints C x = misclosure (equations 104 and 105).
 
-    The cofactors (n, n) are the inverse of the normal matrix without constraints, `right` (n,) its right-hand
-    side, c (k, n) the constraints.
+    The cofactors (n, n) are the inverse of the normal matrix without constraints, `right` (n,) is its
+    right-hand side, c (k, n) the constraints.
     """
     across = cofactors @ c.T
     gain = np.linalg.solve(c @ across, across.T).T
@@ -184,16 +182,15 @@ def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> t
 
 
 def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int | None = None) -> Result:
-    """Constrain the attitudes of the given pairs to common values; two pairs stand for all three groups.
+    """Constrain the attitudes of pairs to common values; two pairs imply all three groups.
 
-    As published by one linear step, without iterating again; else iterated, with one attitude for the groups.
-    The degrees of freedom of the result count the constraints.
+    As published by one linear step; else iterated, with one attitude for the groups. The degrees of freedom
+    of the result count the constraints.
     """
     counts = replace(result.counts, constraints=len(constraints(pairs, len(NAMES))))
-    made = (
-        _modified(result, pairs) if result.problem.options.as_published else _iterated(result, pairs, threads)
-    )
-    return replace(result, solved=made, counts=counts, pairs=pairs, movement=(), messages=())
+    published = result.problem.options.as_published
+    solved = _modified(result, pairs) if published else _iterated(result, pairs, threads)
+    return replace(result, solved=solved, counts=counts, pairs=pairs, movement=(), messages=())
 
 
 def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
@@ -244,7 +241,7 @@ def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int |
         limit=problem.options.max_iterations,
         threads=threads,
     )
-    # Of what weights of several groups say, the common values keep their distance to each.
+    # The sum of squares has the differences of the common values from the weighted values of each group.
     off, axis = spread @ again.parameters - problem.initial, again.axis_residual
     weighted = float(off @ problem.parameter_weights @ off)
     if problem.axis is not None and axis is not None:

@@ -1,41 +1,48 @@
 """A night of exposures: from measured star images and rough attitudes to the calibrated camera.
 
 Stars are identified with an ideal camera first, then again with the calibrated one; images that contradict it
-are left out, one round after the other.
+are rejected, round by round.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from photogram.errors import AdjustmentError, InputError
-from photogram.messages import Message, listed
+from photogram.arguments.types import Bools
+from photogram.errors import AdjustmentError, InputError, PhotogramError
+from photogram.messages import Message
 from photogram.show.angles import ARCSEC
 from photogram.statistics.verdict import LARGEST_FACTOR
-from photogram.stellar.blind import ATTITUDE, FIELD, locate
+from photogram.stellar.blind import ATTITUDE_ERROR, FIELD_ERROR, locate
+from photogram.stellar.camera_tables import correlation_remarks
 from photogram.stellar.comparison import stood_still
 from photogram.stellar.identification import attitude_of_stars, has_named_stars
-from photogram.stellar.lens_choice import LensFit, LensTest, as_lens, compared_lenses, test_scale, test_terms
+from photogram.stellar.lens_choice import POSITIVE, LensFit, LensTest, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
 from photogram.stellar.places import Earth
+from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
+from photogram.words import Phrase, phrase
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
 
-_FIELDS = 200
-"""Fields of view that are tried for exposures whose images name their stars."""
+_MAX_FIELDS = 200
+"""Fields of view that are tried if images name their stars."""
+_MAX_ROUNDS = 10
 
 
 def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight:
     """Identify the stars of a night and calibrate the camera.
 
-    An exposure takes part when chance would not have found its stars (`photogram.stellar.odds`), and stays
-    when it fits the camera of the others (`photogram.stellar.comparison`). The others are named, with the
-    mistake that explains them if there is one (`photogram.stellar.hints`).
+    An exposure takes part if its stars are not explained by chance (`photogram.stellar.odds`) and it fits the
+    camera of the others (`photogram.stellar.comparison`). Messages name the other exposures and the mistake
+    that explains them, if there is one (`photogram.stellar.hints`).
 
     Raises
     ------
@@ -44,7 +51,7 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     AdjustmentError
         The stars do not determine the camera.
     """
-    # The pole turns all attitudes alike: it waits for the last adjustment.
+    # The pole turns all attitudes by the same angle, and is used in the last adjustment only.
     still = replace(night, earth=Earth(night.earth.dut1))
     lenses: list[LensFit] = []
     if night.blind is not None:
@@ -56,85 +63,80 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     if night.earth.pole != (0.0, 0.0):
         run.adjust(replace(still, earth=night.earth))
     found, names = run.found, night.names
-    frame, freedom = night.frame, found.degrees_of_freedom
     sd = night.pixel_sd * (found.mean_error or 1.0)
     result = CalibratedNight(
         night=night,
         exposures=tuple(run.exposures()),
-        names=tuple(names[each.index] for each in run.seen),
+        names=tuple(names[seen.index] for seen in run.seen),
         calibration=found,
-        identified=np.array([int((each.stars >= 0).sum()) for each in run.seen]),
-        rejected=np.array([int(((each.stars >= 0) & ~each.kept).sum()) for each in run.seen]),
-        odds=np.array([each.expected for each in run.seen]),
-        log_odds=np.array([each.log_odds for each in run.seen]),
-        star_probabilities=np.concatenate([each.probabilities[each.kept] for each in run.seen]),
+        identified=np.array([int((seen.stars >= 0).sum()) for seen in run.seen]),
+        rejected=np.array([int(((seen.stars >= 0) & ~seen.kept).sum()) for seen in run.seen]),
+        odds=np.array([seen.expected for seen in run.seen]),
+        log_odds=np.array([seen.log_odds for seen in run.seen]),
+        star_probabilities=np.concatenate([seen.probabilities[seen.kept] for seen in run.seen]),
         doubtful={names[index]: expected for index, expected in sorted(run.doubtful.items())},
         messages=(),
         lenses=tuple(lenses),
         scale_test=_scale_test(night, run, threads),
-        term_tests=tuple(test_terms(found.camera, freedom, frame, sd)),
+        term_tests=tuple(test_terms(found.camera, found.degrees_of_freedom, night.frame, sd)),
         standstill=stood_still(found) if night.tripod else None,
     )
-    return replace(result, messages=(*_failed(result), *run.messages(), *_remarks(result)))
+    messages = [*_failed(result), *run.messages(), *_remarks(result)]
+    return replace(result, messages=tuple(map(Message, messages)))
 
 
 def _located(night: Night, fields: tuple[float, float]) -> Night:
-    """Return the night with the attitudes and the field of view that are found in the whole sky."""
+    """Return the night with the attitudes and the field of view that fit anywhere in the sky."""
     unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
     found = (
         locate([night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth)
         if unknown
         else []
     )
-    seen = [located.field for located in found if located.found] or _field_of_stars(night, fields)
+    reasons = {index: place.reason for index, place in zip(unknown, found, strict=True) if place.reason}
+    seen = [place.field for place in found if place.reason is None] or _field_of_stars(night, fields)
     if not seen:
-        reasons = sorted({located.reason() for located in found}) or ["images name one star, and need two"]
-        raise InputError(f"no exposure is found in the sky: {listed(reasons)}")
-    exposures, reasons_of = list(night.exposures), dict(night.nowhere)
-    for index, located in zip(unknown, found, strict=True):
-        exposures[index] = replace(exposures[index], attitude=located.attitude)
-        if not located.found:
-            reasons_of[index] = located.reason()
-    camera = SkyCamera.of_field(*night.frame, float(np.median(seen)))
+        several = {reason.code: reason for reason in reasons.values()}
+        one_named = phrase("stars.one-named")
+        raise InputError(phrase("stars.not-located", reasons=[*several.values()] or [one_named]))
+    exposures = list(night.exposures)
+    for index, place in zip(unknown, found, strict=True):
+        exposures[index] = replace(exposures[index], attitude=place.attitude)
     return replace(
         night,
         exposures=exposures,
-        camera=camera,
-        attitude_error=ATTITUDE,
-        field_error=FIELD,
+        camera=SkyCamera.of_field(*night.frame, float(np.median(seen))),
+        attitude_error=ATTITUDE_ERROR,
+        field_error=FIELD_ERROR,
         roll_known=True,
-        nowhere=reasons_of,
+        nowhere={**night.nowhere, **reasons},
     )
 
 
 def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
-    """Return the field of view that fits the exposures whose images name their stars best; none without."""
-    named = [each for each in night.exposures if has_named_stars(each)]
-    if not named:
-        return []
-    tried = np.geomspace(*fields, _FIELDS)
-    misfits = [
-        sum(
-            attitude_of_stars(
-                each, SkyCamera.of_field(*night.frame, field), night.site, night.catalogue, night.earth
-            )[1]
-            for each in named
+    """Return the field of view that fits the named stars of exposures best; empty without named stars."""
+    named = [exposure for exposure in night.exposures if has_named_stars(exposure)]
+
+    def misfit(field: float) -> float:
+        camera = SkyCamera.of_field(*night.frame, field)
+        return sum(
+            attitude_of_stars(exposure, camera, night.site, night.catalogue, night.earth)[1]
+            for exposure in named
         )
-        for field in tried.tolist()
-    ]
-    return [float(tried[int(np.argmin(misfits))])]
+
+    return [min(np.geomspace(*fields, _MAX_FIELDS).tolist(), key=misfit)] if named else []
 
 
 def _directed(night: Night) -> Night:
-    """Return the night with the directions that named stars give exposures without any."""
+    """Return the night with attitudes by named stars of exposures without an attitude."""
     exposures = [
         replace(
-            each,
-            attitude=attitude_of_stars(each, night.camera, night.site, night.catalogue, night.earth)[0],
+            exposure,
+            attitude=attitude_of_stars(exposure, night.camera, night.site, night.catalogue, night.earth)[0],
         )
-        if has_named_stars(each) and np.isnan(each.attitude).any()
-        else each
-        for each in night.exposures
+        if has_named_stars(exposure) and np.isnan(exposure.attitude).any()
+        else exposure
+        for exposure in night.exposures
     ]
     return replace(night, exposures=exposures)
 
@@ -143,7 +145,7 @@ def _run(night: Night, threads: int | None) -> Run:
     """Identify and adjust until all exposures fit each other."""
     run = Run(night, threads)
     run.compare()
-    if run.identify_left_out():
+    if run.identify_rejected():
         run.compare()
     return run
 
@@ -153,40 +155,110 @@ def _with_best_lens(night: Night, threads: int | None) -> tuple[list[LensFit], N
     runs, failed = [], []
     for lens in night.lenses:
         try:
-            camera = as_lens(night.camera, lens, night.frame)
-            runs.append(_run(replace(night, camera=camera, fixed=_of(night, camera)), threads))
+            runs.append(_run(_with_camera(night, as_lens(night.camera, lens, night.frame)), threads))
         except (InputError, AdjustmentError) as error:
-            failed.append(f"{lens}: {error}")
+            failed.append(_failed_fit(lens, error))
     if not runs:
-        raise InputError(f"no lens shows stars of the catalogue: {'; '.join(failed)}")
-    most = max(runs, key=lambda run: sum(int(each.kept.sum()) for each in run.seen))
+        raise InputError(phrase("stars.no-lens-identifies", reasons=_reasons(failed)))
+    most = max(runs, key=lambda run: sum(seen.count for seen in run.seen))
     pairs = zip(most.seen, most.exposures(), strict=True)
-    exposures = [replace(exposure, stars=each.stars) for each, exposure in pairs]
-    fits, camera = compared_lenses(
-        night.lenses,
-        exposures,
-        most.found.camera,
-        night.site,
-        night.catalogue,
-        frame=night.frame,
-        pixel_sd=night.pixel_sd,
-        rejection=night.rejection,
-        fixed=night.fixed,
-        common_scale=night.common_scale,
-        earth=night.earth,
-        threads=threads,
-    )
-    start = replace(camera, covariance=np.zeros_like(camera.covariance))
-    return fits, replace(night, camera=start, fixed=_of(night, start))
+    exposures = [replace(exposure, stars=seen.stars) for seen, exposure in pairs]
+    fits, camera = _compared_lenses(night, exposures, most.found.camera, threads)
+    return fits, _with_camera(night, replace(camera, covariance=np.zeros_like(camera.covariance)))
 
 
-def _of(night: Night, camera: SkyCamera) -> tuple[str, ...]:
-    """Return the names of those parameters to be held that a camera has."""
-    return tuple(name for name in night.fixed if name in camera.names)
+def _with_camera(night: Night, camera: SkyCamera) -> Night:
+    """Return the night with another camera, and those fixed parameters that the camera has."""
+    return replace(night, camera=camera, fixed=tuple(name for name in night.fixed if name in camera.names))
+
+
+def as_lens(camera: SkyCamera, lens: str, frame: tuple[float, float]) -> SkyCamera:
+    """Return an ideal camera of another lens with the same horizontal field of view.
+
+    Raises InputError: the field of view of the lens is smaller.
+    """
+    if lens == camera.lens:
+        return camera
+    left, right = camera.rays(np.array([[0.0, camera.values[3]], [frame[0], camera.values[3]]]))
+    field = math.acos(max(-1.0, min(1.0, float(left[2])))) + math.acos(max(-1.0, min(1.0, float(right[2]))))
+    return SkyCamera.of_field(*frame, field, lens)
+
+
+def _compared_lenses(
+    night: Night, exposures: Sequence[Exposure], camera: SkyCamera, threads: int | None
+) -> tuple[list[LensFit], SkyCamera]:
+    """Adjust lenses to the same images; return them, the best first, and the camera of the best.
+
+    Images that one lens rejects are not used for any lens, unless the lens rejects most of them.
+
+    Raises AdjustmentError: no lens can be adjusted.
+    """
+    night = replace(night, weigh_stars=False)
+
+    def adjust(start: SkyCamera, images: Sequence[Exposure]) -> SkyCalibration:
+        return adjusted(_with_camera(night, start), images, start, threads)
+
+    tried: dict[str, tuple[SkyCamera, list[Bools]]] = {}
+    fits: list[LensFit] = []
+    failed: list[LensFit] = []
+    for lens in night.lenses:
+        now = list(exposures)
+        try:
+            found = adjust(as_lens(camera, lens, night.frame), now)
+            for _ in range(_MAX_ROUNDS if night.rejection else 0):
+                far = np.abs(found.residuals).max(axis=1)
+                limit = night.rejection * max(1.4826 * float(np.median(np.abs(found.residuals))), 1e-12)
+                if not (far > limit).any():
+                    break
+                for number, exposure in enumerate(now):
+                    stars = np.array(exposure.stars)
+                    chosen = np.flatnonzero(stars >= 0)
+                    stars[chosen[far[found.exposures == number] > limit]] = -1
+                    now[number] = replace(exposure, stars=stars, attitude=found.attitudes[number])
+                found = adjust(found.camera, now)
+        except (InputError, AdjustmentError) as error:
+            failed.append(_failed_fit(lens, error))
+            continue
+        tried[lens] = found.camera, [np.asarray(exposure.stars) >= 0 for exposure in now]
+    counts = {lens: sum(int(images.sum()) for images in kept) for lens, (_, kept) in tried.items()}
+    usual = [kept for lens, (_, kept) in tried.items() if 2 * counts[lens] > max(counts.values())]
+    common = [np.logical_and.reduce(images) for images in zip(*usual, strict=True)]
+    shared = [
+        replace(exposure, stars=np.where(chosen, np.asarray(exposure.stars), -1))
+        for exposure, chosen in zip(exposures, common, strict=False)
+    ]
+    cameras = {}
+    for lens, (start, _) in tried.items():
+        try:
+            found = adjust(start, shared)
+        except (InputError, AdjustmentError) as error:
+            failed.append(_failed_fit(lens, error))
+            continue
+        count = int(found.camera.known.sum())
+        effective = found.degrees_of_freedom + count
+        total = max(found.mean_error**2 * found.degrees_of_freedom, 1e-300)
+        bic = effective * math.log(total / effective) + count * math.log(effective)
+        fits.append(LensFit(lens, count, len(found.xy), found.mean_error, bic))
+        cameras[lens] = found.camera
+    if not fits:
+        raise AdjustmentError(phrase("stars.no-lens", reasons=_reasons(failed)))
+    fits.sort(key=lambda fit: fit.bic)
+    near = [fit for fit in fits if fit.bic - fits[0].bic < POSITIVE]
+    best = min(near, key=lambda fit: (fit.parameters, fit.bic))
+    fits.remove(best)
+    return [best, *fits, *failed], cameras[best.lens]
+
+
+def _failed_fit(lens: str, error: PhotogramError) -> LensFit:
+    return LensFit(lens, 0, 0, math.nan, math.inf, error.phrase or str(error))
+
+
+def _reasons(failed: Sequence[LensFit]) -> list[Phrase]:
+    return [phrase("error.at", what=fit.lens, message=fit.reason) for fit in failed]
 
 
 def _scale_test(night: Night, run: Run, threads: int | None) -> LensTest | None:
-    """Test fx = fy, by an adjustment without that condition where there is one."""
+    """Test fx = fy; with this condition by an adjustment without it."""
     found = run.found
     if night.common_scale:
         if night.prior is not None:
@@ -196,52 +268,36 @@ def _scale_test(night: Night, run: Run, threads: int | None) -> LensTest | None:
     return test_scale(found.camera, found.degrees_of_freedom, night.frame, sd)
 
 
-def _failed(result: CalibratedNight) -> list[Message]:
-    """Say what makes the camera unfit for use, and of which nature it is."""
-    texts, lens = [], result.camera.lens
+def _failed(result: CalibratedNight) -> Iterator[Phrase]:
+    """Return the reasons why the camera cannot be used."""
+    lens = result.camera.lens
     if not result.converged:
-        texts.append(f"the adjustment has not converged: {result.calibration.status}: do not use this camera")
+        yield phrase("stars.not-converged", status=result.calibration.status)
     if result.mostly_left_out:
-        texts.append("more exposures are left out than take part: do not use this camera")
-    texts += [
-        f"the identification of exposure {name} is doubtful: by chance {expected:.2g} attitudes would show"
-        " as many stars: do not use this camera before the exposure is taken out of the file, or confirmed"
-        for name, expected in result.doubtful.items()
-    ]
+        yield phrase("stars.mostly-rejected")
+    for name, expected in result.doubtful.items():
+        yield phrase("stars.doubtful", name=name, expected=expected)
     test = result.test
     failed = test.problem() if test else None
     if test and failed:
-        texts.append(f"{failed}: do not use this camera" if test.factor > LARGEST_FACTOR else failed)
+        code = "stars.do-not-use" if test.factor > LARGEST_FACTOR else "stars.residuals"
+        yield phrase(code, reason=failed)
         missing = result.night.site.effects.left_out
-        places = f", or its places need {' and '.join(missing)}, left out of them" if missing else ""
-        texts.append(
-            f"the stars are found beyond doubt: sd_px is too small, or the lens {lens} does not"
-            f" describe this camera (others are {listed([name for name in LENSES if name != lens])}){places}"
-        )
-    return [Message(text) for text in texts]
+        effects = [phrase("stars.effects-missing", effects=missing)] if missing else []
+        others = [name for name in LENSES if name != lens]
+        yield phrase("stars.lens-or-sd", lens=lens, lenses=others, effects=effects)
 
 
-def _remarks(result: CalibratedNight) -> list[Message]:
-    """Name what the stars hardly determine, and what else they say."""
-    texts = [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in result.correlated()]
-    weak = [
-        f"{test.name} (probability {test.probability:.2g})"
-        for test in result.term_tests
-        if not test.significant
-    ]
-    if weak:
-        texts.append(f"distortion terms that are not significant: {'; '.join(weak)}")
-    scale = result.scale_test
+def _remarks(result: CalibratedNight) -> Iterator[Phrase]:
+    """Return remarks on parameters that the stars hardly determine, and on the tests of lens and tripod."""
+    yield from correlation_remarks(result.correlated())
+    tests, scale, standstill = result.term_tests, result.scale_test, result.standstill
+    if weak := [test for test in tests if not test.significant]:
+        terms = [phrase("stars.weak-term", name=test.name, p=test.probability) for test in weak]
+        yield phrase("stars.weak-terms", terms=terms)
     if scale is not None and result.night.common_scale and scale.needed:
-        texts.append(
-            f"fx is not fy: the data refuse it (F = {scale.statistic:.1f}, probability"
-            f" {scale.probability:.2g}), it makes {scale.effect:.2f} px at the rim"
-        )
-    if result.standstill is not None:
-        texts += [
-            f"exposure {result.names[k]}: the camera did not stand still, it is turned by"
-            f" {result.standstill.turns[k] / ARCSEC:.1f} arcsec against the others"
-            f" (probability {result.standstill.own[k]:.2g})"
-            for k in result.standstill.moved
-        ]
-    return [Message(text) for text in texts]
+        yield phrase("stars.scale", f=scale.statistic, p=scale.probability, effect=scale.effect)
+    if standstill is not None:
+        for k in standstill.moved:
+            turn, p = float(standstill.turns[k] / ARCSEC), float(standstill.own[k])
+            yield phrase("stars.moved", name=result.names[k], turn=turn, p=p)

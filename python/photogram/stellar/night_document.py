@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -42,21 +41,14 @@ def night_document(result: CalibratedNight) -> Document:
     free = np.flatnonzero(camera.known)
     matrix = correlations(camera.covariance)[np.ix_(free, free)]
     names = [camera.names[row] for row in free]
+    correlation = matrix_table("correlations", "Correlations", names, matrix, decimals=3)
     lens = "Which lens the data prefer, and which of its terms are significant."
+    layers = Layers("exposure-layers", tables.exposures(result, MAX_EXPOSURES))
     sections = [
         Section("pictures", "Stars and residuals", [pictures(sketches(result))]),
         Section("size", "How much, how good", [Facts("How much", much), Facts("How good", good)]),
-        Section(
-            "camera",
-            "Camera",
-            [
-                tables.parameters(result),
-                matrix_table("correlations", "Correlations", names, matrix, decimals=3),
-            ],
-        ),
-        Section(
-            "exposures", "Exposures", [Layers("exposure-layers", tables.exposures(result, MAX_EXPOSURES))]
-        ),
+        Section("camera", "Camera", [tables.parameters(result), correlation]),
+        Section("exposures", "Exposures", [layers]),
         Section("lens", "Lens", [tables.lens_tests(result), tables.lenses(result)], lens),
         Section.of(tables.worst(result, MAX_WORST_IMAGES)),
         tests_section(result.verdict),
@@ -91,7 +83,6 @@ def pictures(drawn: dict[str, Plot]) -> Layers:
 
 def _members(result: CalibratedNight) -> dict[str, Any]:
     found, night, camera, test = result.calibration, result.night, result.camera, result.test
-    own = members(result, "converged", "usable", "doubtful", "falsely_identified")
     return {
         "title": night.title,
         "conventions": CONVENTIONS,
@@ -99,13 +90,13 @@ def _members(result: CalibratedNight) -> dict[str, Any]:
         "m_unit": "standard deviation of an image coordinate",
         "sd_px": night.pixel_sd,
         **members(found, "degrees_of_freedom", "iterations", stop="status"),
-        **own,
+        **members(result, "converged", "usable", "doubtful", "falsely_identified"),
         "verdict": result.verdict.document(),
         "global_test": test and members(test, "limits", "probability", variance_of_unit_weight="variance"),
         "lens": {
             "name": camera.lens,
             **members(camera, "common_scale", model="facts.model", formula="facts.formula"),
-            "tried": result.lenses,
+            "tried": [{**vars(fit), "reason": str(fit.reason)} for fit in result.lenses],
             "scale_test": result.scale_test and _test(result.scale_test),
             "term_tests": [*map(_test, result.term_tests)],
         },
@@ -119,7 +110,7 @@ def _members(result: CalibratedNight) -> dict[str, Any]:
 
 
 def _test(test: LensTest) -> dict[str, Any]:
-    return asdict(test) | {"verdict": test.verdict}
+    return {**vars(test), "verdict": test.verdict}
 
 
 def _standstill(result: CalibratedNight) -> dict[str, Any] | None:

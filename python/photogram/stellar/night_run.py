@@ -1,36 +1,36 @@
-"""The exposures of a night that take part, the camera they give, and those that are left out."""
+"""The exposures of a night that take part, the camera they give, and those that are rejected."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, listed
 from photogram.stellar.comparison import fewer_stars, held_out
-from photogram.stellar.hints import Hint, Setting, find_hint
-from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, Found, identify, identify_again
+from photogram.stellar.hints import find_hint
+from photogram.stellar.identification import (
+    STARS_OF_AN_ATTITUDE,
+    attitude_radius,
+    identify,
+    identify_again,
+)
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.odds import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS
 from photogram.stellar.pointing import turn_between
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
+from photogram.words import Phrase, phrase
 
-_ROUNDS = 20
+MAX_REJECTION_ROUNDS = 20
 _REACH = 3.0
-"""Distance from a predicted image up to which a measured one is called its star at least, pixels."""
-_FAR = 2.0
-"""Errors of the approximate attitudes from which an exposure is named: the lens was not known, either."""
-_UNEXPLAINED = (
-    "none of the mistakes that are often made explains it (angles, mirrored images, place, time, field of"
-    " view): compare attitudes, attitude_error_deg and field of view with the exposures, and the catalogue"
-    " with the images"
-)
+"""Distance in pixels within which the star of an image is searched for at least."""
+_NOTABLE_ERROR = 2.0
+"""Multiple of the error of approximate attitudes that is remarked on: they were compared by another lens."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,120 +40,109 @@ class Seen:
     index: int  # Among those of the night
     stars: Indices  # (k,) catalogue star of each image, -1 for none
     kept: Bools  # (k,) which images take part
-    attitude: Floats  # (3,) that the stars of the first identification give
-    # Expected number of chance matches as good as the first identification; NaN where images name their
-    # stars
+    attitude: Floats  # (3,) by the stars of the first identification
+    # Expected number of chance matches as good as the first identification; NaN if images name their stars
     first: float = math.nan
-    odds: float = 0.0  # Expected number of wrong attitudes that would do as well under the camera
-    log_odds: float = math.nan  # Of the exposure against chance, as Lang et al. have them
+    odds: float = 0.0  # Expected number of wrong attitudes that match as well under the camera
+    log_odds: float = math.nan  # Of the exposure against chance (Lang et al.)
     probabilities: Floats = field(default_factory=lambda: np.zeros(0))  # (k,) of the stars; NaN for none
     scale: float = 1.0  # Of predicted images over measured ones
 
     @property
     def expected(self) -> float:
-        """The larger of the two expected numbers; NaN where the images name their stars."""
+        """The larger of the two expected numbers; NaN if the images name their stars."""
         return max(self.first, self.odds) if math.isfinite(self.first) else math.nan
 
-    def exposure(self, night: Night, attitude: Floats | None = None) -> Exposure:
+    @property
+    def count(self) -> int:
+        """Images that take part."""
+        return int(self.kept.sum())
+
+    def exposure(self, night: Night, attitude: Floats) -> Exposure:
         """Return the exposure with the stars of the images that take part."""
-        given = night.exposures[self.index]
-        start = self.attitude if attitude is None else attitude
-        return replace(given, attitude=start, stars=np.where(self.kept, self.stars, -1))
+        stars = np.where(self.kept, self.stars, -1)
+        return replace(night.exposures[self.index], attitude=attitude, stars=stars)
 
 
 class Run:
-    """The exposures that take part, the camera they give, and those that are left out."""
+    """The exposures that take part, the camera they give, and those that are rejected."""
 
     def __init__(self, night: Night, threads: int | None) -> None:
         self.night, self.threads = night, threads
-        self.left_out: dict[int, str] = {}
-        self.doubtful: dict[int, float] = {}
-        self.tried: dict[int, float] = {}
+        self.rejected: dict[int, str | Phrase] = {}  # reasons
+        self.doubtful: dict[int, float] = {}  # expected numbers of chance matches
+        self.tried: dict[int, float] = {}  # numbers of hypotheses
         self.first: list[Seen] = []
         self.seen: list[Seen] = []
         self.found: SkyCalibration
         self.unsettled = False
         for index, exposure in enumerate(night.exposures):
             if index in night.nowhere:
-                self.left_out[index] = night.nowhere[index]
+                self.rejected[index] = night.nowhere[index]
             elif exposure.stars is None:
                 self._sight(index, night.camera, night.tolerance, night.field_error)
             else:
                 self._take(Seen(index, exposure.stars, exposure.stars >= 0, exposure.attitude))
-        unknown = self._unidentified()
-        hint = find_hint(
-            [night.exposures[index] for index in unknown],
-            [night.names[i] for i in unknown],
-            setting_of(night),
-        )
-        self.hint = hint
+        self.hint = find_hint(night, self._unidentified())
         if not self.first:
-            reasons = [f"exposure {night.names[i]}: {reason}" for i, reason in self.left_out.items()]
-            texts = ["no exposure shows stars of the catalogue where its attitude says they are"]
-            explained = [_said(hint) if hint else _UNEXPLAINED]
-            raise InputError("; ".join([*texts, *explained, listed(reasons, 3)]))
+            reasons = [self._named("stars.exposure", i, reason=text) for i, text in self.rejected.items()]
+            cause = self._cause() if self.hint else phrase("stars.unexplained")
+            raise InputError(phrase("stars.no-exposure", cause=cause, reasons=reasons))
         self.settle()
 
-    def _sight(self, index: int, camera: SkyCamera, tolerance: float, field_error: float) -> None:
-        """Identify an exposure: it takes part when chance would not have done so, or the user says so."""
-        night = self.night
+    def _named(self, code: str, index: int, **fields: object) -> Phrase:
+        return Phrase(code, {"name": self.night.names[index], **fields})
+
+    def _sight(self, index: int, camera: SkyCamera, tolerance: float, stretch: float) -> None:
+        """Identify an exposure: it takes part if chance explains less, or if the user confirms it."""
+        night, tried = self.night, self.tried.get(index, 0.0)
         sighting = identify(
-            night.exposures[index],
-            camera,
-            night.site,
-            night.catalogue,
-            frame=night.frame,
-            radius=setting_of(night).radius,
-            tolerance=tolerance,
-            earth=night.earth,
-            stretch=field_error,
-            roll_known=night.roll_known,
-            tried=self.tried.get(index, 0.0),
+            night.exposures[index], night, camera, tolerance=tolerance, stretch=stretch, tried=tried
         )
-        made = sighting.match
-        self.tried[index] = made.hypotheses
+        match = sighting.match
+        self.tried[index] = match.hypotheses
         self.doubtful.pop(index, None)
-        confirmed = sighting.doubtful and night.names[index] in night.confirmed
-        if not (sighting.accepted or confirmed):
-            self.left_out[index] = sighting.reason()
-            if sighting.doubtful:
-                self.doubtful[index] = made.expected
+        if match.accepted or (sighting.doubtful and night.names[index] in night.confirmed):
+            kept, scale = sighting.stars >= 0, match.scale
+            self._take(
+                Seen(index, sighting.stars, kept, sighting.attitude, first=match.expected, scale=scale)
+            )
             return
-        stars = sighting.found
-        self._take(Seen(index, stars, stars >= 0, sighting.attitude, first=made.expected, scale=made.scale))
+        self.rejected[index] = sighting.reason()
+        if sighting.doubtful:
+            self.doubtful[index] = match.expected
 
     def _unidentified(self) -> list[int]:
-        """Return the exposures that are left out and may be found otherwise."""
+        """Return the rejected exposures that another attitude or camera may identify."""
         night = self.night
-        return [i for i in self.left_out if night.exposures[i].stars is None and i not in night.nowhere]
+        return [i for i in self.rejected if night.exposures[i].stars is None and i not in night.nowhere]
 
     def _take(self, seen: Seen) -> None:
-        """Let an exposure take part if it has stars enough."""
-        count = int((seen.stars >= 0).sum())
-        if count < STARS_OF_AN_ATTITUDE:
-            self.left_out[seen.index] = f"{count} of its {len(seen.stars)} images have a star"
+        """Let an exposure with enough stars take part."""
+        if seen.count < STARS_OF_AN_ATTITUDE:
+            counts = {"matched": seen.count, "images": len(seen.stars), "least": STARS_OF_AN_ATTITUDE}
+            self.rejected[seen.index] = Phrase("stars.few-named", counts)
         else:
-            self.left_out.pop(seen.index, None)
+            self.rejected.pop(seen.index, None)
             self.first.append(seen)
 
     def exposures(self) -> list[Exposure]:
-        """Return the exposures that take part, with their stars and attitudes."""
+        """Return the exposures that take part, with their stars and adjusted attitudes."""
         pairs = zip(self.seen, self.found.attitudes, strict=True)
-        return [each.exposure(self.night, attitude) for each, attitude in pairs]
+        return [seen.exposure(self.night, attitude) for seen, attitude in pairs]
 
     def adjust(self, night: Night) -> None:
-        """Adjust once more from the values that were found."""
+        """Adjust once more from the adjusted values."""
         self.found = adjusted(night, self.exposures(), self.found.camera, self.threads)
 
     def settle(self) -> None:
-        """Adjust from the first identification, until no image comes or goes."""
+        """Adjust from the first identification until the images that take part do not change."""
         night, self.seen = self.night, self.first
-        exposures = [each.exposure(night) for each in self.seen]
+        exposures = [seen.exposure(night, seen.attitude) for seen in self.seen]
         self.found = adjusted(night, exposures, self._start(), self.threads)
-        self.unsettled = True
-        for _ in range(_ROUNDS):
+        for _ in range(MAX_REJECTION_ROUNDS):
             pairs = zip(self.seen, self.found.attitudes, strict=True)
-            again = [_seen_again(night, each, self.found, attitude) for each, attitude in pairs]
+            again = [_seen_again(night, seen, self.found, attitude) for seen, attitude in pairs]
             same = zip(again, self.seen, strict=True)
             self.unsettled = not all((a.kept == b.kept).all() and (a.stars == b.stars).all() for a, b in same)
             self.seen = again
@@ -162,8 +151,8 @@ class Run:
             self.adjust(night)
 
     def _start(self) -> SkyCamera:
-        """Return the camera to begin with: of the scale that its exposures have."""
-        camera, scales = self.night.camera, [each.scale for each in self.first]
+        """Return the camera to begin with, scaled as its exposures require."""
+        camera, scales = self.night.camera, [seen.scale for seen in self.first]
         if self.night.prior is not None or camera.known.any():
             return camera
         values = camera.values.copy()
@@ -171,112 +160,93 @@ class Run:
         return replace(camera, values=values)
 
     def compare(self) -> None:
-        """Take out exposures that do not fit the others, the worst first, until all do."""
+        """Reject exposures that do not fit the others, the worst first, until all fit."""
         while worst := self._worst():
             index, reason = worst
-            self.left_out[index] = reason
-            self.first = [each for each in self.first if each.index != index]
+            self.rejected[index] = reason
+            self.first = [seen for seen in self.first if seen.index != index]
             if not self.first:
-                name = self.night.names[index]
-                raise InputError(f"no exposure is left; the last one, {name}, is left out: {reason}")
+                raise InputError(self._named("stars.no-exposure-left", index, reason=reason))
             self.settle()
 
-    def _worst(self) -> tuple[int, str] | None:
-        by_chance = max(self.seen, key=lambda each: np.nan_to_num(each.odds))
-        name = self.night.names[by_chance.index]
-        allowed = DOUBTFUL if name in self.night.confirmed else ACCEPTED
-        if by_chance.odds >= allowed:
-            if by_chance.odds <= DOUBTFUL:
-                self.doubtful[by_chance.index] = by_chance.odds
-            count, images = int(by_chance.kept.sum()), len(by_chance.kept)
-            return by_chance.index, (
-                f"under the calibrated camera {count} of its {images} images have a star, which chance may do"
-            )
+    def _worst(self) -> tuple[int, Phrase] | None:
+        """Return the exposure that fits the others least, and the reason; None if all fit."""
+        night, confirmed = self.night, set(self.night.confirmed)
+        worst = max(self.seen, key=lambda seen: np.nan_to_num(seen.odds))
+        if worst.odds >= (DOUBTFUL if night.names[worst.index] in confirmed else ACCEPTED):
+            if worst.odds <= DOUBTFUL:
+                self.doubtful[worst.index] = worst.odds
+            return worst.index, _counted("stars.matches-by-chance", worst)
         unnamed = [
-            each
-            for each in self.seen
-            if self.night.exposures[each.index].stars is None
-            and self.night.names[each.index] not in self.night.confirmed
+            seen
+            for seen in self.seen
+            if night.exposures[seen.index].stars is None and night.names[seen.index] not in confirmed
         ]
-        poor = fewer_stars(
-            np.array([len(each.kept) for each in unnamed]), np.array([each.kept.sum() for each in unnamed])
-        )
-        if poor:
-            each = unnamed[poor[0]]
-            return each.index, (
-                f"under the calibrated camera {int(each.kept.sum())} of its {len(each.kept)} images have a"
-                " star, less than half of what the other exposures have"
-            )
+        images, matched = np.array([(len(seen.kept), seen.count) for seen in unnamed]).reshape(-1, 2).T
+        if poor := fewer_stars(images, matched):
+            return unnamed[poor[0]].index, _counted("stars.few-matches", unnamed[poor[0]])
         tests = held_out(
             self.exposures(),
             self.found,
-            self.night.site,
-            self.night.catalogue,
-            pixel_sd=self.night.pixel_sd,
-            earth=self.night.earth,
+            night.site,
+            night.catalogue,
+            pixel_sd=night.pixel_sd,
+            earth=night.earth,
         )
         unlike = [(test.factor, k) for k, test in enumerate(tests) if test.unlike(len(tests))]
         if not unlike:
             return None
         factor, k = max(unlike)
-        return self.seen[k].index, (
-            f"under the camera of the other exposures its residuals are {factor:.3g} times larger than theirs"
-        )
+        return self.seen[k].index, phrase("stars.unlike", factor=factor)
 
-    def _far(self) -> list[str]:
-        """Name exposures whose stars turn them farther from the given attitude than it may be wrong."""
-        night, texts = self.night, []
-        width, height = night.frame
-        corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
-        looked = corners if night.roll_known else np.array([[0.5 * width, 0.5 * height]])
-        rays = self.found.camera.rays(looked)
-        for each, attitude in zip(self.seen, self.found.attitudes, strict=True):
-            given = night.exposures[each.index]
-            turn = turn_between(given.attitude, attitude, rays)
-            if given.stars is None and turn > _FAR * night.attitude_error:
-                texts.append(
-                    f"exposure {night.names[each.index]}: its stars are up to {math.degrees(turn):.1f}"
-                    " degrees from where its attitude says, which is said to be wrong by"
-                    f" {math.degrees(night.attitude_error):g}: look at its time, its angles and the station"
-                )
-        return texts
-
-    def identify_left_out(self) -> bool:
-        """Try exposures that are left out once more, with the calibrated camera; say whether any is found."""
+    def identify_rejected(self) -> bool:
+        """Identify rejected exposures with the calibrated camera; return whether any now takes part."""
         night, before = self.night, len(self.first)
         tolerance = min(night.tolerance, max(2 * night.rejection * _noise(night, self.found), _REACH))
         for index in self._unidentified():
             self._sight(index, self.found.camera, tolerance, STRETCH)
-        self.first.sort(key=lambda each: each.index)
+        self.first.sort(key=lambda seen: seen.index)
         if len(self.first) == before:
             return False
         self.settle()
         return True
 
-    def messages(self) -> list[Message]:
-        """Say what was left out, and why."""
-        names = self.night.names
-        # What was found after all needs no explanation.
-        explains = self.hint and {names[i] for i in self.left_out} & set(self.hint.exposures)
-        texts = [
-            *([_said(self.hint)] if self.hint and explains else []),
-            *self._far(),
-            *(f"exposure {names[i]} is left out: {reason}" for i, reason in sorted(self.left_out.items())),
-        ]
-        texts += [
-            f"exposure {names[each.index]}: the count of its stars and the odds of their distances disagree"
-            f" (by chance {each.expected:.2g}, log odds {each.log_odds:.1f}, accepted from {LOG_ODDS:.1f})"
-            for each in self.seen
-            if math.isfinite(each.expected) and (each.expected < ACCEPTED) != (each.log_odds > LOG_ODDS)
-        ]
+    def messages(self) -> Iterator[Phrase]:
+        """Return remarks on rejected exposures and their reasons, attitudes and odds."""
+        # An exposure that was identified later needs no explanation.
+        if self.hint and {self.night.names[i] for i in self.rejected} & set(self.hint[1]):
+            yield self._cause()
+        yield from self._far()
+        for index, reason in sorted(self.rejected.items()):
+            yield self._named("stars.rejected", index, reason=reason)
+        for seen in self.seen:
+            if math.isfinite(seen.expected) and (seen.expected < ACCEPTED) != (seen.log_odds > LOG_ODDS):
+                odds = {"expected": seen.expected, "odds": seen.log_odds, "limit": LOG_ODDS}
+                yield self._named("stars.odds-disagree", seen.index, **odds)
         if self.unsettled:
-            texts.append(f"images still come and go after {_ROUNDS} rounds of rejection")
-        return [Message(text) for text in texts]
+            yield phrase("stars.unsettled", rounds=MAX_REJECTION_ROUNDS)
+
+    def _cause(self) -> Phrase:
+        assert self.hint is not None
+        mistake, names = self.hint
+        return phrase("stars.cause", mistake=mistake, n=len(names), names=names)
+
+    def _far(self) -> Iterator[Phrase]:
+        """Remark on exposures that differ from their approximate attitude by more than its error."""
+        night, error = self.night, self.night.attitude_error
+        width, height = night.frame
+        corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+        rays = self.found.camera.rays(corners if night.roll_known else corners[3:] / 2)
+        for seen, attitude in zip(self.seen, self.found.attitudes, strict=True):
+            exposure = night.exposures[seen.index]
+            turn = turn_between(exposure.attitude, attitude, rays)
+            if exposure.stars is None and turn > _NOTABLE_ERROR * error:
+                degrees = {"turn": math.degrees(turn), "error": math.degrees(error)}
+                yield self._named("stars.far", seen.index, **degrees)
 
 
-def _said(hint: Hint) -> str:
-    named = f"exposure{'s' if len(hint.exposures) > 1 else ''} {listed(list(hint.exposures))}"
-    return f"as it seems, {hint.text}: stars of {named} are found then"
+def _counted(code: str, seen: Seen) -> Phrase:
+    return phrase(code, matched=seen.count, images=len(seen.kept))
 
 
 def adjusted(
@@ -298,39 +268,17 @@ def adjusted(
     )
 
 
-def setting_of(night: Night) -> Setting:
-    """Return what exposures of a night are identified with."""
-    return Setting(
-        night.site,
-        night.catalogue,
-        night.frame,
-        night.camera,
-        night.attitude_error,
-        night.tolerance,
-        night.earth,
-        night.field_error,
-        night.roll_known,
-    )
-
-
 def _noise(night: Night, found: SkyCalibration) -> float:
     """Return the robust standard deviation of the residuals, pixels."""
     return max(1.4826 * float(np.median(np.abs(found.residuals))), 1e-3 * night.pixel_sd)
 
 
 def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Floats) -> Seen:
-    """Identify stars with the calibrated camera, and leave out images that are far from theirs."""
-    given, noise = night.exposures[seen.index], _noise(night, found)
+    """Identify stars with the calibrated camera, and reject images that are far from theirs."""
+    exposure, noise = night.exposures[seen.index], _noise(night, found)
     limit = night.rejection * noise if night.rejection else math.inf
-    again = identify_again(
-        replace(given, attitude=attitude),
-        found.camera,
-        night.site,
-        night.catalogue,
-        frame=night.frame,
-        reach=max(2 * night.rejection * noise, _REACH),
-        earth=night.earth,
-    )
+    reach = max(2 * night.rejection * noise, _REACH)
+    again = identify_again(replace(exposure, attitude=attitude), night, found.camera, reach)
     probabilities = again.probabilities(noise)
     with np.errstate(invalid="ignore"):
         kept = again.off <= limit
@@ -339,17 +287,11 @@ def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Float
     if kept.sum() < STARS_OF_AN_ATTITUDE:
         return replace(seen, odds=math.inf)
     odds = log_odds = math.nan
-    if given.stars is None:
-        odds, log_odds = _odds(night, again, limit), again.log_odds(noise)
+    if exposure.stars is None:
+        radius, log_odds = attitude_radius(night), again.log_odds(noise)
+        # A whole turn moves the corners along their circle.
+        roll = radius if night.roll_known else 0.5 * math.pi * math.hypot(*night.frame)
+        odds = again.expected(limit if night.rejection else _REACH, radius, roll)
     return replace(
         seen, stars=again.stars, kept=kept, odds=odds, log_odds=log_odds, probabilities=probabilities
     )
-
-
-def _odds(night: Night, again: Found, limit: float) -> float:
-    """Return the expected number of wrong attitudes with as many stars under the camera."""
-    reach = limit if math.isfinite(limit) else _REACH
-    radius = setting_of(night).radius
-    # A whole turn moves the corners by their circle.
-    roll = radius if night.roll_known else 0.5 * math.pi * math.hypot(*night.frame)
-    return again.expected(reach, radius, roll)

@@ -20,13 +20,13 @@ from photogram.stellar.camera_tables import (
     names_column,
     parameter_table,
 )
+from photogram.stellar.findings import night_tests
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
-from photogram.stellar.night_result import Night
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.pointing import axis_of
 
 if TYPE_CHECKING:
-    from photogram.stellar import CalibratedNight
+    from photogram.stellar import CalibratedNight, Night
 
 _PIXELS = (Axis.of("x", "px", "_px"), Axis.of("y", "px", "_px"))
 _DEGREES = ("deg", "deg", 1.0)
@@ -39,8 +39,7 @@ def parameters(result: CalibratedNight) -> Table:
     if prior is not None:
         deviations = np.sqrt(np.diag(prior.covariance))
         before = np.where(prior.known, [prior.values, deviations], np.nan)
-    axes = tuple(Axis(name, "pixel" if name[0] in "fc" else "") for name in camera.names)
-    axes = tuple(replace(axis, small="px" if axis.unit else "") for axis in axes)
+    axes = tuple(Axis(name, "pixel", small="px") if name[0] in "fc" else Axis(name) for name in camera.names)
     note = "fy is fx: there is one principal distance." if camera.common_scale else ""
     errors = np.sqrt(np.diag(camera.covariance))
     return parameter_table(axes, camera.values, errors, before, result.significance(), note=note)
@@ -88,15 +87,16 @@ def exposure_table(result: CalibratedNight) -> Table:
 
 def _fit(result: CalibratedNight) -> list[Quantity]:
     found, count = result.calibration, len(result.names)
-    own = [found.exposures == i for i in range(count)]
-    rms = np.array([np.sqrt(np.mean(found.residuals[rows] ** 2)) for rows in own])
-    certain = [result.star_probabilities[rows] for rows in own]
-    least = np.array([np.nanmin(each) if np.isfinite(each).any() else np.nan for each in certain])
-    images_ = [len(each.xy) for each in result.exposures]
+    rows_of = [found.exposures == i for i in range(count)]
+    rms = np.array([np.sqrt(np.mean(found.residuals[rows] ** 2)) for rows in rows_of])
+    likely = [result.star_probabilities[rows] for rows in rows_of]
+    least = np.array([np.nanmin(values) if np.isfinite(values).any() else np.nan for values in likely])
     return [
         _exposure(result),
         of_each(result.exposures, "utc", kind="name", name="utc", head="UTC"),
-        Quantity(images_, name="images", member="images", head="Images"),
+        Quantity(
+            [len(exposure.xy) for exposure in result.exposures], name="images", member="images", head="Images"
+        ),
         Quantity(result.identified, name="identified", member="identified", head="Identified"),
         Quantity(result.rejected, name="left_out", member="rejected", head="Left out"),
         Quantity(rms, _PIXELS[:1], "deviation", head="rms", decimals=3),
@@ -181,12 +181,17 @@ def images(result: CalibratedNight) -> Table:
 
 
 def worst(result: CalibratedNight, most: int) -> Table:
-    """Return the images with the largest standardized residuals."""
+    """Return the images with the largest standardized residuals; the outliers of the verdict are marked."""
     size = np.nan_to_num(np.abs(result.calibration.standardized)).max(axis=1, initial=0.0)
     rows: Indices = np.argsort(-size, kind="stable")[:most]
-    columns = chosen(images(result).columns[:-1], rows)
+    tests = night_tests(result)[0]
+    marked = result.verdict.marks(tests.kind, tests.values.shape)
+    columns = [
+        replace(column, marked=marked) if column.member == "standardized" else column
+        for column in images(result).columns[:-1]
+    ]
     note = f"The {len(rows)} images of the largest test values."
-    return _for_people("worst", "Worst observations", columns, note)
+    return _for_people("worst", "Worst observations", chosen(columns, rows), note)
 
 
 def _for_people(key: str, title: str, columns: Quantities, note: str = "") -> Table:

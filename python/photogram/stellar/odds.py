@@ -15,49 +15,25 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 
-__all__ = [
-    "ACCEPTED",
-    "CERTAIN",
-    "CROWDED",
-    "DOUBTFUL",
-    "FALSE",
-    "LOG_ODDS",
-    "binomial_tail",
-    "chance",
-    "expected_false",
-    "log_odds",
-    "star_probabilities",
-]
-
 ACCEPTED = 1e-6
 """Expected number of equally good chance matches below which an exposure is accepted."""
 DOUBTFUL = 1e-2
-"""Expected number up to which an exposure that is not accepted may still show the stars found."""
+"""Expected number up to which an exposure that is not accepted may show the stars."""
 LOG_ODDS = math.log(1e9)
 """Logarithm of the odds of D. Lang et al. above which their form accepts an exposure."""
 CERTAIN = 0.95
-"""Probability of a star below which its image has to wait for the calibrated camera."""
-FALSE = 0.1
-"""Share of images of no star that is assumed for single ones."""
-_WRONG = 0.25
-"""The same in the odds of an exposure."""
-_REACH = 6.0
-"""Standard deviations up to which a second star counts."""
+"""Probability of a star that an image requires before the camera is calibrated."""
+FALSE = 0.1  # share of images without a star, for single images
+_WRONG = 0.25  # the same in the odds of an exposure
+_REACH = 6.0  # standard deviations within which a second star counts
 CROWDED = 0.3
-"""Catalogue stars in a tolerance area above which counting cannot tell."""
+"""Largest number of catalogue stars in a tolerance area that counting permits."""
 
 
 def chance(images: int, fixing: int, mu: float, matched: int) -> float:
-    """Return the probability that one wrong hypothesis matches at least as many images.
+    """Return the probability that one wrong hypothesis matches at least as many images, one to one.
 
-    Parameters
-    ----------
-    images, matched
-        Images that were compared, and those with a star, one to one.
-    fixing
-        Images that the hypothesis was made from.
-    mu
-        Mean number of catalogue stars in a tolerance area.
+    It was made from `fixing` images; mu is the mean number of catalogue stars in a tolerance area.
     """
     trials, least = images - fixing, matched - fixing
     return binomial_tail(trials, -math.expm1(-mu), least)
@@ -97,26 +73,11 @@ def _normal(off: Floats, sd: float) -> Floats:
 def star_probabilities(
     images: Floats, predicted: Floats, found: Indices, sd: float, density: float
 ) -> Floats:
-    """Return the probability that images show the stars that they were given.
+    """Return the probability (m,) that images (m, 2) show their stars `found` among predicted ones (n, 2).
 
-    Of f, the density of the image about its star, against f' about the next one, and against a false image
-    that has a star by chance: (1 - q) f / ((1 - q) (f + f') + q rho), rho being the density of the stars and
-    q = 0.1.
-
-    Parameters
-    ----------
-    images, predicted
-        (m, 2) and (n, 2).
-    found
-        (m,) index of the star; -1 for none.
-    sd
-        Standard deviation of an image coordinate.
-    density
-        Stars a unit of area.
-
-    Returns
-    -------
-    (m,), NaN where there is no star.
+    With f, the density of the image about its star, f' about the next one, and the probability q = 0.1 of a
+    false image that has a star by chance: (1 - q) f / ((1 - q) (f + f') + q rho), rho being the density of
+    the stars, in stars a unit of area. It is NaN without a star (-1). `sd` is that of an image.
     """
     probability = np.full(len(images), np.nan)
     has = np.flatnonzero(found >= 0)
@@ -135,16 +96,8 @@ def log_odds(off: Floats, images: int, sd: float, density: float) -> float:
     """Return the logarithm of the odds of an exposure against chance: each image is a star's or a false one.
 
     The sum of ln(w f / rho + 1 - w), with w = 0.75, the density f of an image about its star and rho of the
-    stars.
-
-    Parameters
-    ----------
-    off
-        Distances of images from their stars; images without one have none.
-    images
-        All images.
-    sd, density
-        As for `star_probabilities`.
+    stars. `off` are distances of images from their stars, without those of no star, `images` counts all
+    images.
     """
     density = max(density, 1e-300)
     of_stars = np.log((1 - _WRONG) * _normal(np.asarray(off, float), sd) / density + _WRONG)

@@ -8,19 +8,20 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, fields
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import Site
+from photogram.words import phrase
 
 __all__ = ["Options"]
 
 _DAYS = 20 * math.pi
 """A time of ten days, in radians."""
 _STEPS = 10_000
-"""Of a curve: a table and a page have a row for each."""
+"""Rows of the table of a curve at most."""
 
 
 def core_threads(threads: int | None) -> int:
     """Return the number of threads for the core; 0 leaves it to the core."""
     if threads is not None and threads < 1:
-        raise InputError(f"{threads} threads are too few")
+        raise InputError(phrase("error.at", what="threads", message=phrase("error.positive", value=threads)))
     return threads or 0
 
 
@@ -97,36 +98,29 @@ class Options:
 
     def __post_init__(self) -> None:
         if self.pre_run and not self.minimum_stars:
-            raise InputError("option 7 (pre-run) needs option 6 (minimum solution)")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float) and not math.isfinite(value):
-                raise InputError(f"{field.name} is {value}, not a number")
-        if abs(self.movement_time) > _DAYS:
-            raise InputError(
-                f"movement_time is {self.movement_time} rad; it must be a time of some days at most"
-            )
+            raise InputError(phrase("error.requires", name="pre_run", other="minimum_stars"))
+        largest = {"movement_time": _DAYS}
         positive = ("refraction_tolerance", "interval")
-        for name in positive:
-            if not getattr(self, name) > 0:
-                raise InputError(f"{name} is {getattr(self, name)}; it must be positive")
-        limits = (
-            "tolerance",
-            "distortion_tolerance",
-            "max_iterations_minimum",
-            "max_iterations",
-            "mean_error",
-            "crossover",
-            "extent",
-        )
-        for name in limits:
-            if not getattr(self, name) >= 0:
-                raise InputError(f"{name} is {getattr(self, name)}; it cannot be negative")
-
+        signed = ("movement_factor", "movement_time", "comparator_angle", "distortion_first")
+        for field in fields(self):
+            name, value = field.name, getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                continue
+            code = ""
+            if not math.isfinite(value):
+                code = "error.finite"
+            elif not abs(value) <= largest.get(name, math.inf):
+                code = "error.range"
+            elif name in positive and not value > 0:
+                code = "error.positive"
+            elif name not in signed and value < 0:
+                code = "error.not-negative"
+            if code:
+                limits = {"low": -_DAYS, "high": _DAYS, "value": value}
+                raise InputError(phrase("error.at", what=name, message=phrase(code, **limits)))
         if self.curves and self.extent > _STEPS * self.interval:
             raise InputError(
-                f"the curves to extent = {self.extent:g} m by interval = {self.interval:g} m have more than"
-                f" {_STEPS:,} steps"
+                phrase("stars.curve-steps", extent=self.extent, interval=self.interval, most=_STEPS)
             )
 
     @property

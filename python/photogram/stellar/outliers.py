@@ -1,4 +1,4 @@
-"""Images and stars of a plate that contradict the rest, by name."""
+"""Stars and images of a plate that contradict the others, and their effect on the camera."""
 
 from __future__ import annotations
 
@@ -8,157 +8,90 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
-from photogram.lazy_dataclasses import dataclass
-from photogram.messages import listed
-from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
+from photogram.stellar.findings import plate_tests
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Problem
 from photogram.stellar.state import Solved
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
-__all__ = ["Tests", "culprits", "harm", "outliers", "studentized"]
+_FALL = 10.0
+"""Least ratio by which the sum of squares falls without the star that spoils a solution."""
+_MAX_ROUNDS = 10
+_MAX_SUSPECTS = 12
 
 
-_TESTABLE = 0.01
-"""Redundancy numbers below this test nothing."""
-_HELPS = 10.0
-"""By how much the sum of squares falls when what spoils a solution is left out."""
-_ROUNDS = 10
-"""Solutions at most when outliers are left out, each without what is half as far off as the farthest."""
-_SUSPECTS = 12
-"""Stars that are left out one after the other to find what spoils a solution."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tests:
-    """Test values of all observations, and what good ones rarely exceed."""
-
-    images: Floats  # (m, 2) and (S, 2) absolute values; NaN where nothing is tested
-    stars: Floats
-    limit: float  # Good observations of the whole plate stay below it with 95 %
-    # Whether the mean error of unit weight is known (option 14): residuals over their mean errors; else
-    # externally studentized ones
-    known: bool
-
-
-def studentized(result: Result) -> Tests:
-    """Return the test values of plate coordinates and catalogue places."""
-    solved, given = result.solved, result.problem.options.mean_error
-    tested = [
-        np.where(redundancy > _TESTABLE, values, np.nan)
-        for redundancy, values in (
-            (solved.redundancy, solved.standardized),
-            (solved.star_redundancy, solved.star_standardized),
-        )
+def outliers(result: Result) -> list[Phrase]:
+    """Return a remark on the outliers of the verdict, the worst first; empty without outliers."""
+    found = [
+        (float(abs(tested.values[place])), tested.name(place))
+        for tested in plate_tests(result)
+        for place in result.verdict.outlying.get(tested.kind, ())
     ]
-    number = sum(int(np.isfinite(values).sum()) for values in tested)
-    if given:
-        images, stars = (np.abs(values) / given for values in tested)
-        return Tests(images, stars, normal_limit(number), True)
-    freedom, total = result.degrees_of_freedom, sum(solved.sums)
-    images, stars = (np.abs(externally_studentized(values, total, freedom)) for values in tested)
-    return Tests(images, stars, studentized_limit(freedom, number), False)
-
-
-def outliers(result: Result) -> list[str]:
-    """Name plate points and stars that contradict the rest, the worst first."""
-    problem, tests = result.problem, studentized(result)
-    names = [
-        f"point {point} of star {problem.star_ids[star]}"
-        for point, star in zip(problem.image_points, problem.image_stars, strict=True)
-    ]
-    found = _named(tests.images, names, tests.limit)
-    found += _named(tests.stars, [f"the place of star {star}" for star in problem.star_ids], tests.limit)
-    found.sort(reverse=True)
     if not found:
         return []
-    kind = "of their mean errors" if tests.known else "externally studentized"
-    return [
-        f"outliers (residuals {kind}, limit {tests.limit:.2f}): "
-        + listed([f"{name} ({value:.3g})" for value, name in found])
-    ]
+    found.sort(key=lambda item: -item[0])
+    names = [phrase("stars.outlier", name=name, value=value) for value, name in found]
+    fields = result.verdict.outliers[0].fields
+    return [phrase("stars.outliers", statistic=fields["statistic"], limit=fields["limit"], names=names)]
 
 
-def harm(result: Result, iterate: Callable[[Problem], Result]) -> str:
-    """Say which parameter of the camera outliers change by more than it is uncertain without them.
+def harm(result: Result, iterate: Callable[[Problem], Result]) -> Phrase | None:
+    """Return the parameter that outliers change most, in standard deviations without them; None below one.
 
-    Nothing where there are none, where they do no harm, or where the rest does not determine the camera.
-
-    Parameters
-    ----------
-    result
-        A solution that has converged.
-    iterate
-        Solves a problem.
+    Rounds reject outliers that are at least half as large as the worst, and adjust again. None, too, if the
+    remaining observations do not determine the camera.
     """
     clean = result
-    for _ in range(_ROUNDS):
-        tests = studentized(clean)
-        images, stars = (np.nan_to_num(each).max(axis=1, initial=0.0) for each in (tests.images, tests.stars))
-        far = max(tests.limit, 0.5 * max(images.max(initial=0.0), stars.max(initial=0.0)))
-        if not ((images > far).any() or (stars > far).any()):
+    for _ in range(_MAX_ROUNDS):
+        tests, outlying = plate_tests(clean), clean.verdict.outlying
+        if not any(outlying.values()):
             break
+        sizes = [np.nan_to_num(np.abs(tested.values)).max(axis=1, initial=0.0) for tested in tests]
+        half = 0.5 * max(values.max(initial=0.0) for values in sizes)
+        images, stars = (np.zeros(len(values), bool) for values in sizes)
+        for tested, rows, values in zip(tests, (images, stars), sizes, strict=True):
+            rows[[place[0] for place in outlying.get(tested.kind, ())]] = True
+            rows &= values > half
         try:
-            clean = iterate(clean.problem.without(stars > far, images > far))
+            clean = iterate(clean.problem.without(stars, images))
         except AdjustmentError:
-            return ""
+            return None
         if not clean.converged:
-            return ""
+            return None
     sd = np.sqrt(np.diag(clean.covariance))
     camera = np.flatnonzero(clean.solved.free & (sd > 0) & (np.arange(len(sd)) >= INDEX["epsilon"]))
     change = np.abs(result.solved.parameters - clean.solved.parameters)[camera] / sd[camera]
     if not change.size or change.max() <= 1.0:
-        return ""
-    name = NAMES[camera[int(change.argmax())]]
-    return f"outliers change {name} by {change.max():.3g} of the standard deviations that it has without them"
+        return None
+    return phrase("stars.harm", name=NAMES[camera[int(change.argmax())]], change=float(change.max()))
 
 
-def _named(values: Floats, names: list[str], limit: float) -> list[tuple[float, str]]:
-    largest = np.nan_to_num(values).max(axis=1, initial=0.0)
-    return [(float(largest[i]), names[i]) for i in np.flatnonzero(largest > limit)]
-
-
-def culprits(problem: Problem, solved: Solved | None, iterate: Callable[[Problem], Solved]) -> list[str]:
-    """Name the star without which a solution that has not converged does.
-
-    Parameters
-    ----------
-    problem
-        The plate.
-    solved
-        Where the iteration stopped; None where there is nothing.
-    iterate
-        Solves a problem.
-    """
-    stars = len(problem.star_ids)
-    before = math.inf if solved is None else sum(solved.sums)
-    found: list[tuple[float, str]] = []
+def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Solved]) -> list[Phrase]:
+    """Return a remark on the star without which a solution that has not converged does."""
+    before = sum(solved.sums)
+    best, culprit = math.inf, ""
     for star in _suspects(problem, solved):
-        others = np.arange(stars) == star
-        left = problem.without(others, np.zeros(len(problem.image_points), bool))
+        others = np.arange(len(problem.star_ids)) == star
         try:
-            again = iterate(left)
+            again = iterate(problem.without(others, np.zeros(len(problem.image_points), bool)))
         except AdjustmentError:
             continue
-        if again.converged and _HELPS * sum(again.sums) < before:
-            found.append((sum(again.sums), problem.star_ids[star]))
-    if not found:
-        return []
-    _, name = min(found)
-    return [f"without star {name} the solution converges: it, or one of its images, is wrong"]
+        total = sum(again.sums)
+        if again.converged and _FALL * total < before and total < best:
+            best, culprit = total, problem.star_ids[star]
+    return [phrase("stars.culprit", star=culprit)] if culprit else []
 
 
-def _suspects(problem: Problem, solved: Solved | None) -> list[int]:
+def _suspects(problem: Problem, solved: Solved) -> list[int]:
     """Return the stars whose images have the largest residuals."""
     size = np.zeros(len(problem.star_ids))
-    if solved is not None:
-        weighted = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
-        np.maximum.at(size, problem.image_stars, np.nan_to_num(weighted))
-        own = problem.known & ~problem.held
-        off = solved.places - problem.star_places
-        size[own] += np.nan_to_num(np.einsum("si,sij,sj->s", off[own], problem.star_weights[own], off[own]))
-    return [int(star) for star in np.argsort(-size, kind="stable")[:_SUSPECTS]]
+    weighted = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
+    np.maximum.at(size, problem.image_stars, np.nan_to_num(weighted))
+    observed = problem.known & ~problem.held
+    off = (solved.places - problem.star_places)[observed]
+    size[observed] += np.nan_to_num(np.einsum("si,sij,sj->s", off, problem.star_weights[observed], off))
+    return [int(star) for star in np.argsort(-size, kind="stable")[:_MAX_SUSPECTS]]

@@ -10,10 +10,11 @@ GRAD = math.pi / 200.0
 GROUPS = ("pre", "post", "event")
 """The groups of images of one plate, each with an attitude of its own."""
 
-_INTERIOR = ("epsilon", "xp", "yp", "cx", "cy", "dx", "dy", "K1", "K2", "K3", "K4", "K5", "phi_T")
+INTERIOR = ("epsilon", "xp", "yp", "cx", "cy", "dx", "dy", "K1", "K2", "K3", "K4", "K5", "phi_T")
+DISTORTION = INTERIOR[7:12]
 TAU = ("tau1", "tau2", "tau3", "tau4")
-COMMON = (*_INTERIOR, *TAU)
-"""What all images share, in the order of the numerical core."""
+COMMON = (*INTERIOR, *TAU)
+"""Parameters of all images, in the order of the numerical core."""
 
 NAMES = (*(f"{angle}_{group}" for group in GROUPS for angle in ("alpha", "omega", "kappa")), *COMMON)
 """All parameters in order: 22 of orientation and camera, 4 of refraction."""
@@ -32,3 +33,6 @@ UNITS = {
     **dict.fromkeys(TAU, "arcsec"),
 }
 """Unit of each parameter."""
+
+SIGNIFICANT = 1.96
+"""Distortion terms below this multiple of their mean error are remarked on (5 % of error)."""

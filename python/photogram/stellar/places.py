@@ -18,6 +18,7 @@ from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.pointing import pole_matrix, terrestrial
 from photogram.stellar.sky import Effects, Site
+from photogram.words import phrase
 
 _ALL = Effects()
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
@@ -71,7 +72,7 @@ def _times(text: str, dut1: float = 0.0) -> tuple[_Days, _Days]:
 
     match = _UTC.fullmatch(text.strip())
     if match is None:
-        raise InputError(f"{text!r} is not a UTC time such as 2024-03-01T21:03:05.25")
+        raise InputError(phrase("stars.utc", value=text))
     year, month, day, hour, minute = (int(part) for part in match.groups()[:5])
     old = _YEARS[0] <= year < _UTC_BEGINS
     with warnings.catch_warnings():
@@ -81,7 +82,7 @@ def _times(text: str, dut1: float = 0.0) -> tuple[_Days, _Days]:
                 "UT1" if old else "UTC", year, month, day, hour, minute, float(match[6])
             )
         except (erfa.ErfaError, erfa.ErfaWarning) as error:
-            raise InputError(f"{text!r}: {error}") from None
+            raise InputError(phrase("stars.utc-range", value=text, reason=str(error))) from None
         if not old:
             return erfa.taitt(*erfa.utctai(first, second)), erfa.utcut1(first, second, dut1)
     ut1 = float(first), float(second) + dut1 / erfa.DAYSEC
@@ -126,22 +127,13 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
     # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
     epoch = erfa.epj2jd(catalogue.epoch)
     with warnings.catch_warnings():
-        # Parallaxes of zero stand for stars that are far; erfa remarks on each.
+        # Parallaxes of zero mean distant stars; erfa warns about each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
-        # What overflows ends as an error of erfa.
+        # Overflows become an error of erfa.
         warnings.simplefilter("ignore", RuntimeWarning)
+        motions = ra, dec, pm_ra, catalogue.proper_motions[:, 1], catalogue.parallaxes / ARCSEC
         try:
-            moved = erfa.pmsafe(
-                ra,
-                dec,
-                pm_ra,
-                catalogue.proper_motions[:, 1],
-                catalogue.parallaxes / ARCSEC,
-                0.0,
-                *epoch,
-                2451545.0,
-                0.0,
-            )
+            moved = erfa.pmsafe(*motions, 0.0, *epoch, 2451545.0, 0.0)
         except erfa.ErfaError:
             raise _no_motion(catalogue) from None
     if not all(np.isfinite(part).all() for part in moved):
@@ -159,17 +151,7 @@ def _reduced(places: Sequence[Floats], astrometry: Any, effects: Effects) -> tup
     """Take the steps of erfa.atciq one by one: places of 2000.0 with their motions to those of date."""
     import erfa
 
-    right, declination, pm_right, pm_declination, parallax, velocity = places
-    seen = erfa.pmpx(
-        right,
-        declination,
-        pm_right,
-        pm_declination,
-        parallax,
-        velocity,
-        astrometry["pmt"],
-        astrometry["eb"],
-    )
+    seen = erfa.pmpx(*places, astrometry["pmt"], astrometry["eb"])
     if effects.light_deflection:
         seen = erfa.ldsun(seen, astrometry["eh"], astrometry["em"])
     if effects.annual_aberration:
@@ -204,13 +186,10 @@ def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
 
 
 def _no_motion(catalogue: Catalogue) -> InputError:
-    """Name the star whose proper motion or parallax is largest."""
+    """Return the error of the star with the largest proper motion or parallax."""
     with np.errstate(over="ignore"):
         size = np.abs(catalogue.proper_motions).max(axis=1) + np.abs(catalogue.parallaxes)
-    return InputError(
-        "stars cannot be taken to 2000.0: the proper motion or the parallax of star"
-        f" {catalogue.ids[int(np.argmax(size))]} is none that a star can have"
-    )
+    return InputError(phrase("stars.no-motion", star=catalogue.ids[int(np.argmax(size))]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +199,9 @@ class InertialAttitude:
     Axes of the camera are x right, y down, z along the axis; that is the camera of computer vision.
     """
 
-    # (3, 3) R with camera direction = R times ICRS direction, of places without aberration and
-    # refraction; det R = 1
+    # (3, 3) R with camera direction = R times ICRS direction, without aberration and refraction; det R = 1
     matrix: Floats
-    # (3, 3) radians squared: of the small turn d about the axes of the camera with R_true = Exp(d) R
-    covariance: Floats
+    covariance: Floats  # (3, 3) of the small turn d about the camera axes with R_true = Exp(d) R, radians^2
 
     @property
     def quaternion(self) -> Floats:
@@ -254,18 +231,9 @@ class InertialAttitude:
 def inertial_attitude(
     angles: Floats, covariance: Floats, site: Site, utc: str, earth: Earth | None = None
 ) -> InertialAttitude:
-    """Return the attitude of an exposure in ICRS.
+    """Return the attitude of an exposure in ICRS from alpha, omega, kappa with their covariance (3, 3).
 
-    Parameters
-    ----------
-    angles, covariance
-        (3,) alpha, omega, kappa from the mean pole, radians, and their covariance (3, 3).
-    site
-        The station, from the mean pole.
-    utc
-        Mid exposure.
-    earth
-        UT1 - UTC and the pole; zero when None.
+    Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero.
 
     Notes
     -----

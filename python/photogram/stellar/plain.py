@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence, Set
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,44 +12,33 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.io.rows import Row, read_rows
-from photogram.io.toml_tables import Document, Table, read_document
-from photogram.messages import listed
+from photogram.io.toml import Document, Table, read_document
+from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
-from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
 from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
-from photogram.stellar.sky import Site
-from photogram.stellar.tomlfile import effects, pole_arcsec, site
+from photogram.stellar.sky import HOUR, Site, landmark
+from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
+from photogram.words import phrase
 
-_OPTIONS: dict[str, Callable[[Table, str], Any]] = {
-    "common_scale": Table.switch,
-    "refraction": Table.switch,
-    "minimum_stars": Table.words,
-    "pre_run": Table.switch,
-    "curves": Table.switch,
-    "plate_list": Table.switch,
-    "max_iterations_minimum": Table.count,
-    "max_iterations": Table.count,
-    "mean_error": Table.number,
-    "histogram": Table.switch,
-    "tolerance": Table.number,
-    "refraction_tolerance_arcsec": Table.number,
-    "distortion_tolerance": Table.number,
-    "movement_factor": Table.number,
-    "movement_time": Table.number,
-    "crossover": Table.number,
-    "interval": Table.number,
-    "extent": Table.number,
-    "comparator_angle_deg": Table.number,
-    "distortion_first": Table.number,
-    "as_published": Table.switch,
+_READERS: dict[type, Callable[[Table, str], Any]] = {
+    bool: Table.switch,
+    int: Table.count,
+    float: Table.number,
+    tuple: Table.words,
 }
+"""Readers of options by the types of their defaults."""
+_OPTIONS_IN_UNITS = {
+    "refraction_tolerance_arcsec": ("refraction_tolerance", ARCSEC),
+    "comparator_angle_deg": ("comparator_angle", math.radians(1)),
+}
+_OTHER_OPTIONS = ("reference", "pole", "refraction_tolerance", "comparator_angle")
 _STAR_WEIGHT = ("weight_ra", "weight_dec", "weight_cross")
 _IMAGE_WEIGHT = ("weight_xx", "weight_yy", "weight_xy")
 _TABLES = {
@@ -80,18 +69,13 @@ def read_plain(path: Path) -> Problem:
         The TOML file; it names the CSV files of stars and images, relative to itself.
     """
     document = read_document(path, _TABLES)
-    try:
+    with at_place(Place(path)):
         return _problem(document)
-    except InputError as error:
-        raise error if error.file else InputError(error.message, file=path) from None
 
 
 def inputs(path: Path) -> list[Path]:
-    """Return the files that a calibration is read from: results must not replace them."""
-    document = read_document(path, _TABLES)
-    files = (("stars", "file"), ("images", "file"), ("camera", "prior"))
-    named = [document.optional(table) for table, _ in files]
-    return [path, *(table.path(key) for table, (_, key) in zip(named, files, strict=True) if key in table)]
+    """Return the files that a calibration is read from."""
+    return named_files(path, _TABLES, (("stars", "file"), ("images", "file"), ("camera", "prior")))
 
 
 def _problem(document: Document) -> Problem:
@@ -107,23 +91,22 @@ def _problem(document: Document) -> Problem:
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
         if place.setdefault(star_key(ids[index]), index) != index:
-            raise row.place.error(f"star {ids[index]} is listed twice")
+            raise row.place.error(phrase("error.repeated", kind="star", name=ids[index]))
         if not _is_landmark(row) and abs(row.required("dec_rad")) > math.pi / 2:
-            raise row.place.error("dec_rad is beyond the pole: declinations are between -pi/2 and pi/2")
+            raise row.place.error(phrase("stars.declination", star=ids[index], value=row.required("dec_rad")))
     for row in image_rows:
         name = row.cells.get("star", "")
         if star_key(name) not in place:
-            raise row.place.error(f"ERROR 1: star {name} is not listed")
+            raise row.place.error(phrase("stars.unlisted", star=name))
     star_weight, image_weight = _common_weight(stars), _common_weight(images)
     places, weights = _stars(star_rows, star_weight, station)
     options = _options(document)
     landmarks = {star_key(ids[i]) for i, row in enumerate(star_rows) if _is_landmark(row)}
     if landmarks and options.refraction:
-        raise stars.error(
-            "file", "has observed directions of landmarks: no refraction is estimated with them"
-        )
+        raise stars.error("file", phrase("stars.landmarks-and-refraction"))
     dut1 = document.optional("places").number("dut1_s", 0.0, low=-1, high=1)
-    groups = _Groups(images, landmarks, partial(sidereal_time, station, dut1=dut1))
+    sidereal = partial(sidereal_time, station, dut1=dut1)
+    groups, times = _groups_and_times(images, image_rows, landmarks, sidereal)
     problem = Problem(
         site=station,
         star_ids=ids,
@@ -132,10 +115,10 @@ def _problem(document: Document) -> Problem:
         star_weights=weights,
         image_points=tuple(row.cells.get("point", "") for row in image_rows),
         image_stars=np.array([place[star_key(row.cells.get("star", ""))] for row in image_rows], np.int64),
-        image_groups=np.array([groups.of(row) for row in image_rows], np.int64),
+        image_groups=np.array(groups, np.int64),
         image_xy=_pairs(image_rows, "x_m", "y_m"),
         image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
-        image_times=np.array([groups.time(row) for row in image_rows]),
+        image_times=np.array(times),
         initial=initial,
         parameter_weights=_parameter_weights(document.optional("weights")),
         fixed=fixed,
@@ -159,8 +142,8 @@ def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
         if values.pop(angle, None):
             for group in GROUPS:
                 values.setdefault(f"{angle}_{group}", angle)
-    own = None if prior is None else float(prior.values[INDEX["cx"] - 9])
-    parameters = default_parameters(table.positive("cx", own))
+    c = None if prior is None else float(prior.values[INDEX["cx"] - 9])
+    parameters = default_parameters(table.positive("cx", c))
     for name, key in values.items():
         index = _index(table, name)
         parameters[index] = table.number(key) * (GRAD if UNITS[name] == "rad" else 1.0)
@@ -169,9 +152,7 @@ def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
 
 def _index(table: Table, name: str) -> int:
     if name not in INDEX:
-        raise InputError(
-            f"[{table.name}] there is no parameter {name!r}; there are {', '.join(NAMES)}", file=table.file
-        )
+        raise table.error(name, phrase("error.choice", value=name, names=list(NAMES)))
     return INDEX[name]
 
 
@@ -211,20 +192,19 @@ def _is_landmark(row: Row) -> bool:
 
 def _stars(rows: list[Row], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
     """Return (S, 2) places and (S, 2, 2) weights of stars and of landmarks among them."""
-    found = []
+    places, weights = [], []
     for row in rows:
         weight = _star_weight(row, common)
-        if not _is_landmark(row):
-            found.append((np.array([row.required("ra_rad"), row.required("dec_rad")]), weight))
-            continue
-        azimuth, elevation = (
-            math.radians(row.required(f"{name}_deg")) for name in ("azimuth_north", "elevation")
-        )
-        try:
-            found.append(landmark(station, azimuth, elevation, weight))
-        except InputError as error:
-            raise row.place.error(error.message) from None
-    places, weights = ([each[k] for each in found] for k in range(2))
+        if _is_landmark(row):
+            azimuth, elevation = (
+                math.radians(row.required(f"{name}_deg")) for name in ("azimuth_north", "elevation")
+            )
+            with at_place(row.place):
+                place, weight = landmark(station, azimuth, elevation, weight)
+        else:
+            place = np.array([row.required("ra_rad"), row.required("dec_rad")])
+        places.append(place)
+        weights.append(weight)
     return np.array(places).reshape(-1, 2), _matrices(weights)
 
 
@@ -234,47 +214,44 @@ def _star_weight(row: Row, common: list[float] | None) -> Floats:
     return _weight(row, common, _STAR_WEIGHT)
 
 
-class _Groups:
-    """How images belong to groups, and what is added to their times."""
+def _groups_and_times(
+    table: Table, rows: Sequence[Row], landmarks: Set[str], sidereal: Callable[[str], float]
+) -> tuple[list[int], list[float]]:
+    """Return groups and sidereal times of images.
 
-    def __init__(self, table: Table, landmarks: set[str], sidereal: Callable[[str], float]) -> None:
-        self.landmarks, self.sidereal = landmarks, sidereal
-        self.post, self.event = table.count("first_post", 500), table.count("first_event", 900)
-        self.corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
-
-    def of(self, row: Row) -> int:
-        """Take the column `orientation`, else the number of the point as in the deck."""
-        name, point = row.cells.get("orientation", ""), row.cells.get("point", "")
+    A group is that of the column `orientation`, else follows from the number of the point as in the deck.
+    """
+    post, event = table.count("first_post", 500), table.count("first_event", 900)
+    corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])
+    groups, times = [], []
+    for row in rows:
+        name, digits = row.cells.get("orientation", ""), row.cells.get("point", "").removeprefix("-")
         if name:
             if name not in GROUPS:
-                raise row.place.error(f"orientation {name!r} is not one of {', '.join(GROUPS)}")
-            return GROUPS.index(name)
-        digits = point.removeprefix("-")
-        if not (digits.isascii() and digits.isdigit()):
-            raise row.place.error(f"point {point!r} is not a number: name its orientation")
-        # The trail is the last three digits.
-        trail = int(digits[-3:])
-        return 0 if trail < self.post else 1 if trail < self.event else 2
-
-    def time(self, row: Row) -> float:
-        """Return the sidereal time of an image."""
-        if star_key(row.cells.get("star", "")) in self.landmarks:
-            return HOUR
-        if utc := row.cells.get("utc", ""):
-            try:
-                time = self.sidereal(utc)
-            except InputError as error:
-                raise row.place.error(error.message) from None
+                message = phrase("error.choice", value=name, names=GROUPS)
+                raise row.place.error(phrase("error.column", column="orientation", message=message))
+            group = GROUPS.index(name)
+        elif digits.isascii() and digits.isdigit():
+            # The trail is the last three digits.
+            trail = int(digits[-3:])
+            group = 0 if trail < post else 1 if trail < event else 2
         else:
-            time = row.required("sidereal_time_rad")
-        return time + self.corrections[self.of(row)]
+            raise row.place.error(phrase("stars.no-orientation", point=row.cells.get("point", "")))
+        if star_key(row.cells.get("star", "")) in landmarks:
+            time = HOUR
+        elif utc := row.cells.get("utc", ""):
+            with at_place(row.place):
+                time = sidereal(utc) + corrections[group]
+        else:
+            time = row.required("sidereal_time_rad") + corrections[group]
+        groups.append(group)
+        times.append(time)
+    return groups, times
 
 
 def _axis(table: Table) -> Axis:
     xx, yy, xy = table.numbers("weight", 3)
-    group = table.text("orientation", "event")
-    if group not in GROUPS:
-        raise table.error("orientation", f"{group!r} is not one of {', '.join(GROUPS)}")
+    group = table.choice("orientation", GROUPS, "event")
     return Axis(
         azimuth=math.radians(table.number("azimuth_deg", low=-360, high=360)),
         zenith_distance=math.radians(table.number("zenith_distance_deg", low=-90, high=90)),
@@ -285,16 +262,13 @@ def _axis(table: Table) -> Axis:
 
 
 def _options(document: Document) -> Options:
-    table = document.optional("options")
-    unknown = sorted(set(table.values) - set(_OPTIONS))
-    if unknown:
-        raise InputError(f"there is no option {listed(unknown)}", file=table.file)
-    values = {name: _OPTIONS[name](table, name) for name in table.values}
-    if "refraction_tolerance_arcsec" in values:
-        values["refraction_tolerance"] = values.pop("refraction_tolerance_arcsec") * ARCSEC
-    if "comparator_angle_deg" in values:
-        values["comparator_angle"] = math.radians(values.pop("comparator_angle_deg"))
-    pole = document.optional("pole")
+    table, pole = document.optional("options"), document.optional("pole")
+    plain = {field.name: field.default for field in fields(Options) if field.name not in _OTHER_OPTIONS}
+    table.only([*plain, *_OPTIONS_IN_UNITS])
+    values = {name: _READERS[type(default)](table, name) for name, default in plain.items() if name in table}
+    for key, (name, unit) in _OPTIONS_IN_UNITS.items():
+        if key in table:
+            values[name] = table.number(key) * unit
     return Options(
         reference=site(document.table("reference")) if "reference" in document else None,
         pole=(pole_arcsec(pole, "x_arcsec") * ARCSEC, pole_arcsec(pole, "y_arcsec") * ARCSEC),

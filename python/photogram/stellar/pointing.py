@@ -10,16 +10,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.stellar.sky import Site
-
-__all__ = [
-    "attitude_of",
-    "axis_of",
-    "pole_matrix",
-    "roll_of",
-    "terrestrial",
-    "transformed_angles",
-    "turn_between",
-]
+from photogram.words import phrase
 
 
 def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
@@ -39,8 +30,9 @@ def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
     InputError
         An angle that is infinite.
     """
-    if math.inf in (abs(azimuth), abs(elevation), abs(roll)):
-        raise InputError(f"azimuth, elevation and roll are {azimuth}, {elevation}, {roll}: one is infinite")
+    for name, angle in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll)):
+        if math.isinf(angle):
+            raise InputError(phrase("error.at", what=name, message=phrase("error.finite", value=angle)))
     north, east = -math.cos(elevation) * math.cos(azimuth), -math.cos(elevation) * math.sin(azimuth)
     zenith = math.sin(elevation)
     alpha, omega = math.atan2(north, zenith), math.asin(max(-1.0, min(1.0, east)))
@@ -81,20 +73,10 @@ def roll_of(attitude: Floats) -> float:
 def transformed_angles(
     angles: Floats, station: Site, reference: Site, pole: tuple[float, float] = (0.0, 0.0)
 ) -> Floats:
-    """Return alpha, omega, kappa in the local system of another station.
+    """Return alpha, omega, kappa (3,) in the local system of another station, in radians.
 
-    Parameters
-    ----------
-    angles
-        (3,) in the system of `station`, radians.
-    station, reference
-        Their latitudes and west longitudes.
-    pole
-        x of the pole towards the prime meridian, y towards 90 degrees west, radians.
-
-    Returns
-    -------
-    (3,) alpha and kappa in [0, 2 pi), omega in [-pi/2, pi/2].
+    x of the pole is towards the prime meridian, y towards 90 degrees west. Alpha and kappa are in [0, 2 pi),
+    omega in [-pi/2, pi/2].
     """
     matrix = _photocore.pointing_matrix(np.asarray(angles, float))
     turned = terrestrial(reference).T @ pole_matrix(pole) @ terrestrial(station) @ matrix.T

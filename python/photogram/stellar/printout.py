@@ -15,11 +15,11 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.curves import star_means
 from photogram.stellar.parameters import GROUPS
-from photogram.stellar.result import Stage
 from photogram.stellar.sky import Site
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
+    from photogram.stellar.state import Stage
 
 WIDTH = 132
 

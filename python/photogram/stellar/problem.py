@@ -1,8 +1,8 @@
-"""A calibration as it is known beforehand: stars, images, weights, counts, what is rejected."""
+"""The input of a calibration: stars, images, weights, counts, rejected observations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -10,22 +10,12 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import listed
+from photogram.messages import unknown_name
 from photogram.show.summary import Brief
 from photogram.stellar.options import Options
-from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar.parameters import COMMON, INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
-
-__all__ = [
-    "Axis",
-    "Counts",
-    "Problem",
-    "default_parameters",
-    "degrees_of_freedom",
-    "failure",
-    "rejected",
-    "singular",
-]
+from photogram.words import Phrase, phrase
 
 
 def default_parameters(principal_distance: float) -> Floats:
@@ -134,26 +124,24 @@ class Problem(Brief):
         for name, shape in shapes.items():
             array = getattr(self, name)
             if array.shape != shape:
-                raise InputError(f"{name} has the shape {array.shape}, not {shape}")
-            if name not in ("star_weights", "fixed") and not np.isfinite(array).all():
-                raise InputError(f"{name} holds what is not a number")
-        if images and not (
-            self.image_stars.min() >= 0
-            and self.image_stars.max() < stars
-            and set(self.image_groups) <= {0, 1, 2}
-        ):
-            raise InputError("an image names a star or a group that is not there")
-        if np.isnan(self.star_weights).any():
-            raise InputError("star_weights holds what is not a number")
-        points = [
-            f"point {point} of star {self.star_ids[star]}"
-            for point, star in zip(self.image_points, self.image_stars, strict=True)
-        ]
+                fields = {"shape": str(shape), "actual": str(array.shape)}
+                raise InputError(phrase("error.at", what=name, message=Phrase("error.shape", fields)))
+            infinite = name == "star_weights"
+            if np.isnan(array).any() or not (infinite or np.isfinite(array).all()):
+                raise InputError(phrase("stars.not-finite", name=name))
+        for name, count in (("image_stars", stars), ("image_groups", 3)):
+            for image in np.flatnonzero((getattr(self, name) < 0) | (getattr(self, name) >= count))[:1]:
+                wrong = {"value": int(getattr(self, name)[image]), "low": 0, "high": count - 1}
+                message = Phrase("error.whole-range", wrong)
+                raise InputError(phrase("error.at", what=f"{name}[{image}]", message=message))
+        pairs = zip(self.image_points, self.image_stars, strict=True)
+        points = [phrase("stars.point", point=point, star=self.star_ids[star]) for point, star in pairs]
         _refuse_indefinite(points, self.image_weights)
         weighted = np.flatnonzero(self.known & ~self.held)
-        _refuse_indefinite([f"star {self.star_ids[i]}" for i in weighted], self.star_weights[weighted])
+        names = [phrase("stars.star", star=self.star_ids[i]) for i in weighted]
+        _refuse_indefinite(names, self.star_weights[weighted])
         if self.axis is not None:
-            _refuse_indefinite(["the axis"], self.axis.weight[None])
+            _refuse_indefinite([phrase("stars.axis")], self.axis.weight[None])
 
     @property
     def known(self) -> Bools:
@@ -175,19 +163,16 @@ class Problem(Brief):
         keep_images = ~(images | stars[self.image_stars])
         keep = ~stars & np.isin(np.arange(len(self.star_ids)), self.image_stars[keep_images])
         place = np.cumsum(keep) - 1
-        names = self.star_names or self.star_ids
+        of_images = ("image_groups", "image_xy", "image_weights", "image_times")
         return replace(
             self,
             star_ids=_chosen(self.star_ids, keep),
-            star_names=_chosen(names, keep),
+            star_names=_chosen(self.star_names or self.star_ids, keep),
             star_places=self.star_places[keep],
             star_weights=self.star_weights[keep],
             image_points=_chosen(self.image_points, keep_images),
             image_stars=place[self.image_stars[keep_images]],
-            image_groups=self.image_groups[keep_images],
-            image_xy=self.image_xy[keep_images],
-            image_weights=self.image_weights[keep_images],
-            image_times=self.image_times[keep_images],
+            **{name: getattr(self, name)[keep_images] for name in of_images},
         )
 
     def places_at(self, parameters: Floats, free: Bools) -> Floats:
@@ -201,51 +186,107 @@ class Problem(Brief):
 
     def core(self, parameters: Floats, places: Floats, fixed: Bools) -> _photocore.StellarProblem:
         """Return the problem as the core takes it, at given values."""
+        axis, held = self.axis, self.held
         weighted = np.flatnonzero(self.weighted & ~fixed)
-        block = self.parameter_weights[np.ix_(weighted, weighted)]
-        held = self.held
-        weights = np.where(held[:, None, None], 0.0, self.star_weights)
-        return _photocore.StellarProblem(
-            station=self.site.core,
-            camera=self.options.camera_kind,
-            pointings=parameters[:9].reshape(3, 3),
-            common=parameters[9:],
-            fixed=fixed.tolist(),
-            weighted=weighted.astype(np.int64),
-            weighted_values=self.initial[weighted],
-            weight_root=weight_root(block, [NAMES[i] for i in weighted]),
-            star_places=places,
-            star_catalogue=self.star_places,
-            star_weights=weights,
-            star_fixed=held.tolist(),
+        return core_problem(
+            self.site,
+            self.options.camera_kind,
+            parameters,
+            fixed,
+            prior=Prior(
+                weighted,
+                self.initial[weighted],
+                self.parameter_weights[np.ix_(weighted, weighted)],
+                [NAMES[i] for i in weighted],
+            ),
+            places=places,
+            catalogue=self.star_places,
+            star_weights=np.where(held[:, None, None], 0.0, self.star_weights),
+            star_fixed=held,
             image_stars=self.image_stars,
             image_pointings=self.image_groups,
             image_xy=self.image_xy,
             image_weights=self.image_weights,
             image_times=self.image_times,
-            image_shifts=np.zeros_like(self.image_xy),
             axis=None
-            if self.axis is None
-            else (self.axis.group, self.axis.standard, self.axis.xy.tolist(), self.axis.weight.tolist()),
+            if axis is None
+            else (axis.group, axis.standard, axis.xy.tolist(), axis.weight.tolist()),
         )
 
 
-def weight_root(weights: Floats, names: list[str]) -> Floats:
-    """Return R of P = R^T R, scaled on the way because parameters differ by many orders of magnitude."""
-    scale = np.sqrt(np.diag(weights))
-    try:
-        lower = np.linalg.cholesky(weights / np.outer(scale, scale))
-    except np.linalg.LinAlgError:
-        raise InputError(f"the weight matrix of {', '.join(names)} is not positive definite") from None
-    return np.ascontiguousarray(lower.T * scale)
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Weighted parameters of the core: (k,) rows, values, (k, k) weights, names."""
+
+    rows: Indices
+    values: Floats
+    weights: Floats
+    names: Sequence[str]
+
+    def root(self) -> Floats:
+        """Return R of P = R^T R; P is scaled since parameters differ by many orders of magnitude."""
+        scale = np.sqrt(np.diag(self.weights))
+        try:
+            lower = np.linalg.cholesky(self.weights / np.outer(scale, scale))
+        except np.linalg.LinAlgError:
+            raise InputError(phrase("stars.indefinite", names=self.names)) from None
+        return np.ascontiguousarray(lower.T * scale)
 
 
-def _refuse_indefinite(names: list[str], weights: Floats) -> None:
+NO_PRIOR = Prior(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0)), [])
+
+
+def core_problem(
+    site: Site,
+    camera: tuple[float | None, bool, bool] | tuple[str, bool],
+    values: Floats,
+    fixed: Bools,
+    *,
+    places: Floats,
+    star_weights: Floats,
+    star_fixed: Bools,
+    image_stars: Indices,
+    image_pointings: Indices,
+    image_xy: Floats,
+    image_weights: Floats,
+    image_times: Floats,
+    image_shifts: Floats | None = None,
+    catalogue: Floats | None = None,
+    prior: Prior = NO_PRIOR,
+    axis: tuple[int, tuple[float, float], list[float], list[list[float]]] | None = None,
+) -> _photocore.StellarProblem:
+    """Return a problem of the core: values of attitudes (three each) and of the 17 common parameters."""
+    attitudes = len(values) - len(COMMON)
+    return _photocore.StellarProblem(
+        station=site.core,
+        camera=camera,
+        pointings=values[:attitudes].reshape(-1, 3),
+        common=values[attitudes:],
+        fixed=fixed.tolist(),
+        weighted=prior.rows,
+        weighted_values=prior.values,
+        weight_root=prior.root(),
+        star_places=places,
+        star_catalogue=places if catalogue is None else catalogue,
+        star_weights=star_weights,
+        star_fixed=star_fixed.tolist(),
+        image_stars=image_stars.astype(np.int64),
+        image_pointings=image_pointings.astype(np.int64),
+        image_xy=image_xy,
+        image_weights=image_weights,
+        image_times=image_times,
+        image_shifts=np.zeros_like(image_xy) if image_shifts is None else image_shifts,
+        axis=axis,
+    )
+
+
+def _refuse_indefinite(names: Sequence[Phrase], weights: Floats) -> None:
     first, cross, second = weights[:, 0, 0], weights[:, 0, 1], weights[:, 1, 1]
     definite = (first > 0) & (second - cross**2 / np.where(first > 0, first, 1.0) > 0)
     if not definite.all():
-        named = listed([names[i] for i in np.flatnonzero(~definite)])
-        raise InputError(f"the weight matrix of {named} is not positive definite")
+        raise InputError(
+            phrase("stars.indefinite", names=[names[i] for i in np.flatnonzero(~definite).tolist()])
+        )
 
 
 def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
@@ -254,14 +295,12 @@ def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Counts:
-    """What an adjustment counts."""
+    """Observations and unknowns of an adjustment."""
 
-    # Plate coordinates with those of the axis; catalogue coordinates that have weight; parameters that
-    # have weight
-    plate_observations: int
-    star_observations: int
-    parameter_observations: int
-    parameter_unknowns: int  # What is estimated
+    plate_observations: int  # Plate coordinates with those of the axis
+    star_observations: int  # Catalogue coordinates with a weight
+    parameter_observations: int  # Parameters with a weight
+    parameter_unknowns: int
     star_unknowns: int
     constraints: int = 0  # Of a combined solution
 
@@ -287,12 +326,9 @@ class Counts:
 
 
 def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
-    """Count observations and unknowns where the given parameters are estimated.
+    """Count observations and unknowns if some parameters are estimated.
 
-    Raises
-    ------
-    AdjustmentError
-        There are fewer observations than unknowns (error 3).
+    Raises AdjustmentError: there are fewer observations than unknowns (error 3).
     """
     free_stars = int((~problem.held).sum())
     counts = Counts(
@@ -304,22 +340,22 @@ def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
     )
     if counts.degrees_of_freedom < 0:
         raise AdjustmentError(
-            f"ERROR 3: not enough observations: {counts.observations} for {counts.unknowns} unknowns"
+            phrase("stars.error-3", observations=counts.observations, unknowns=counts.unknowns)
         )
     return counts
 
 
-def rejected(problem: Problem, stars: Set[str], points: Set[str]) -> Problem:
-    """Return a problem without the named stars and plate points; a star that loses all its images goes, too.
+def rejected(problem: Problem, stars: Collection[str], points: Collection[str]) -> Problem:
+    """Return a problem without some stars and plate points; stars without images left are removed, too.
 
-    Raises
-    ------
-    InputError
-        A number that is not there.
+    Raises InputError: an unknown number.
     """
-    missing = sorted(set(stars) - set(problem.star_ids)) + sorted(set(points) - set(problem.image_points))
-    if missing:
-        raise InputError(f"rejected but not there: {', '.join(missing)}")
+    for kind, names, known in (
+        ("star", stars, problem.star_ids),
+        ("plate point", points, problem.image_points),
+    ):
+        if missing := sorted(set(names) - set(known)):
+            raise InputError(unknown_name(kind, missing[0], known))
     if not stars and not points:
         return problem
     left = problem.without(
@@ -336,22 +372,17 @@ def rejected(problem: Problem, stars: Set[str], points: Set[str]) -> Problem:
     return replace(left, labels=labels)
 
 
-def singular(parameters: Iterable[int]) -> AdjustmentError:
+def singular(parameters: Sequence[int]) -> AdjustmentError:
     """Return error 4 of the report, with the names of the parameters."""
-    names = ", ".join(NAMES[i] for i in parameters)
-    return AdjustmentError(
-        f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {names}"
-    )
+    return AdjustmentError(phrase("stars.error-4", names=[NAMES[i] for i in parameters]))
 
 
 def failure(problem: Problem, error: _photocore.StellarError) -> AdjustmentError:
-    """Say which stars or parameters of a problem an error of the core tells of."""
+    """Return an error of the core with the names of stars or parameters of a problem."""
     kind, message, indices = error.args
     if kind == "undetermined":
         return singular(indices)
-    stars = [problem.star_ids[i] for i in indices]
-    if kind == "undetermined stars":
-        return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {', '.join(stars)}")
-    if kind == "not finite":
-        return AdjustmentError(f"below the horizon or behind the camera: star {listed(stars)}")
-    return AdjustmentError(message)
+    codes = {"undetermined stars": "stars.error-2", "not finite": "stars.not-visible"}
+    if kind not in codes:
+        return AdjustmentError(message)
+    return AdjustmentError(phrase(codes[kind], names=[problem.star_ids[i] for i in indices]))

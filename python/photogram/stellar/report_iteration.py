@@ -17,12 +17,12 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError
 from photogram.stellar.problem import Problem, degrees_of_freedom, failure, singular
 from photogram.stellar.state import Level, Solved
+from photogram.words import phrase
 
 DIVERGED = "FOUR DIVERGENT STEPS OCCURRED"
 SETTLED = "ITERATION RESULTS DIFFER BY LESS THAN TOLERANCE SETTING"
-PASSES = 6
-"""Passes of the inverse of the distortion at the most."""
-_MOST = 100
+_MAX_PASSES = 6  # of the inverse of the distortion
+_MAX_ITERATIONS = 100
 
 
 def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | None:
@@ -40,7 +40,7 @@ def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | 
         return DIVERGED
     if abs(levels[-2] - levels[-1]) <= tolerance:
         return SETTLED
-    limit = limit or _MOST
+    limit = limit or _MAX_ITERATIONS
     return f"{limit} ITERATIONS COMPLETED" if len(levels) > limit else None
 
 
@@ -49,7 +49,7 @@ def _tolerances(problem: Problem) -> dict[str, Any]:
     return {
         "refraction": options.refraction_tolerance,
         "distortion": options.distortion_tolerance,
-        "passes": PASSES,
+        "passes": _MAX_PASSES,
     }
 
 
@@ -84,12 +84,10 @@ def iterate(
         if problem.options.common_scale:
             parameters[13] = parameters[12]
     if not correction:
-        # The equations name the stars that are out of sight; where all are, it is the camera.
+        # The equations name invisible stars, unless the camera makes all of them invisible.
         if np.isfinite(constant).any():
             _correction(problem, core)
-        raise AdjustmentError(
-            "the initial values give discrepancies beyond all numbers: those of the camera are wrong"
-        )
+        raise AdjustmentError(phrase("stars.initial-camera"))
     if correction["without_effect"]:
         raise singular(correction["without_effect"])
     # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
@@ -114,13 +112,13 @@ def _correction(problem: Problem, core: _photocore.StellarProblem) -> dict[str, 
 
 
 def residual_cycle(
-    problem: Problem, parameters: Floats, free: Bools, *, cofactors: Floats, **rest: Any
+    problem: Problem, parameters: Floats, free: Bools, *, cofactors: Floats, **others: Any
 ) -> Solved:
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
     Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
     two millionths of the mean error of unit weight. The cofactors (26, 26) are those of the parameters,
-    `rest` is how the solution was found.
+    `others` are further attributes of the solution.
 
     Raises AdjustmentError: a star is not determined by its images (error 2), or has none at these parameters.
     """
@@ -132,10 +130,9 @@ def residual_cycle(
         raise failure(problem, error) from None
     final = problem.core(parameters, found["places"], ~free).published(**tolerances)
     remarks = tuple(
-        f"DISTORTION NOT CONVERGING FOR POINT NUMBER {problem.image_points[i]}: "
-        f"last changes {a:.3g}, {b:.3g} m"
+        phrase("stars.unsettled-distortion", point=problem.image_points[i], first=a, second=b)
         for i, (a, b) in final["unsettled"]
     )
     return Solved.of(
-        problem, found, parameters=parameters, free=free, cofactors=cofactors, remarks=remarks, **rest
+        problem, found, parameters=parameters, free=free, cofactors=cofactors, remarks=remarks, **others
     )

@@ -4,119 +4,29 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.show.methods import Documented, Judged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.stellar.camera_tables import correlated, correlations, significance
-from photogram.stellar.parameters import INDEX, NAMES
-from photogram.stellar.plate_model import plate_camera
+from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
+from photogram.stellar.cameras import PlateCamera
+from photogram.stellar.directions import Direction, Ellipse, directions, ellipse
+from photogram.stellar.parameters import DISTORTION, INDEX, NAMES, SIGNIFICANT
 from photogram.stellar.problem import Counts, Problem
-from photogram.stellar.state import Level, Solved
+from photogram.stellar.state import Level, PreRun, Solved, Stage
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
-
-__all__ = ["Ellipse", "FictitiousPoint", "Movement", "PreRun", "Result", "Stage", "ellipse"]
-
-
-@dataclass(frozen=True)
-class Movement:
-    """A fictitious point under two attitudes."""
-
-    first: str  # The groups
-    second: str
-    xy: float  # x = y of the point, metres
-    angle: float  # Angle between its two directions and its mean error, radians
-    mean_error: float
-    # Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
-    # distance), elevation; radians
-    differences: tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class FictitiousPoint:
-    """A plate point as a direction under one attitude."""
-
-    group: str  # Of the attitude
-    xy: float  # x = y of the point, metres
-    place: tuple[float, float]  # Apparent right ascension and declination, radians
-    azimuth: float  # Observed (refracted) ones: azimuth from south, positive west; radians
-    elevation: float
-    covariance: Floats  # (2, 2) of the place from the orientation, radians squared
-
-
-SIGNIFICANT = 1.96
-"""Distortion terms below this multiple of their mean error are named (5 % of error)."""
-_SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-DISTORTION = ("K1", "K2", "K3", "K4", "K5")
-
-
-@dataclass(frozen=True)
-class Ellipse:
-    """A mean error ellipse on the sphere."""
-
-    major: float  # Half axes, radians
-    minor: float
-    # Of the major axis, from increasing right ascension towards increasing declination, radians
-    direction: float
-
-
-def ellipse(covariance: Floats, declination: float) -> Ellipse:
-    """Return the mean error ellipse of a covariance of right ascension and declination (section 5.7)."""
-    turned = np.diag([math.cos(declination), 1.0])
-    values, vectors = np.linalg.eigh(turned @ covariance @ turned)
-    minor, major = (math.sqrt(max(float(value), 0.0)) for value in values)
-    return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]) % math.pi)
-
-
-@dataclass(frozen=True, eq=False)
-class Direction:
-    """An unknown direction (section 5.7)."""
-
-    star: str  # Its number
-    place: tuple[float, float]  # Right ascension and declination, radians
-    correction: tuple[float, float]  # (2,) of the direction of its first image, radians
-    azimuth: float  # Observed (refracted) ones at its first image: azimuth from south, positive west; radians
-    elevation: float
-    mean_errors: tuple[float, float]  # Of right ascension times cos(declination), and declination; radians
-    # m_i: mean error of unit weight from its own images, which should be parallel; that of the
-    # adjustment where there is only one
-    image_mean_error: float
-    orientation: Ellipse  # Ellipse from the orientation alone, as if its images had no error
-    total: Ellipse  # Ellipse with its images at the mean error of unit weight of the adjustment
-    published: Ellipse  # Ellipse with its images at m_i, as the report has it
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One of the solutions of a run."""
-
-    solution: str  # `minimum`, `maximum` or `refraction`
-    counts: Counts  # Its observations and unknowns
-    levels: tuple[Level, ...]  # Its history
-    stop: str  # Why it stopped
-    converged: bool  # Whether by its criterion
-    # Natural logarithm of the determinant of its reduced normal equations, in the units of the
-    # parameters
-    log_determinant: float
-
-
-@dataclass(frozen=True, eq=False)
-class PreRun:
-    """Images that took no part in the minimum solution (option 7)."""
-
-    points: tuple[str, ...]  # Their numbers, and those of their stars
-    stars: tuple[str, ...]
-    residuals: Floats  # (m, 2) computed minus measured, metres
+    from photogram.stellar.movement import Movement
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +59,7 @@ class Result(Judged, Documented, Brief):
     pairs
         Of a combined solution: the pairs that the movement test found equal.
     spoiled
-        By how much outliers change the camera, where that is more than it is uncertain without them.
+        The change of the camera by outliers, if it exceeds the uncertainty without them; else empty.
     """
 
     problem: Problem
@@ -162,7 +72,7 @@ class Result(Judged, Documented, Brief):
     movement: tuple[Movement, ...] = ()
     combined: Result | None = None
     pairs: tuple[tuple[str, str], ...] = ()
-    spoiled: str = ""
+    spoiled: str | Phrase = ""
 
     @property
     def converged(self) -> bool:
@@ -210,17 +120,7 @@ class Result(Judged, Documented, Brief):
         weighted
             Whether its parameters are observations with their full covariance; otherwise they are known.
         """
-        own = self.combined or self
-        options = own.problem.options
-        interior = slice(INDEX["epsilon"], INDEX["phi_T"] + 1)
-        return plate_camera(
-            own.solved.parameters[interior],
-            own.covariance[interior, interior],
-            name,
-            weighted=weighted,
-            common_scale=options.common_scale,
-            distortion_first=options.distortion_first,
-        )
+        return PlateCamera.of(self).as_camera(name, weighted=weighted)
 
     @property
     def estimated(self) -> list[str]:
@@ -269,47 +169,7 @@ class Result(Judged, Documented, Brief):
 
     def directions(self) -> list[Direction]:
         """Return the unknown directions with their error ellipses."""
-        unknown = np.flatnonzero(~self.problem.known)
-        if not unknown.size:
-            return []
-        core = self.problem.core(self.solved.parameters, self.solved.places, ~self.solved.free)
-        of_images = core.directions()
-        order = np.argsort(self.problem.image_stars, kind="stable")
-        firsts, ends = (np.searchsorted(self.problem.image_stars[order], unknown, side) for side in _SIDES)
-        return [
-            self._direction(int(star), order[first:end], of_images)
-            for star, first, end in zip(unknown, firsts, ends, strict=True)
-        ]
-
-    def _direction(self, star: int, images: Indices, of_images: Floats) -> Direction:
-        problem, solved = self.problem, self.solved
-        place, unit = solved.places[star], self.mean_error
-        residuals, weights = solved.residuals[images], problem.image_weights[images]
-        square = float(np.einsum("mi,mij,mj->", residuals, weights, residuals))
-        own = math.sqrt(square / (2 * len(images) - 2)) if len(images) > 1 else unit
-        inverse = solved.star_inverse[star]
-        orientation = unit**2 * (solved.star_cofactors[star] - inverse)
-        total = self.star_covariances[star]
-        time = problem.image_times[images[:1]]
-        ((xi, eta),) = problem.site.standard_coordinates(place[None], time, solved.parameters[22:])
-        return Direction(
-            star=problem.star_ids[star],
-            place=(float(place[0]), float(place[1])),
-            correction=(
-                math.remainder(place[0] - of_images[images[0], 0], math.tau),
-                float(place[1] - of_images[images[0], 1]),
-            ),
-            azimuth=math.atan2(-eta, -xi) % math.tau,
-            elevation=math.atan2(1.0, math.hypot(xi, eta)),
-            mean_errors=(
-                math.sqrt(total[0, 0]) * math.cos(place[1]),
-                math.sqrt(total[1, 1]),
-            ),
-            image_mean_error=own,
-            orientation=ellipse(orientation, place[1]),
-            total=ellipse(total, place[1]),
-            published=ellipse(orientation + own**2 * inverse, place[1]),
-        )
+        return directions(self)
 
     def document(self) -> Document:
         """Return the document: verdict, parameters, stars, images, curves, movement."""
@@ -332,8 +192,9 @@ class Result(Judged, Documented, Brief):
         names = [NAMES[row] for row in rows]
         return significance(names, self.solved.parameters[rows], self.covariance[np.ix_(rows, rows)])
 
-    def doubtful(self) -> list[str]:
+    def doubtful(self) -> list[Phrase]:
         """Name what the stars hardly determine: correlations, distortion terms that are not significant."""
-        found = [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in self.correlated()]
-        weak = [f"{name} ({t:.1f} mean errors)" for name, t in self.significance().items() if t < SIGNIFICANT]
-        return found + ([f"distortion terms that are not significant: {', '.join(weak)}"] if weak else [])
+        weak = {name: ratio for name, ratio in self.significance().items() if ratio < SIGNIFICANT}
+        terms = [phrase("stars.weak-ratio", name=name, ratio=ratio) for name, ratio in weak.items()]
+        remarks = [*correlation_remarks(self.correlated())]
+        return [*remarks, *([phrase("stars.weak-terms", terms=terms)] if terms else [])]

@@ -15,6 +15,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC as ARCSEC
+from photogram.words import phrase
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
@@ -28,6 +29,10 @@ HIGHEST_PRESSURE = 850.0
 """Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone."""
 HECTOPASCAL = 1013.25 / 760.0
 """Of a millimetre of mercury."""
+HOUR = 0.0
+"""Sidereal time of all images of a landmark, radians: it does not turn with the sky."""
+_STEP = 1e-6
+"""Of the differences that transform weights, radians."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +58,13 @@ class Air:
     def __post_init__(self) -> None:
         low, high = TEMPERATURES
         if not low <= self.temperature <= high:
-            raise InputError(
-                f"the air has {self.temperature:g} K; temperatures in kelvin are between {low:g} and {high:g}"
-            )
+            raise InputError(phrase("stars.temperature", value=self.temperature, low=low, high=high))
         if not 0 <= self.pressure <= HIGHEST_PRESSURE:
-            hint = ""
+            hint = []
             if HIGHEST_PRESSURE < self.pressure <= HIGHEST_PRESSURE * HECTOPASCAL:
-                hint = f"; {self.pressure:g} hPa are {self.pressure / HECTOPASCAL:.1f}"
-            raise InputError(
-                f"the pressure is {self.pressure:g} mm of mercury; it must be between 0 and"
-                f" {HIGHEST_PRESSURE:g}{hint}"
-            )
+                hint = [phrase("stars.hectopascals", mercury=self.pressure / HECTOPASCAL)]
+            fields = {"value": self.pressure, "most": HIGHEST_PRESSURE}
+            raise InputError(phrase("stars.pressure", hint=hint, **fields))
 
 
 def refraction(
@@ -193,3 +194,50 @@ class Site:
         standard = np.asarray(standard, float)
         times = np.ascontiguousarray(np.broadcast_to(np.asarray(sidereal_times, float), len(standard)))
         return _photocore.star_places(standard, times, self.core, np.asarray(tau, float))
+
+
+def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tuple[Floats, Floats]:
+    """Return the place of a star that is seen where a landmark is, at the sidereal time `HOUR`.
+
+    The direction is the observed one, with the refraction that the program applies to stars and without their
+    aberration: the place is what program and station turn into it.
+
+    Parameters
+    ----------
+    site
+        The station.
+    azimuth
+        From north through east, radians.
+    elevation
+        Observed, above the horizon, radians.
+    weight
+        (2, 2) of azimuth and elevation; infinite or zero on the diagonal for a direction that is held, or not
+        known.
+
+    Returns
+    -------
+    (2,) right ascension and declination, radians, and their (2, 2) weight.
+
+    Raises
+    ------
+    InputError
+        An elevation that is not between the horizon and the zenith, an azimuth that is not finite, a weight
+        of another shape.
+    """
+    weight = shaped("weight", weight, (2, 2))
+    if not 0 < elevation < np.pi / 2:
+        raise InputError(phrase("stars.elevation", value=float(np.degrees(elevation))))
+    if not np.isfinite(azimuth):
+        message = phrase("error.finite", value=float(azimuth))
+        raise InputError(phrase("error.at", what="azimuth", message=message))
+    azimuth = np.remainder(azimuth, 2 * np.pi)
+    steps = _STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+    azimuths, elevations = (np.array([azimuth, elevation]) + steps).T
+    standard = np.column_stack([np.cos(azimuths), np.sin(azimuths)]) / np.tan(elevations)[:, None]
+    places = site.places(standard, HOUR)
+    turns = np.remainder(places - places[0] + np.pi, 2 * np.pi) - np.pi
+    back = np.linalg.inv((turns[1::2] - turns[2::2]).T / (2 * _STEP))
+    diagonal = np.diag(weight)
+    if np.isinf(diagonal).any() or not diagonal.any():
+        return places[0], np.diag(diagonal)
+    return places[0], back.T @ weight @ back

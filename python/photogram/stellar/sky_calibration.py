@@ -18,25 +18,16 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
-from photogram.messages import listed
+from photogram.messages import unknown_name
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.options import core_threads
+from photogram.stellar.parameters import COMMON
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
 from photogram.stellar.pointing import transformed_angles
-from photogram.stellar.problem import weight_root
+from photogram.stellar.problem import NO_PRIOR, Prior, core_problem
 from photogram.stellar.sky import Site
-from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera, weight_of
-
-__all__ = [
-    "BrownCamera",
-    "Exposure",
-    "SkyCalibration",
-    "SkyCamera",
-    "calibrate_exposures",
-    "partials",
-    "project_sky",
-    "stars_near",
-]
+from photogram.stellar.sky_cameras import SkyCamera, weight_of
+from photogram.words import Phrase, phrase
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
@@ -72,10 +63,10 @@ class SkyCalibration:
     """A calibrated camera and the attitudes of E exposures."""
 
     camera: SkyCamera  # With covariance, scaled by the variance of unit weight
-    attitudes: Floats  # (E, 3) alpha, omega, kappa in radians, and (E, 3, 3)
-    attitude_covariances: Floats
+    attitudes: Floats  # (E, 3) alpha, omega, kappa in radians
+    attitude_covariances: Floats  # (E, 3, 3)
     cross_covariances: Floats  # (E, 3, k) of attitudes and camera
-    exposures: Indices  # (m,) exposure and catalogue star of each image used
+    exposures: Indices  # (m,) exposure and catalogue star of each image
     stars: Indices
     # (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their
     # mean errors
@@ -85,7 +76,7 @@ class SkyCalibration:
     standardized: Floats
     catalogue: Indices  # (S,) index in the catalogue of the stars used
     # (S, 2) adjusted minus catalogue right ascension and declination, radians; redundancy numbers;
-    # residuals over their mean errors. NaN for stars that were held.
+    # residuals over their mean errors. NaN for fixed stars.
     star_residuals: Floats
     star_redundancy: Floats
     star_standardized: Floats
@@ -110,7 +101,7 @@ def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats,
     pixels = _photocore.plate_images(standard, attitude, camera.common[:-4], camera.kind)
     limit = _photocore.radial_domain(camera.facts.model, camera.model_values)
     if limit is not None:
-        # Where radial distortion turns back, it would fold stars from far outside into the frame.
+        # Where the radial distortion decreases, stars far outside would have images in the frame.
         ideal = replace(camera, values=np.where(np.arange(len(camera.values)) < 2, 1.0, 0.0))
         straight = _photocore.plate_images(standard, attitude, ideal.common[:-4], camera.kind)
         pixels[np.linalg.norm(straight, axis=1) >= limit[0]] = np.nan
@@ -128,7 +119,7 @@ def stars_near(
 ) -> Indices:
     """Return the stars of a catalogue around the field of an exposure, by index.
 
-    `margin` (radians) is what the attitude may be off.
+    `margin` is the largest error of the attitude, radians.
     """
     alpha, omega = exposure.attitude[:2]
     if not math.cos(alpha) * math.cos(omega) > 0.02:
@@ -193,18 +184,16 @@ def calibrate_exposures(
         The stars do not determine the camera, or the memory does not hold the adjustment.
     """
     processors = core_threads(threads)
-    unknown = sorted(set(fixed) - set(camera.names))
-    if unknown:
-        raise InputError(f"there is no camera parameter {', '.join(unknown)}")
+    for name in sorted(set(fixed) - set(camera.names)):
+        raise InputError(unknown_name("camera parameter", name, camera.names))
     if not exposures:
-        raise InputError("there are no exposures")
+        raise InputError(phrase("error.missing", name="exposures"))
     if not 0 < pixel_sd < LARGEST_SD:
-        raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
+        limits = phrase("error.range", low=0, high=LARGEST_SD, value=pixel_sd)
+        raise InputError(phrase("error.at", what="pixel_sd", message=limits))
     if prior is not None and (prior.lens, prior.common_scale) != (camera.lens, common_scale):
-        raise InputError(
-            f"the prior is a camera {_described(prior.lens, prior.common_scale)},"
-            f" not {_described(camera.lens, common_scale)}"
-        )
+        lenses = _described(prior.lens, prior.common_scale), _described(camera.lens, common_scale)
+        raise InputError(phrase("stars.prior-lens", prior=lenses[0], camera=lenses[1]))
     camera = _tied(camera, common_scale)
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
@@ -217,54 +206,51 @@ def calibrate_exposures(
             unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=processors, progress=None
         )
     except _photocore.StellarError as error:
-        undetermined = _undetermined(error, camera, len(exposures))
-        raise AdjustmentError(f"the stars do not determine the camera: {undetermined}") from None
+        raise AdjustmentError(_undetermined(error, camera, len(exposures))) from None
     weighted = 0 if prior is None else int((prior.known & free).sum())
     freedom = 2 * len(images.xy) + weighted - 3 * len(exposures) - int(free.sum())
     result = _result(found, images, camera, len(exposures), freedom)
     if earth.pole == (0.0, 0.0):
         return result
-    # The turn between the poles is so small that covariances stay.
+    # The rotation between the poles is so small that covariances do not change.
     turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
     change = np.array(turned) - result.attitudes
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
 
 
-def _described(lens: str, common_scale: bool) -> str:
-    return f"of the lens {lens}{' with fx = fy' if common_scale else ''}"
+def _described(lens: str, common_scale: bool) -> Phrase:
+    return phrase("stars.lens-fx-fy" if common_scale else "stars.lens", lens=lens)
 
 
 def _tied(camera: SkyCamera, common_scale: bool) -> SkyCamera:
-    """Return a camera whose fy is fx, or no longer."""
+    """Return a camera with or without the condition that fy is fx."""
     values = camera.values.copy()
     if common_scale and not camera.common_scale:
         values[:2] = values[:2].mean()
     return replace(camera, values=values, common_scale=common_scale)
 
 
-def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: int) -> str:
-    """Name what the stars of so many exposures do not determine."""
+def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: int) -> Phrase:
+    """Return the unknowns that the stars of some exposures do not determine."""
     kind, message, indices = error.args
     if kind != "undetermined" or not indices:
-        return str(message)
+        return phrase("stars.no-solution", reason=str(message))
     attitudes = sorted({index // 3 + 1 for index in indices if index < 3 * exposures})
     places = dict(zip(camera.facts.places, camera.names, strict=True))
-    left = [places[index - 3 * exposures] for index in indices if index >= 3 * exposures]
+    names: list[str | Phrase] = [places[i - 3 * exposures] for i in indices if i >= 3 * exposures]
     if attitudes:
-        left.append(f"the attitudes of exposures {listed([str(number) for number in attitudes])}")
-    return f"they leave {', '.join(left)} open"
+        names.append(phrase("stars.attitudes", numbers=attitudes))
+    return phrase("stars.undetermined", names=names)
 
 
 def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
-    """Refuse what the machine cannot hold: stars that are estimated tie all attitudes to each other."""
-    attitudes = 3 * exposures
-    needed = _PER_IMAGE * images + (16 * attitudes**2 if weigh_stars else 0)
+    """Refuse an adjustment that exceeds the memory: estimated stars connect all attitudes."""
+    needed = _PER_IMAGE * images + (16 * (3 * exposures) ** 2 if weigh_stars else 0)
     free = available_memory()
     if free is not None and needed > free:
-        raise AdjustmentError(
-            f"{exposures} exposures with {images} images take {needed / 2**30:.1f} GiB of memory, and"
-            f" {free / 2**30:.1f} GiB are free" + ("; hold the stars" if weigh_stars else "")
-        )
+        sizes = {"needed": needed / 2**30, "free": free / 2**30}
+        code = "stars.memory.stars" if weigh_stars else "stars.memory"
+        raise AdjustmentError(phrase(code, exposures=exposures, images=images, **sizes))
 
 
 def partials(
@@ -297,12 +283,13 @@ class _Images:
         for number, exposure in enumerate(exposures):
             chosen = np.flatnonzero(exposure.stars >= 0) if exposure.stars is not None else np.zeros(0, int)
             if exposure.stars is None or not chosen.size:
-                raise InputError(f"exposure {number + 1} ({exposure.utc}) has no stars")
+                raise InputError(phrase("stars.no-stars", number=number + 1, utc=exposure.utc))
+            named = exposure.stars[chosen]
             exposure_of.append(np.full(len(chosen), number))
-            stars.append(exposure.stars[chosen])
+            stars.append(named)
             xy.append(exposure.xy[chosen])
             times.append(np.full(len(chosen), sidereal_time(site, exposure.utc, dut1)))
-            places.append(apparent_places(catalogue.take(exposure.stars[chosen]), exposure.utc, site.effects))
+            places.append(apparent_places(catalogue.take(named), exposure.utc, site.effects))
         self.exposures, self.stars = np.concatenate(exposure_of), np.concatenate(stars)
         self.xy, self.times = np.vstack(xy), np.concatenate(times)
         every = np.vstack(places)
@@ -313,12 +300,10 @@ class _Images:
         self.shifts = shifts
         errors = catalogue.take(self.catalogue).mean_errors(epoch(exposures[0].utc))
         self.weighted: Bools = (errors.min(axis=1) > 0) & weigh
-        # The axes of date differ from those of the catalogue by minutes of arc: nothing to an error ellipse.
+        # The axes of date differ from those of the catalogue by minutes of arc: negligible for an ellipse.
         errors[:, 0] /= np.cos(self.places[:, 1])
         self.weights = np.zeros((len(errors), 2, 2))
-        self.weights[self.weighted] = np.array([np.diag(row**-2.0) for row in errors[self.weighted]]).reshape(
-            -1, 2, 2
-        )
+        self.weights[self.weighted] = errors[self.weighted, :, None] ** -2.0 * np.eye(2)
 
 
 def _core(
@@ -332,38 +317,33 @@ def _core(
 ) -> _photocore.StellarProblem:
     first, count = 3 * len(exposures), len(images.xy)
     place = first + np.array(camera.facts.places)
-    fixed = np.ones(first + COMMON, bool)
+    fixed = np.ones(first + len(COMMON), bool)
     fixed[:first] = fixed[place[free]] = False
-    weighted, values, root = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0))
+    weighted = NO_PRIOR
     if prior is not None:
-        # What is held conditions the others: a block of the whole weight matrix.
+        # Fixed parameters are conditions of the others: a block of the whole weight matrix.
         weights = np.zeros((len(free), len(free)))
-        weights[np.ix_(prior.known, prior.known)] = weight_of(
-            prior.covariance[np.ix_(prior.known, prior.known)]
-        )
-        chosen = np.flatnonzero(prior.known & free)
-        weighted, values = place[chosen], prior.values[chosen]
-        root = weight_root(weights[np.ix_(chosen, chosen)], [camera.names[i] for i in chosen])
-    return _photocore.StellarProblem(
-        station=site.core,
-        camera=camera.kind,
-        pointings=np.array([exposure.attitude for exposure in exposures], float),
-        common=camera.common,
-        fixed=fixed.tolist(),
-        weighted=weighted,
-        weighted_values=values,
-        weight_root=root,
-        star_places=images.places,
-        star_catalogue=images.places,
+        known = np.ix_(prior.known, prior.known)
+        weights[known] = weight_of(prior.covariance[known])
+        rows = np.flatnonzero(prior.known & free)
+        names = [camera.names[i] for i in rows]
+        weighted = Prior(place[rows], prior.values[rows], weights[np.ix_(rows, rows)], names)
+    attitudes = [exposure.attitude for exposure in exposures]
+    return core_problem(
+        site,
+        camera.kind,
+        np.concatenate([*attitudes, camera.common]),
+        fixed,
+        prior=weighted,
+        places=images.places,
         star_weights=images.weights,
-        star_fixed=(~images.weighted).tolist(),
-        image_stars=images.local.astype(np.int64),
-        image_pointings=images.exposures.astype(np.int64),
+        star_fixed=~images.weighted,
+        image_stars=images.local,
+        image_pointings=images.exposures,
         image_xy=images.xy,
         image_weights=np.broadcast_to(np.eye(2) / pixel_sd**2, (count, 2, 2)).copy(),
         image_times=images.times,
         image_shifts=images.shifts,
-        axis=None,
     )
 
 
@@ -377,10 +357,7 @@ def _result(
     with np.errstate(over="ignore"):
         covariance = variance * found["common_cofactors"][np.ix_(place, place)]
     if not np.isfinite(covariance).all():
-        raise AdjustmentError(
-            "the variances of the camera are beyond double precision: images lie too far from their stars, or"
-            " standard deviations cannot be right"
-        )
+        raise AdjustmentError(phrase("stars.variances-too-large"))
     values = parameters[3 * count :][place]
     if camera.common_scale:
         values[1] = values[0]

@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import orjson
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.io import json
-from photogram.io.files import read_bytes
+from photogram.io.json import Tree, read_json, to_json
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.stellar.lenses import LENSES, Lens, lens_named
+from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
+from photogram.words import phrase
 
 
 def weight_of(covariance: Floats) -> Floats:
@@ -30,69 +30,43 @@ def weight_of(covariance: Floats) -> Floats:
     try:
         lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
     except np.linalg.LinAlgError:
-        raise InputError("the covariance of the camera is not positive definite") from None
+        message = phrase("error.covariance")
+        raise InputError(phrase("error.at", what="covariance", message=message)) from None
     root = np.linalg.solve(lower, np.diag(1.0 / sd))
     return np.asarray(root.T @ root, float)
 
 
-def read_any(path: Path) -> dict[str, Any]:
-    """Read a JSON document.
-
-    Raises InputError: the file cannot be read, or holds something else.
-    """
-    try:
-        document = orjson.loads(read_bytes(path))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"is not a camera: {error}", file=path) from None
-    if not isinstance(document, dict):
-        raise InputError("is not a camera: no JSON object", file=path)
+def of_kind(document: Tree, kinds: Sequence[str]) -> Tree:
+    """Return a document of one of some kinds; InputError: it is another document."""
+    kind = document["kind"]
+    if kind.value not in kinds:
+        raise kind.error(phrase("error.choice", value=str(kind.value), names=kinds))
     return document
 
 
-def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
-    """Read a JSON document of one of some kinds.
+def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Return the parameters of a camera and their covariance: zero for those that are not in its order.
 
-    Raises InputError: the file cannot be read, or is another document.
+    Raises InputError: a missing parameter, another name, a wrong number, a negative variance.
     """
-    document = read_any(path)
-    if "kind" not in document:
-        raise InputError("is not a camera: 'kind'", file=path)
-    if document["kind"] not in kinds:
-        raise InputError(f"is a {document['kind']}, not a {' or a '.join(kinds)}", file=path)
-    return document
-
-
-def read_camera(path: Path, document: dict[str, Any], names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Return the parameters of a document and their covariance: zero for what is not in its order.
-
-    Raises InputError: a parameter that is missing, what is not a number, a negative variance.
-    """
-    names = list(names)
-    try:
-        values = [document["parameters"][name] for name in names]
-        order = [names.index(name) for name in document["covariance"]["order"]]
-        matrix = np.array(document["covariance"]["matrix"], float).reshape(len(order), len(order))
-        found = np.array([v["value"] if isinstance(v, dict) else v for v in values], float)
-        # A null becomes NaN.
-        if not (np.isfinite(found).all() and np.isfinite(matrix).all() and (np.diag(matrix) >= 0).all()):
-            raise InputError("is not a camera: what is not a number, or a negative variance", file=path)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"is not a camera: {error}", file=path) from None
+    members = [document["parameters"][name] for name in names]
+    values = [member.get("value", None) if isinstance(member.value, dict) else member for member in members]
+    order, matrix = document["covariance"]["order"], document["covariance"]["matrix"]
+    for name in order:
+        if name.value not in names:
+            raise name.error(phrase("error.choice", value=str(name.value), names=list(names)))
+    rows = [names.index(name.value) for name in order]
+    block = np.array([row.numbers(len(rows)) for row in matrix]).reshape(-1, len(rows))
+    if len(block) != len(rows) or not (np.diag(block) >= 0).all():
+        raise matrix.error(phrase("error.covariance"))
     covariance = np.zeros((len(names), len(names)))
-    covariance[np.ix_(order, order)] = matrix
-    return found, covariance
+    covariance[np.ix_(rows, rows)] = block
+    return np.array([value.number() for value in values]), covariance
 
 
-COMMON = 17
-"""Parameters of the core that all images share."""
-_INTERIOR = COMMON - len(TAU)
 _EQUAL = 1e-4
-"""Pixels by which fy may differ from fx in blocks, where the two were one parameter."""
-_KIND = "sky camera"
+"""Pixels by which fy may differ from fx in blocks, if the two were one parameter."""
+_KINDS = ("brown camera", "sky camera")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +98,9 @@ class SkyCamera:
     def __post_init__(self) -> None:
         count = len(lens_named(self.lens).names)
         if np.shape(self.values) != (count,) or np.shape(self.covariance) != (count, count):
-            raise InputError(f"a camera {self.lens} has {count} parameters: {', '.join(self.names)}")
+            shapes = {"values": np.shape(self.values), "covariance": np.shape(self.covariance)}
+            fields = {name: str(shape) for name, shape in shapes.items()}
+            raise InputError(phrase("stars.parameters", lens=self.lens, names=self.names, **fields))
 
     @classmethod
     def of_field(cls, width: float, height: float, field_of_view: float, lens: str = "brown") -> Self:
@@ -137,16 +113,12 @@ class SkyCamera:
         """
         facts = lens_named(lens)
         if not 0 < field_of_view < facts.widest:
-            widest = math.degrees(facts.widest)
-            raise InputError(
-                f"the field of view is {math.degrees(field_of_view):g} degrees; of a lens {lens} it is"
-                f" between 0 and {widest:g}"
-            )
+            field, widest = math.degrees(field_of_view), math.degrees(facts.widest)
+            raise InputError(phrase("stars.field-of-view", field=field, lens=lens, widest=widest))
         f = 0.5 * width / facts.radius(0.5 * field_of_view)
-        count = len(facts.names)
-        values = np.zeros(count)
+        values = np.zeros(len(facts.names))
         values[:4] = f, f, 0.5 * width, 0.5 * height
-        return cls(values, np.zeros((count, count)), lens)
+        return cls(values, np.zeros((len(values), len(values))), lens)
 
     @property
     def facts(self) -> Lens:
@@ -173,9 +145,9 @@ class SkyCamera:
     @property
     def common(self) -> Floats:
         """(17,) as the core takes it: those of the model, zeros, coefficients of refraction."""
-        common = np.zeros(COMMON)
+        common = np.zeros(len(COMMON))
         common[: len(self.facts.order)] = self.model_values
-        common[_INTERIOR:] = TAU
+        common[len(INTERIOR) :] = TAU
         return common
 
     @property
@@ -190,13 +162,11 @@ class SkyCamera:
 
     def images(self, rays: Floats) -> Floats:
         """Return images (n, 2), pixels, of directions as of `rays`."""
-        turned = np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
-        return _photocore.camera_images(self.facts.model, self.model_values, turned)
+        return _photocore.camera_images(self.facts.model, self.model_values, _turned(rays))
 
     def partials(self, rays: Floats) -> Floats:
         """Return partials (n, 2, k), pixels, of images of directions, as of `rays`, by the parameters."""
-        turned = np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
-        _, _, found = _photocore.camera_partials(self.facts.model, self.model_values, turned)
+        _, _, found = _photocore.camera_partials(self.facts.model, self.model_values, _turned(rays))
         return np.asarray(found[:, :, list(self.facts.places)], float)
 
     def largest_angle(self, frame: tuple[float, float]) -> float:
@@ -226,17 +196,16 @@ class SkyCamera:
             matrix[1, :], matrix[:, 1] = matrix[0, :], matrix[:, 0]
             matrix[1, 1] = matrix[0, 0] + _EQUAL**2
             known = known | (np.arange(len(names)) == 1)
-        order = np.flatnonzero(known)
-        return Camera(
-            model, values, covariance=([names[i] for i in order], matrix[np.ix_(order, order)]), name=name
-        )
+        rows = np.flatnonzero(known)
+        covariance = [names[i] for i in rows], matrix[np.ix_(rows, rows)]
+        return Camera(model, values, covariance=covariance, name=name)
 
     def document(self) -> dict[str, Any]:
         """Return the camera as it is written."""
         brown = self.lens == "brown"
         return {
             "program": f"photogram {_photocore.__version__}",
-            "kind": "brown camera" if brown else _KIND,
+            "kind": _KINDS[0 if brown else 1],
             **({} if brown else {"lens": self.lens, "model": self.facts.model}),
             "unit": "pixel",
             "common_scale": self.common_scale,
@@ -246,7 +215,7 @@ class SkyCamera:
 
     def to_json(self) -> bytes:
         """Return the camera as a JSON document: a weighted prior of later adjustments."""
-        return json.to_json(self.document())
+        return to_json(self.document())
 
     @classmethod
     def read(cls, path: Path) -> SkyCamera:
@@ -257,15 +226,17 @@ class SkyCamera:
         InputError
             The file cannot be read, or is another document.
         """
-        document = read_document(path, ("brown camera", _KIND))
-        lens = str(document.get("lens", "brown"))
-        if lens not in LENSES:
-            raise InputError(
-                f"is a camera of the lens {lens}, which is none of {', '.join(LENSES)}", file=path
-            )
-        values, covariance = read_camera(path, document, LENSES[lens].names)
-        of = BrownCamera if lens == "brown" else SkyCamera
-        return of(values, covariance, lens, document.get("common_scale") is True)
+        document = of_kind(read_json(path), _KINDS)
+        lens = document.get("lens", "brown")
+        if lens.value not in LENSES:
+            raise lens.error(phrase("error.choice", value=str(lens.value), names=list(LENSES)))
+        values, covariance = read_camera(document, LENSES[lens.value].names)
+        of = BrownCamera if lens.value == "brown" else SkyCamera
+        return of(values, covariance, lens.value, document.get("common_scale", False).value is True)
+
+
+def _turned(rays: Floats) -> Floats:
+    return np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
 
 
 class BrownCamera(SkyCamera):

@@ -1,14 +1,16 @@
-"""Values that an iteration has reached, and how it got there."""
+"""Values that an iteration has reached, and its history."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.lazy_dataclasses import dataclass, field
-from photogram.stellar.problem import Problem
+from photogram.lazy_dataclasses import dataclass
+from photogram.stellar.problem import Counts, Problem, degrees_of_freedom
+from photogram.words import Phrase
 
 
 @dataclass(frozen=True)
@@ -17,55 +19,44 @@ class Level:
 
     solution: str  # `minimum`, `maximum` or `refraction`
     number: int  # From 1
-    # Level of discrepancies before its correction, metres. As published: root of the sum of squares of
-    # the plate discrepancies over the degrees of freedom, stars at their catalogue places. Else: root
-    # of the whole weighted sum of squares over the degrees of freedom.
+    # Level of discrepancies before its correction, metres. As published: root of the sum of squares of the
+    # plate discrepancies over the degrees of freedom, with stars at their catalogue places. Else: root of the
+    # whole weighted sum of squares over the degrees of freedom.
     level: float
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What an iteration returns."""
+    """The result of an iteration."""
 
     parameters: Floats  # (26,) values
     places: Floats  # (S, 2) adjusted places of the stars
     free: Bools  # (26,) which parameters were estimated
-    cofactors: Floats  # (26, 26) for unit weight; zero for what was not
-    # (S, 2, 2) of the places; and what of them would be left if the parameters were known: the report's
-    # (1)^-1
-    star_cofactors: Floats
-    star_inverse: Floats
+    cofactors: Floats  # (26, 26) for unit weight; zero for fixed parameters
+    star_cofactors: Floats  # (S, 2, 2) of the places
+    star_inverse: Floats  # (S, 2, 2) the same with known parameters: the report's (1)^-1
     residuals: Floats  # (m, 2) computed minus measured plate coordinates, metres
     redundancy: Floats  # (m, 2) of the images
     standardized: Floats
-    star_redundancy: Floats  # (S, 2) of the catalogue places; NaN where there is none
+    star_redundancy: Floats  # (S, 2) of the catalogue places; NaN if they have no weight
     star_standardized: Floats
     axis_residual: Floats | None  # Computed minus measured plate coordinates of the axis
     sums: tuple[float, float, float]  # Weighted sums of squares of plate, stars, parameters (with the axis)
-    # Natural logarithm of the determinant of the reduced normal equations in the units of the
-    # parameters
-    log_determinant: float
+    log_determinant: (
+        float  # Natural logarithm, of the reduced normal equations in the units of the parameters
+    )
     stop: str  # Why the iteration stopped
     converged: bool  # Whether by its criterion
-    levels: tuple[Level, ...]  # The history
-    remarks: tuple[str, ...] = field(default=())  # What went on
+    levels: tuple[Level, ...]
+    remarks: tuple[Phrase, ...] = ()
 
     @classmethod
-    def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **rest: Any) -> Solved:
-        """Take stars and images from what the core has found.
+    def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **others: Any) -> Solved:
+        """Return the result of the core for stars and images, and the other attributes.
 
-        Parameters
-        ----------
-        problem
-            The problem.
-        found
-            What `StellarProblem.adjust` or `residual_cycle` returns.
-        unit
-            Mean error of unit weight that the standardized residuals count in.
-        rest
-            The other attributes.
+        `unit` is the mean error of unit weight in the standardized residuals of the core.
         """
-        tested = (problem.known & ~problem.held)[:, None]
+        observed = (problem.known & ~problem.held)[:, None]
         plate, stars, weighted, axis = found["sums_of_squares"]
         axis_residual = found["axis_residual"]
         # The residuals of the core are observed minus computed.
@@ -76,9 +67,46 @@ class Solved:
             residuals=-found["residuals"],
             redundancy=found["image_redundancy"],
             standardized=-unit * found["image_standardized"],
-            star_redundancy=np.where(tested, found["place_redundancy"], np.nan),
-            star_standardized=np.where(tested, -unit * found["place_standardized"], np.nan),
+            star_redundancy=np.where(observed, found["place_redundancy"], np.nan),
+            star_standardized=np.where(observed, -unit * found["place_standardized"], np.nan),
             axis_residual=None if axis_residual is None else -np.array(axis_residual),
             sums=(plate, stars, weighted + axis),
-            **rest,
+            **others,
         )
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One of the solutions of a run."""
+
+    solution: str  # `minimum`, `maximum` or `refraction`
+    counts: Counts
+    levels: tuple[Level, ...]
+    stop: str
+    converged: bool
+    log_determinant: float
+
+    @classmethod
+    def of(cls, problem: Problem, solved: Solved) -> Stage:
+        """Return the stage of a solution."""
+        levels, counts = solved.levels, degrees_of_freedom(problem, solved.free)
+        return cls(levels[0].solution, counts, levels, solved.stop, solved.converged, solved.log_determinant)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations after the initial values."""
+        return len(self.levels) - 1
+
+    @property
+    def log10_determinant(self) -> float:
+        """Decimal logarithm of the determinant of the reduced normal equations."""
+        return self.log_determinant / math.log(10)
+
+
+@dataclass(frozen=True, eq=False)
+class PreRun:
+    """Images without a part in the minimum solution (option 7)."""
+
+    points: tuple[str, ...]
+    stars: tuple[str, ...]
+    residuals: Floats  # (m, 2) computed minus measured, metres

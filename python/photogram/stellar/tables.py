@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import fields
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each
 from photogram.stellar.camera_tables import (
@@ -32,11 +33,12 @@ from photogram.stellar.curves import (
     residual_classes,
     star_means,
 )
+from photogram.stellar.directions import Ellipse, ellipse
+from photogram.stellar.findings import plate_tests
 from photogram.stellar.movement import fictitious_points
-from photogram.stellar.outliers import studentized
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
-from photogram.stellar.result import Ellipse, ellipse
+from photogram.stellar.problem import Counts
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
@@ -82,29 +84,23 @@ def parameters(result: Result) -> list[Table]:
 
 def stages(result: Result) -> list[Table]:
     """Return the solutions of the run, and the levels of discrepancies of all iterations."""
-    rows = [
-        {
-            "solution": stage.solution,
-            **asdict(stage.counts),
-            "degrees_of_freedom": stage.counts.degrees_of_freedom,
-            "iterations": len(stage.levels) - 1,
-            "stop": stage.stop,
-            "converged": stage.converged,
-            "log10_determinant": stage.log_determinant / math.log(10),
-        }
-        for stage in result.stages
-    ]
-    heads = {"log10_determinant": "Log10 of the determinant"}
+    counts = {field.name: f"counts.{field.name}" for field in fields(Counts)}
+    attributes = {
+        "solution": "solution",
+        **counts,
+        "degrees_of_freedom": "counts.degrees_of_freedom",
+        **{name: name for name in ("iterations", "stop", "converged", "log10_determinant")},
+    }
     columns = [
-        Quantity(
-            [row[name] for row in rows],
-            (),
-            "name" if name in ("solution", "stop", "converged") else "number",
+        of_each(
+            result.stages,
+            attribute,
+            kind="name" if name in ("solution", "stop", "converged") else "number",
             member=name,
-            head=heads.get(name, name.capitalize().replace("_", " ")),
+            head=name.capitalize().replace("_", " "),
             figures=10,
         )
-        for name in rows[0]
+        for name, attribute in attributes.items()
     ]
     levels = [
         of_each(result.levels, "solution", kind="name", head="Solution"),
@@ -282,15 +278,19 @@ def _images_of(result: Result) -> list[Quantity]:
 
 def worst(result: Result, most: int) -> Table:
     """Return the plate coordinates with the largest test values."""
-    tests = studentized(result)
-    sizes = np.nan_to_num(np.abs(tests.images))
+    tests = plate_tests(result)[0]
+    values = np.abs(tests.values)
+    sizes = np.nan_to_num(values)
     order: Indices = np.argsort(-sizes, axis=None, kind="stable")[:most]
     point, star, _ = (replace(column, member="") for column in _images_of(result))
     columns = [
         point,
         star,
         column(result.solved.residuals, UM_OF_M, "Residual", 2, parts="x, y"),
-        column(tests.images, None, f"Test value {'w' if tests.known else 't'}", 2, parts="x, y"),
+        replace(
+            column(values, None, f"Test value {tests.statistic}", 2, parts="x, y"),
+            marked=result.verdict.marks(tests.kind, tests.values.shape),
+        ),
     ]
     note = f"The {len(order)} plate coordinates of the largest test values."
     places = np.column_stack(np.unravel_index(order, sizes.shape))

@@ -1,12 +1,14 @@
-"""What TOML files of calibrations by stars have alike: the station, the effects on places, the pole."""
+"""Parts of TOML files of calibrations by stars: station, effects on places, pole, names of other files."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
 
-from photogram.errors import InputError
-from photogram.io.toml_tables import Table
+from photogram.io.places import at_place
+from photogram.io.toml import KeyPlace, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
@@ -24,29 +26,24 @@ _STATION = {
 }
 
 
-def effects(table: Table) -> Effects:
-    """Return which effects apparent places have, all that the table does not switch off.
+def named_files(
+    path: Path, tables: Mapping[str, Sequence[str] | None], keys: Sequence[tuple[str, str]]
+) -> list[Path]:
+    """Return a file and the files that keys of its tables name: results must not replace them."""
+    document = read_document(path, tables)
+    named = [(document.optional(table), key) for table, key in keys]
+    return [path, *(table.path(key) for table, key in named if key in table)]
 
-    Raises
-    ------
-    InputError
-        A value that is neither true nor false.
-    """
+
+def effects(table: Table) -> Effects:
+    """Return the effects on apparent places: all that the table does not switch off."""
     return Effects(**{one.name: table.switch(one.name, True) for one in fields(Effects)})
 
 
 def site(table: Table) -> Site:
-    """Return the station of a table.
-
-    Raises
-    ------
-    InputError
-        A key that is not known, a value of another kind, a latitude beyond the poles, air that cannot be.
-    """
+    """Return the station of a table."""
     table.only(_STATION)
-    latitude = table.number("latitude_deg")
-    if not abs(latitude) <= 90:
-        raise table.error("latitude_deg", f"is {latitude:g}; it is not between -90 and 90 degrees")
+    latitude = table.number("latitude_deg", low=-90, high=90)
     temperature = table.number("temperature_K", 273.15)
     if table.says("pressure_hPa", "pressure_mmHg"):
         pressure = table.number("pressure_hPa") / HECTOPASCAL
@@ -56,10 +53,8 @@ def site(table: Table) -> Site:
         west = -table.number("longitude_east_deg", low=-360, high=360)
     else:
         west = table.number("longitude_west_deg", 0.0, low=-360, high=360)
-    try:
+    with at_place(KeyPlace(table)):
         air = Air(temperature, pressure)
-    except InputError as error:
-        raise InputError(f"[{table.name}] {error.message}", file=table.file) from None
     return Site(
         latitude=math.radians(latitude),
         longitude_west=math.radians(west),
@@ -74,8 +69,5 @@ def site(table: Table) -> Site:
 
 
 def pole_arcsec(table: Table, key: str) -> float:
-    """Return a coordinate of the pole, never a second of arc from the mean one; zero where it is missing.
-
-    Raises InputError: it is something else.
-    """
+    """Return a coordinate of the pole; zero if it is missing."""
     return table.number(key, 0.0, low=-2, high=2)

@@ -5,14 +5,14 @@ from .calibration import Calibration as Calibration
 from .calibration import simulate_corners as simulate_corners
 from .calibration_difference import CameraDifference as CameraDifference
 from .calibration_result import Calibrated as Calibrated
-from .calibration_result import Worth as Worth
-from .calibration_result import WorthOptions as WorthOptions
 from .conversion import Conversion as Conversion
 from .conversion import convert_lens as convert_lens
 from .corners import Corners as Corners
 from .cross_validation import CrossValidation as CrossValidation
+from .drawing import plot_board_residuals as plot_board_residuals
 from .drawing import plot_cross_validation as plot_cross_validation
 from .drawing import plot_difference as plot_difference
+from .drawing import plot_poorest_views as plot_poorest_views
 from .drawing import plot_uncertainty as plot_uncertainty
 from .drawing import plot_uncertainty_curve as plot_uncertainty_curve
 from .first_calibration import FirstCalibration as FirstCalibration
@@ -26,10 +26,7 @@ from .new_views import Candidate as Candidate
 from .new_views import NewView as NewView
 from .new_views import Suggestions as Suggestions
 from .output.formats import camera_files as camera_files
-from .plan_drawing import plot_planned_views as plot_planned_views
 from .reading import read as read
-from .residual_drawing import plot_board_residuals as plot_board_residuals
-from .residual_drawing import plot_poorest_views as plot_poorest_views
 from .suggestions import suggest_views as suggest_views
 from .triangulation import Triangulated as Triangulated
 from .triangulation import distance_uncertainty as distance_uncertainty
@@ -39,5 +36,8 @@ from .uncertainty import projection_uncertainty as projection_uncertainty
 from .uncertainty import uncertainty_against_distance as uncertainty_against_distance
 from .uncertainty import uncertainty_map as uncertainty_map
 from .view_plan import plan_views as plan_views
+from .view_plan_document import plot_planned_views as plot_planned_views
 from .view_plan_result import PlannedView as PlannedView
 from .view_plan_result import ViewPlan as ViewPlan
+from .worth import Worth as Worth
+from .worth import WorthOptions as WorthOptions

@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import argument_error
 from photogram.arguments.types import Bools
 from photogram.errors import InputError, RankError
-from photogram.targets.calibration_result import Calibrated, Worth, WorthOptions
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
-from photogram.targets.housings import camera_number, housed_with, housing_of
+from photogram.targets.housing import camera_number, housed_with, housing_of
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.suggestions import suggest_views
 from photogram.targets.uncertainty import uncertainty_map
-from photogram.words import Phrase
+from photogram.targets.worth import Worth, WorthOptions
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
@@ -58,7 +60,7 @@ def cross_validate(
         The views of a part do not determine all unknowns.
     """
     if isinstance(into, int) and into < 2:
-        raise InputError(f"views are cross-validated in 2 parts or more, not {into}")
+        raise argument_error("into", "least", low=2, value=into)
     number = camera_number(result, camera)
     cameras = housed_with(result, number)
     names = tuple(result.cameras[each].name for each in cameras)
@@ -68,7 +70,8 @@ def cross_validate(
     parts, tests, housings = [], [], []
     for pair in splits(len(views), into):
         if min(map(len, pair)) < MIN_VIEWS_PER_PART:
-            raise InputError(f"{len(views)} views are too few for cross-validation by {into}")
+            fields = {"views": len(views), "into": into, "least": MIN_VIEWS_PER_PART}
+            raise InputError(phrase("targets.few-views", **fields))
         adjusted = []
         for part in pair:
             if progress is not None:
@@ -150,38 +153,30 @@ def appraise(
         As of the adjustment.
     """
     asked = asked or WorthOptions()
-    told = progress or (lambda _: None)
-    remarks: list[str] = []
+    report = progress or (lambda _: None)
+    remarks: list[Phrase] = []
     cross: list[CrossValidation] = []
     for number, camera in enumerate(calibrated.cameras):
         if asked.cross_validate is None or housed_with(calibrated, number)[0] != number:
             continue
         try:
-            cross.append(cross_validate(calibrated, asked.cross_validate, number, progress=told))
+            cross.append(cross_validate(calibrated, asked.cross_validate, number, progress=report))
         except (InputError, RankError) as error:
-            remarks.append(f"{camera.name}: no cross-validation: {error}")
+            reason = error.phrase or str(error)
+            remarks.append(phrase("targets.no-cross-validation", camera=camera.name, reason=reason))
     maps: list[UncertaintyMap] = []
     for number, camera in enumerate(calibrated.cameras):
         if calibrated.calibration.corners.sizes[number] is None:
-            remarks.append(f"{camera.name}: no map without the size of its pictures (--size WxH)")
+            remarks.append(phrase("targets.no-size", camera=camera.name))
             continue
         model = model_verdict(calibrated, number, cross)
         for distance in asked.distances or (math.inf, median_distance(calibrated, number)):
-            told(f"map of {camera.name} {distance_text(distance, calibrated.calibration.board.unit)}")
-            maps.append(
-                uncertainty_map(
-                    calibrated,
-                    number,
-                    distance,
-                    asked.grid,
-                    datum=asked.datum,
-                    noise_only=asked.noise_only,
-                    model=model,
-                )
-            )
+            report(f"map of {camera.name} {distance_text(distance, calibrated.calibration.board.unit)}")
+            how: dict[str, Any] = {"datum": asked.datum, "noise_only": asked.noise_only, "model": model}
+            maps.append(uncertainty_map(calibrated, number, distance, asked.grid, **how))
     suggestions = []
     if asked.suggest and maps:
-        told("views to take next")
+        report("views to take next")
         at = maps[0].distance
         suggestions.append(suggest_views(calibrated, at, camera=maps[0].camera, views=asked.suggest))
     return Worth(maps=tuple(maps), cross=tuple(cross), suggestions=tuple(suggestions), remarks=tuple(remarks))
@@ -190,12 +185,12 @@ def appraise(
 def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossValidation]) -> str:
     """Return what is known of the model of a camera's lens: by other views, and by a pattern of residuals."""
     name = calibrated.cameras[camera].name
-    own = [each.verdict for each in cross if name in each.cameras]
-    said = own or ["model not tested by cross-validation"]
+    verdicts = [each.verdict for each in cross if name in each.cameras]
+    verdicts = verdicts or ["model not tested by cross-validation"]
     for test in calibrated.verdict.tests:
-        if test.kind == Phrase("test.frame", {"camera": name}) and not test.accepted:
-            said.append("residuals have a pattern over the picture: the map is optimistic")
-    return "; ".join(said)
+        if test.kind == phrase("test.frame", camera=name) and not test.accepted:
+            verdicts.append("residuals have a pattern over the picture: the map is optimistic")
+    return "; ".join(verdicts)
 
 
 def median_distance(calibrated: Calibrated, camera: int) -> float:

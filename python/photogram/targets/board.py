@@ -12,12 +12,23 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, length, names, number, one_of, shaped, text, whole_number
+from photogram.arguments.arrays import (
+    argument_error,
+    frozen,
+    length,
+    names,
+    number,
+    one_of,
+    shaped,
+    text,
+    whole_number,
+)
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief, Rows
+from photogram.words import phrase
 
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
 Shape = Literal["held", "bend", "points"]  # unknowns: none, deflections of the middle lines, every point
@@ -90,7 +101,7 @@ class Board(Valued, Brief):
         if self.point_sd is not None:
             sd = shaped("point_sd", self.point_sd, (len(self.places), 3))
             if not ((sd >= 0) & np.isfinite(sd)).all():
-                raise InputError("point_sd of a board are not standard deviations")
+                raise InputError(phrase("targets.point-sd"))
             self._set("point_sd", sd)
         for name in ("sd_plane", "sd_spacing"):
             if getattr(self, name) is not None:
@@ -102,7 +113,8 @@ class Board(Valued, Brief):
     def _refuse(self, *fields: str) -> None:
         for name in fields:
             if getattr(self, name) is not None:
-                raise InputError(f"a board of the kind {self.kind} has no {name}")
+                kind = phrase("targets.kind", kind=self.kind)
+                raise InputError(phrase("error.not-applicable", name=name, other=kind))
 
     def _check_grid(self) -> None:
         self._refuse("points", "point_names")
@@ -110,49 +122,48 @@ class Board(Valued, Brief):
         for name in ("columns", "rows"):
             count = whole_number(f"{name} of a board", getattr(self, name))
             if count < least:
-                raise InputError(f"a board has {least} or more {name}, not {count}")
+                raise argument_error(name, "least", low=least, value=count)
             self._set(name, count)
         columns, rows = self.grid
         if columns * rows > MAX_POINTS:
-            raise InputError(
-                f"columns and rows of a board are {self.columns} and {self.rows}, {columns * rows} points:"
-                f" {MAX_POINTS} points are the most"
-            )
+            raise argument_error("columns x rows", "most", high=MAX_POINTS, value=columns * rows)
         if self.kind == "aprilgrid":
             for name in ("tag_size", "tag_spacing"):
                 if getattr(self, name) is None:
-                    raise InputError(f"an AprilGrid has a {name}")
+                    raise argument_error(name, "empty")
                 self._set(name, _length(name, getattr(self, name)))
             assert self.tag_size is not None
             assert self.tag_spacing is not None
             pitch = self.tag_size * (1 + self.tag_spacing)
             if self.spacing not in (None, pitch, (pitch, pitch)):
-                raise InputError("the spacing of an AprilGrid is that of tag_size and tag_spacing")
+                raise InputError(phrase("targets.april-spacing"))
             self._set("spacing", (pitch, pitch))
             return
         self._refuse("tag_size", "tag_spacing")
         if self.spacing is None:
-            raise InputError("the spacing of a board must be given")
+            raise argument_error("spacing", "empty")
         both = self.spacing if isinstance(self.spacing, Sequence) else (self.spacing, self.spacing)
         if len(both) != 2:
-            raise InputError(f"the spacing of a board is one number, or two, not {len(both)}")
+            raise argument_error("spacing", "count", count=2, actual=len(both))
         self._set("spacing", (_length("spacing", both[0]), _length("spacing", both[1])))
 
     def _check_points(self) -> None:
         self._refuse("tag_size", "tag_spacing", "spacing")
         if self.points is None:
-            raise InputError("a board of the kind points has points")
+            raise argument_error("points", "empty")
         if self.shape == "bend":
-            raise InputError("a bend is that of a board with columns and rows, not of points")
+            raise InputError(phrase("targets.bend"))
         count = length("points", self.points)
         self._set("points", shaped("points", self.points, (count, 3)))
-        if not (np.abs(np.asarray(self.points)) <= MAX_LENGTH).all():
-            raise InputError(f"points of a board are not finite numbers up to {MAX_LENGTH:g}")
+        beyond = ~(np.abs(np.asarray(self.points)) <= MAX_LENGTH)
+        if beyond.any():
+            value = float(np.asarray(self.points)[beyond][0])
+            raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
         if self.point_names is not None:
-            given = names("point_names", self.point_names)
-            if len(given) != count or len(set(given)) < count:
-                raise InputError(f"point_names of a board are not {count} different names")
-            self._set("point_names", tuple(given))
+            point_names = names("point_names", self.point_names)
+            if len(point_names) != count or len(set(point_names)) < count:
+                raise InputError(phrase("targets.names", count=count))
+            self._set("point_names", tuple(point_names))
 
     def brief(self) -> tuple[str, Rows]:
         """Return what the board is in a few lines."""
@@ -259,9 +270,7 @@ class Board(Valued, Brief):
 
 
 def _length(name: str, value: object) -> float:
-    found = number(name, value)
-    if not 1 / MAX_LENGTH <= found <= MAX_LENGTH:
-        raise InputError(
-            f"{name} of a board is a positive number from {1 / MAX_LENGTH:g} to {MAX_LENGTH:g}, not {found:g}"
-        )
-    return found
+    length = number(name, value)
+    if not 1 / MAX_LENGTH <= length <= MAX_LENGTH:
+        raise argument_error(name, "range", low=1 / MAX_LENGTH, high=MAX_LENGTH, value=length)
+    return length

@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from photogram.errors import InputError
+from photogram.arguments.arrays import value_field
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
 from photogram.io.json import Tree
+from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlFile, float_of
 from photogram.io.yaml_text import read_yaml_text
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.targets.board import Board
+from photogram.words import phrase
 
 BOARD_FILE = "board.toml"
 _WORDS = ("kind", "unit", "shape")
@@ -43,7 +45,8 @@ def picture_size(path: Path) -> tuple[int, int] | None:
         return None
     value = file.content["picture_size"]
     if not (isinstance(value, list) and len(value) == 2 and all(type(each) is int for each in value)):
-        raise file.error("picture_size", "picture_size is a width and a height: [640, 480]")
+        size = phrase("targets.picture-size", value=str(value))
+        raise file.error("picture_size", phrase("error.at", what="picture_size", message=size))
     return value[0], value[1]
 
 
@@ -52,26 +55,27 @@ def _of_toml(path: Path) -> Board:
     content = file.content
     for key in content:
         if key not in _KEYS:
-            raise file.error(key, f"a board has no {key}{nearest(key, _KEYS)}")
-    given: dict[str, Any] = {key: _value(file, key, str, _TEXT) for key in _WORDS if key in content}
-    given |= {key: _value(file, key, int, "a whole number") for key in _COUNTS if key in content}
-    given |= {key: _number(file, key) for key in _LENGTHS if key in content}
+            raise file.error(key, unknown_name("key", key, _KEYS))
+    fields: dict[str, Any] = {key: _value(file, key, str, "error.text") for key in _WORDS if key in content}
+    fields |= {key: _value(file, key, int, "error.whole") for key in _COUNTS if key in content}
+    fields |= {key: _number(file, key) for key in _LENGTHS if key in content}
     both = [key for key in ("spacing_x", "spacing_y") if key in content]
     if both and ("spacing" in content or len(both) == 1):
-        raise file.error(both[0], "spacing, or spacing_x and spacing_y, say what a board has")
+        raise file.error(both[0], phrase("targets.spacings"))
     if both:
-        given["spacing"] = (_number(file, "spacing_x"), _number(file, "spacing_y"))
+        fields["spacing"] = (_number(file, "spacing_x"), _number(file, "spacing_y"))
     elif "spacing" in content:
-        given["spacing"] = _number(file, "spacing")
+        fields["spacing"] = _number(file, "spacing")
     if "points" in content:
-        given |= _points(file, path.parent / _value(file, "points", str, _TEXT))
-    return _made(given, path)
+        fields |= _points(file, path.parent / _value(file, "points", str, "error.text"))
+    with at_place(Place(path)):
+        return Board(**fields)
 
 
 def _points(file: TomlFile, path: Path) -> dict[str, Any]:
     """Return points of a table: point, x, y, z; sd, or sd_x, sd_y, sd_z."""
     if not path.is_file():
-        raise file.error("points", f"points: there is no file {path.name}")
+        raise file.error("points", phrase("targets.no-table", name=path.name))
     table = read_columns(path, known=("point",), numbers=("x", "y", "z", "sd", *_SD))
     table.require("point", "x", "y", "z")
     places = table.vectors(("x", "y", "z"))
@@ -85,19 +89,17 @@ def _points(file: TomlFile, path: Path) -> dict[str, Any]:
     return found
 
 
-_TEXT = "text between quotation marks"
-
-
-def _value(file: TomlFile, key: str, kind: type | UnionType, what: str) -> Any:
-    """Return a value of a kind, of which true and false are none."""
+def _value(file: TomlFile, key: str, kind: type | UnionType, code: str) -> Any:
+    """Return a value of a kind, and not true or false."""
     value = file.content[key]
     if isinstance(value, bool) or not isinstance(value, kind):
-        raise file.error(key, f"{key} is {what}")
+        message = phrase(code, value=value_field(value))
+        raise file.error(key, phrase("error.at", what=key, message=message))
     return value
 
 
 def _number(file: TomlFile, key: str) -> float:
-    return float_of(_value(file, key, int | float, "a number"))
+    return float_of(_value(file, key, int | float, "error.number"))
 
 
 _KINDS_OF_KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "circlegrid": "circles"}
@@ -108,28 +110,22 @@ def _of_kalibr(path: Path) -> Board:
     content = Tree(read_yaml_text(path), path)
     kind = content["target_type"].text()
     if kind not in _KINDS_OF_KALIBR:
-        raise content["target_type"].error(f"{kind} is none of {', '.join(_KINDS_OF_KALIBR)}")
+        raise content["target_type"].error(phrase("error.choice", value=kind, names=[*_KINDS_OF_KALIBR]))
     what = "tag" if kind == "aprilgrid" else "target"
-    given: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "kind": _KINDS_OF_KALIBR[kind],
         "columns": content[f"{what}Cols"].whole(1),
         "rows": content[f"{what}Rows"].whole(1),
     }
     if kind == "aprilgrid":
-        given |= {"tag_size": content["tagSize"].number(), "tag_spacing": content["tagSpacing"].number()}
+        fields |= {"tag_size": content["tagSize"].number(), "tag_spacing": content["tagSpacing"].number()}
     elif kind == "checkerboard":
-        given["spacing"] = content["colSpacingMeters"].number(), content["rowSpacingMeters"].number()
+        fields["spacing"] = content["colSpacingMeters"].number(), content["rowSpacingMeters"].number()
     else:
         skewed = content.get("asymmetricGrid", False).value
         if not isinstance(skewed, bool):
-            raise content["asymmetricGrid"].error("is true or false")
-        given |= {"spacing": content["spacingMeters"].number()}
-        given |= {"kind": "asymmetric_circles"} if skewed else {}
-    return _made(given, path)
-
-
-def _made(given: dict[str, Any], path: Path) -> Board:
-    try:
-        return Board(**given)
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
+            raise content["asymmetricGrid"].error(phrase("error.flag", value=value_field(skewed)))
+        fields |= {"spacing": content["spacingMeters"].number()}
+        fields |= {"kind": "asymmetric_circles"} if skewed else {}
+    with at_place(Place(path)):
+        return Board(**fields)

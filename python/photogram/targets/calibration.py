@@ -12,20 +12,21 @@ from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import one_of
+from photogram.arguments.arrays import argument_error, one_of
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError, RankError
 from photogram.messages import Message
-from photogram.network.block import Block
 from photogram.network.cameras import images_of
 from photogram.results.result import Result
-from photogram.targets.calibration_result import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.findings import judged
 from photogram.targets.housing import transformed
 from photogram.targets.motion import dated, errors_of_speeds
-from photogram.targets.regularisation import regularised
+from photogram.targets.regularisation import weighted_block
 from photogram.targets.start import Start
+from photogram.targets.unknown_weight import deviation_of_corners, with_unknown_weight
 from photogram.targets.vision import FLIP, photo_poses
+from photogram.words import phrase
 
 
 class Calibration(Start):
@@ -112,16 +113,19 @@ class Calibration(Start):
         """
         if outliers is not None:
             one_of("outliers", outliers, ("mrcal",))
-        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
+        how: dict[str, Any] = {
+            "loss": loss,
+            "threads": threads,
+            "progress": progress,
+            "covariance": "verdict",
+        }
         start: Start = self
         rounds = 0
         while True:
             # Knots that no image touches are determined by priors alone.
-            free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
+            free = None if _has_knots(start) else adjust(start.block(), **how)
             if free is None:
-                result = adjust(
-                    weighted_block(start), **how, covariance="verdict", tolerance=SPLINE_TOLERANCE
-                )
+                result = adjust(weighted_block(start), **how, tolerance=SPLINE_TOLERANCE)
             elif start.regularise is None:
                 result = free
             else:
@@ -131,18 +135,18 @@ class Calibration(Start):
             worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
             if worse.any() and result.converged:
                 start = start.without(worse)
-            elif rounds < ROUNDS and (better := _better(start, result)) is not None:
+            elif rounds < MAX_ROUNDS and (better := _better(start, result)) is not None:
                 start, rounds = better, rounds + 1
             else:
                 break
         messages = [*start.messages, *result.messages]
         if start.sync == "offset":
             messages += checked_clocks(Calibrated(calibration=start, result=result))
-        told = replace(result, messages=messages)
+        result = replace(result, messages=messages)
         if start.sd0 is None:
-            told = with_unknown_weight(told)
+            result = with_unknown_weight(result)
         before = free if start.regularise else None
-        return judged(Calibrated(calibration=start, result=told, unregularised=before))
+        return judged(Calibrated(calibration=start, result=result, unregularised=before))
 
     def snoop(self, **options: Any) -> Calibrated:
         """Take gross errors out one after the other, and adjust what is left.
@@ -160,30 +164,30 @@ class Calibration(Start):
             As of :func:`photogram.snoop`.
         """
         if self.regularise is not None and not _has_knots(self):
-            raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+            raise InputError(phrase("targets.priors"))
         start = self.adjust().calibration if self.sync == "offset" else self
-        found = snoop(weighted_block(start), **options)
-        result = found.result
+        snooped = snoop(weighted_block(start), **options)
+        result = snooped.result
         assert isinstance(result, Result)
-        own = start.with_images_of(result.block)
-        told = replace(result, messages=[*own.messages, *result.messages])
-        return judged(Calibrated(calibration=own, result=told, snooped=found))
+        rest = start.with_images_of(result.block)
+        result = replace(result, messages=[*rest.messages, *result.messages])
+        return judged(Calibrated(calibration=rest, result=result, snooped=snooped))
 
 
-ROUNDS = 8
-CHANGE = 0.01
+MAX_ROUNDS = 8
+MIN_CHANGE = 0.01  # of the standard deviation of corners, and of poses in standard deviations
 SPLINE_TOLERANCE = 1e-6  # convergence limit of splined lenses, in standard deviations
 
 
 def _better(start: Start, result: Result) -> Start | None:
-    """Return what to adjust again: other sd of corners, or motion of the board; None where all is as held."""
-    found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
+    """Return a start with another sd of corners or motion of the board; None if neither changes."""
+    better = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
     if start.sd0 is None and start.shape == "points" and result.converged:
         change = deviation_of_corners(result)
         sd = start.assumed * change
-        if abs(change - 1) > CHANGE and sd > 1e-6:  # corners that fit to the last digit are simulated
-            found = found.replace(assumed=sd)
-    return None if found is start else found
+        if abs(change - 1) > MIN_CHANGE and sd > 1e-6:  # corners that fit to the last digit are simulated
+            better = better.replace(assumed=sd)
+    return None if better is start else better
 
 
 def _in_motion(start: Start, result: Result) -> Start:
@@ -197,19 +201,11 @@ def _in_motion(start: Start, result: Result) -> Start:
     ).picture_poses()
     pictures = slice(len(start.corners.pictures))
     gaps = np.abs(photo_poses(there)[0] - result.photo_positions[pictures])
-    return start if (gaps <= CHANGE * result.photo_sd[pictures, :3]).all() else again
+    return start if (gaps <= MIN_CHANGE * result.photo_sd[pictures, :3]).all() else again
 
 
 def _has_knots(start: Start) -> bool:
     return any(each.knot_unknowns for each in start.cameras)
-
-
-def weighted_block(start: Start) -> Block:
-    """Return the block of a calibration with the priors of its cameras."""
-    if start.regularise is None:
-        return start.block()
-    observed = 2 * len(start.board.places) * len(start.corners.pictures)
-    return start.block(regularised(start.cameras, start.corners.sizes, observed))
 
 
 NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # shares of the motion: remark, error if an offset is free
@@ -232,18 +228,11 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
         share = float(shares[0, views].sum() / shares[1, views].sum())
         if share > MAX_POSE_ERROR and np.isinf(sd[camera]):
             photos = [result.block.photo_ids[row] for row in calibrated.photos[views].tolist()]
-            what = f"the offset of {each.name} is not determined: the board hardly moves"
-            told = (
-                f"{what}; {share:.0%} of its motion are errors of its poses. Weigh it (sd_offsets, --offset)"
-            )
-            raise RankError(told, photos, [], [each.name], what)
+            what = str(phrase("targets.offset", camera=each.name))
+            message = phrase("targets.offset.weigh", camera=each.name, share=share)
+            raise RankError(message, photos, [], [each.name], what)
         if share > NOTABLE_POSE_ERROR:
-            messages.append(
-                Message(
-                    f"the offset of {each.name} comes out too small by about {share:.0%}: so much of the"
-                    " motion of the board are errors of its poses"
-                )
-            )
+            messages.append(Message(phrase("targets.offset.small", camera=each.name, share=share)))
     return messages
 
 
@@ -295,7 +284,7 @@ def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
         Nobody has said how well corners are measured, or one has no image by these values.
     """
     if calibration.sd0 is None:
-        raise InputError("corners are drawn with a standard deviation: sd0 says none")
+        raise argument_error("sd0", "empty")
     random = np.random.default_rng(seed)
     corners = calibration.corners
     places = calibration.places().copy()
@@ -306,7 +295,7 @@ def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
     xy = images_of(calibration.cameras, corners.cameras[corners.picture], seen @ FLIP)
     if not np.isfinite(xy).all():
         row = int(np.argmin(np.isfinite(xy).all(axis=1)))
-        raise InputError(f"{corners.title(row)} has no image by the values of the calibration")
+        raise InputError(phrase("targets.no-image", corner=corners.title(row)))
     errors = calibration.sd0 * corners.sd[:, np.newaxis] * random.standard_normal(xy.shape)
     return calibration.replace(corners=corners.replace(xy=xy + errors))
 

@@ -5,17 +5,16 @@ What it is worth goes with it: maps of uncertainty, what cross-validation says o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.io import json
-from photogram.lazy_dataclasses import dataclass, field, fields, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock
@@ -26,122 +25,16 @@ from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
-from photogram.statistics.findings import Findings
-from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.cross_validation import CrossValidation, Into
-from photogram.targets.maps import UncertaintyMap, distance_text
-from photogram.targets.new_views import Suggestions
-from photogram.targets.projection import DatumName
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
-
-
-@dataclass(frozen=True)
-class WorthOptions:
-    """What is asked of a calibration.
-
-    Attributes
-    ----------
-    distances
-        At which maps are drawn, in the unit of the board; none: infinity, and the boards' median distance.
-    datum, noise_only
-        Of maps.
-    cross_validate
-        How views are split; None: they are not.
-    suggest
-        How many views to take next are looked for.
-    grid
-        Of maps, pixels across and down.
-    """
-
-    distances: Sequence[float] = ()
-    datum: DatumName = "corners"
-    noise_only: bool = False
-    cross_validate: Into | None = "odd"
-    suggest: int = 0
-    grid: tuple[int, int] = (60, 40)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Worth:
-    """What a calibration is worth.
-
-    Attributes
-    ----------
-    maps
-        Of each camera at each distance.
-    cross
-        Cross-validations, one for each housing.
-    suggestions
-        Views to take next, for the first camera.
-    differences
-        From another calibration, camera by camera.
-    remarks
-        What could not be computed, and why.
-    """
-
-    maps: tuple[UncertaintyMap, ...] = ()
-    cross: tuple[CrossValidation, ...] = ()
-    suggestions: tuple[Suggestions, ...] = ()
-    differences: tuple[CameraDifference, ...] = ()
-    remarks: tuple[str, ...] = field(default=())
-
-    @property
-    def largest(self) -> float:
-        """Largest standard deviation of all maps where the board was seen, pixels; NaN without maps."""
-        return max((each.largest for each in self.maps), default=math.nan)
-
-    @property
-    def sentences(self) -> list[str]:
-        """What a reader wants first, a line for each thing."""
-        said = []
-        for camera in dict.fromkeys(each.camera for each in self.maps):
-            own = [each for each in self.maps if each.camera == camera]
-            largest = ", ".join(
-                f"{each.largest:.2g} px {distance_text(each.distance, each.unit)}" for each in own
-            )
-            said.append(f"{camera}: worst where the board was seen {largest}; {own[0].model}")
-        said += [line for each in self.differences for line in each.sentences]
-        for each in self.suggestions:
-            said += [f"view to take next: {line}" for line in each.sentences]
-        return [*said, *self.remarks]
-
+from photogram.targets.worth import Worth
 
 Part = Literal["cameras", "sensors", "board", "views"]
 # Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
 # that are such steps
 Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats | int]]
 STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vision axes
-
-
-class UnknownWeight(Result):
-    """A result whose standard deviations of corners are ratios alone: nothing tests it as a whole."""
-
-    KNOWN: ClassVar[bool] = False
-
-    @property
-    def global_test(self) -> GlobalTest | None:
-        """None: nobody has said how well corners are measured."""
-        return None
-
-    def _findings(self) -> Findings:
-        from photogram.targets.findings import unknown_weight_findings
-
-        return unknown_weight_findings(self)
-
-
-def with_unknown_weight(result: Result) -> Result:
-    """Return a result as one whose unit weight nobody knows."""
-    return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
-
-
-def deviation_of_corners(result: Result) -> float:
-    """Return the standard deviation of a corner of level 0 that residuals have, in those that were given."""
-    used = result.used_images
-    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
-    return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -180,7 +73,7 @@ class Calibrated(Brief, Judged, Documented):
         return calibration_page(self)
 
     def _members(self) -> dict[str, Any]:
-        from photogram.targets.document import calibration_members
+        from photogram.targets.page import calibration_members
 
         return calibration_members(self)
 

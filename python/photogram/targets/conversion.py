@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import is_covariance, number, whole_number
+from photogram.arguments.arrays import argument_error, is_covariance, number, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -39,6 +39,7 @@ from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
 from photogram.targets.vision import TURNED
+from photogram.words import phrase
 
 MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance, so that no pixel dominates
 
@@ -125,8 +126,6 @@ class Conversion(Brief, Documented):
         return Document(
             what="Lens conversion",
             title=title,
-            judgements=[],
-            advice=[],
             highlights=[Fact(name, text) for name, text in rows],
             sections=[Section.of(Table("differences", "Differences", differences))],
             members={
@@ -204,9 +203,9 @@ def convert_lens(
     size = (whole_number("size", size[0]), whole_number("size", size[1]))
     apart = tuple(number("distance", each) for each in distances)
     if not apart or not all(each > 0 for each in apart):
-        raise InputError(f"distances are positive, not {', '.join(map(str, apart)) or 'none'}")
+        raise argument_error("distances", "positive", value=", ".join(map(str, apart)) or "none")
     if len({math.isfinite(each) for each in apart}) > 1:
-        raise InputError("distances: infinity does not go with finite ones: give a large one in its place")
+        raise InputError(phrase("targets.infinite"))
     start = lens_of(model, source, size, knots)
     columns, rows, pixels = image_grid(size, GRID)
     known = _known(source, covariance)
@@ -215,7 +214,7 @@ def convert_lens(
     near &= shows(start, points)
     free = free_names(start)
     if (2 * np.count_nonzero(near) < len(free) and start.knots is None) or not near.any():
-        raise InputError(f"model: {model} shows nothing of what the camera {source.title} shows")
+        raise InputError(phrase("targets.shows-nothing", model=model, camera=source.title))
     finite = math.isfinite(apart[0])
     roots = None if known is None else _roots(source, known, points[near])
     shown = Points(points[near], places[near], finite, roots)
@@ -256,9 +255,9 @@ def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tup
     if given is not None:
         own, matrix = list(given[0]), np.asarray(given[1], dtype=float)
         if unknown := [name for name in own if name not in names]:
-            raise InputError(f"covariance: {source.model} has no {', '.join(unknown)}")
+            raise InputError(phrase("targets.no-parameters", model=source.model, names=unknown))
         if matrix.shape != (len(own), len(own)) or not is_covariance(matrix, singular=True):
-            raise InputError(f"covariance is no covariance matrix of {len(own)} parameters")
+            raise InputError(phrase("error.covariance-singular"))
         return [names.index(name) for name in own], matrix
     weighted = [k for k, sd in enumerate(source.deviations.tolist()) if 0 < sd < math.inf]
     if not weighted:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_beginning, reading
@@ -21,6 +22,7 @@ from photogram.targets.board import Board
 from photogram.targets.board_files import is_board
 from photogram.targets.corner_views import Measured
 from photogram.targets.opencv_corners import BEGIN_BYTES, is_npz, is_storage, read_npz, read_storage
+from photogram.words import Phrase, phrase
 
 _SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(("photo", "picture", "file", "filename", "img", "image_name"), "image"),
@@ -92,20 +94,13 @@ def read_vnl(path: Path, board: Board | None) -> Measured:
     wrong = np.flatnonzero((counts != points) & ~none)
     if len(wrong):
         row = int(np.flatnonzero(images.rows == wrong[0])[0])
-        raise table.error(row, f"the image has {counts[wrong[0]]} rows, but the board {points} points")
+        rows = int(counts[wrong[0]])
+        raise table.error(row, phrase("targets.rows-of-image", rows=rows, points=int(np.max(points))))
     there = ~missing
     xy = table.vectors(("x", "y"), read=_dashed)
     table.check_given(np.where(there[:, np.newaxis], xy, 0.0), ("x", "y"))
     sd, use = _of_levels(table)
-    return Measured(
-        path=path,
-        images=images.names,
-        image=images.rows[there],
-        point=within[there],
-        xy=xy[there],
-        sd=sd[there],
-        use=use[there],
-    )
+    return Measured(path, images.names, images.rows[there], within[there], xy[there], sd[there], use[there])
 
 
 def _dashed(cell: str) -> float:
@@ -113,10 +108,7 @@ def _dashed(cell: str) -> float:
 
 
 def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
-    """Return standard deviations over that of level 0, and which corners count.
-
-    A level l is 2^l, a weight 1/weight; neither `-` nor a negative level, nor a weight of 0, counts.
-    """
+    """Return standard deviations over that of level 0, and which corners count."""
     if "level" in table:
         level = table.numbers("level", np.nan, read=_dashed)
         use = level >= 0
@@ -129,16 +121,18 @@ def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
         sd = table.numbers("sd", 1.0)
         bad = np.flatnonzero(~(sd > 0))
         if len(bad):
-            raise table.error(int(bad[0]), "column sd: is no positive standard deviation")
+            row = int(bad[0])
+            raise _refusal(table, row, "sd", phrase("error.positive", value=float(sd[row])))
         return sd, np.ones(table.count, dtype=bool)
     return np.ones(table.count), np.ones(table.count, dtype=bool)
 
 
-def read_table(path: Path, board: Board | None) -> Measured:
-    """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y.
+def _refusal(table: ColumnTable, row: int, column: str, message: Phrase) -> InputError:
+    return table.error(row, phrase("error.column", column=column, message=message))
 
-    It may have camera, view, time, sd or level, and use.
-    """
+
+def read_table(path: Path, board: Board | None) -> Measured:
+    """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y."""
     table = read_columns(path, known=("image", "time"), numbers=_NUMBERS, spelling=_spelled)
     return _of_table(table, board)
 
@@ -172,7 +166,7 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
         times = table.numbers("time")[first]
         missing = np.flatnonzero(np.isnan(times))
         if len(missing):
-            raise table.error(first[int(missing[0])], "column time: is empty")
+            raise _refusal(table, first[int(missing[0])], "time", phrase("error.empty"))
         times = times * (1e-9 if times.max(initial=0.0) > MIN_NANOSECONDS else 1.0)
     return Measured(
         path=table.path,
@@ -195,7 +189,7 @@ def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str
     found = [views[row] for row in first]
     for row, own in enumerate(image.tolist()):
         if views[row] != found[own]:
-            raise table.error(row, "column view: the image had another view before")
+            raise _refusal(table, row, "view", phrase("targets.other-view"))
     return found
 
 
@@ -206,11 +200,11 @@ def _points(table: ColumnTable, board: Board | None) -> Indices:
         for row, cell in enumerate(table.texts("point")):
             number = (int(cell) if cell.isdecimal() else None) if names is None else names.get(cell)
             if number is None:
-                raise table.error(row, f"column point: the board has no point {cell!r}")
+                raise _refusal(table, row, "point", phrase("targets.no-point", point=cell))
             found[row] = number
         return found
     if board is None:
-        raise table.head.error("says corners by columns and rows, which need the board")
+        raise table.head.error(phrase("targets.needs-board"))
     if "tag" in table:
         return _of_tags(table, board)
     table.require("i", "j")
@@ -223,14 +217,16 @@ def _whole(table: ColumnTable, name: str, count: int) -> Indices:
     values = table.numbers(name)
     bad = np.flatnonzero(~((values == np.floor(values)) & (values >= 0) & (values < count)))
     if len(bad):
-        raise table.error(int(bad[0]), f"column {name}: is no whole number from 0 to {count - 1}")
+        row = int(bad[0])
+        fields = {"low": 0, "high": count - 1, "value": float(values[row])}
+        raise _refusal(table, row, name, phrase("error.whole-range", **fields))
     return values.astype(np.int64)
 
 
 def _of_tags(table: ColumnTable, board: Board) -> Indices:
     """Return points of an AprilGrid: tags from the lower left, their corners anticlockwise from there."""
     if board.kind != "aprilgrid":
-        raise table.head.error(f"has tags, but the board is no aprilgrid: {board.described}")
+        raise table.head.error(phrase("targets.tags", board=board.described))
     table.require("corner")
     tag = _whole(table, "tag", board.columns * board.rows)
     corner = _whole(table, "corner", 4)

@@ -12,10 +12,12 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
+from photogram.words import phrase
 
 ViewBy = Literal["name", "time"]
 Size = tuple[int, int]
@@ -23,35 +25,39 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What the files of one format hold: n corners in I images."""
+    """The n corners in I images of files of one format."""
 
-    path: Path  # The file or folder
-    images: Sequence[str]  # I names; the same may be there once for each camera
+    path: Path  # the file or folder
+    images: Sequence[str]  # I names; a name may occur once for each camera
     image: Indices  # (n,) the image of each corner, and the number of the board's point
     point: Indices
-    xy: Floats  # As of :class:`Corners`, but in the pixels of the file
-    sd: Floats
-    use: Bools
-    cameras: Sequence[str] | None = None  # I names; None where the file does not say them
+    xy: Floats  # as of :class:`Corners`, but in the pixels of the file
+    sd: Floats = field(default_factory=lambda: np.array(1.0))
+    use: Bools = field(default_factory=lambda: np.array(True))
+    cameras: Sequence[str] | None = None  # I names; None if the file does not contain them
     views: Sequence[str] | None = None
     times: Floats | None = None  # (I,) seconds
     # Width and height by the name of a camera, of all by ""
     sizes: Mapping[str, Size] = field(default_factory=dict)
-    picture_sizes: Sequence[Size] = ()  # I widths and heights, where pictures themselves say them
-    board: Board | None = None  # The board, where the file says it
-    messages: Sequence[Message] = ()  # Remarks
+    picture_sizes: Sequence[Size] = ()  # I widths and heights, if they were read from pictures
+    board: Board | None = None
+    messages: Sequence[Message] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("sd", "use"):
+            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), len(self.point)))
 
 
 @dataclass(frozen=True)
 class Grouping:
-    """What a user says of cameras and views, where files or names of images do not."""
+    """Cameras and views of images as specified by the user."""
 
-    cameras: Sequence[str] = ()  # A pattern (`left*.jpg`) for each camera, which names its images
-    views: ViewBy = "name"  # Whether images of one view are known by their names or by their times
-    within: float = 0.005  # Seconds that images of one view are apart at the most
-    apart: bool = False  # Whether every image is a view of its own: they are not synchronised
-    size: Size | None = None  # Width and height of all pictures
-    # What is 0, 0: the `center` or the upper-left `corner` of the first pixel
+    cameras: Sequence[str] = ()  # a pattern (`left*.jpg`) of names of images for each camera
+    views: ViewBy = "name"  # by which images belong to one view
+    within: float = 0.005  # largest difference of times in one view, seconds
+    apart: bool = False  # whether every image is a view of its own: not synchronised
+    size: Size | None = None  # width and height of all pictures
+    # Which place has the coordinates 0, 0: center or upper-left corner of the first pixel
     origin: Literal["center", "corner"] = "center"
 
 
@@ -61,7 +67,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
     # An image without corners is no picture.
     keep &= np.bincount(measured.image, minlength=len(keep)) > 0
     if not keep.any():
-        raise InputError("holds no corners of a board", file=measured.path)
+        raise InputError(phrase("targets.no-corners"), file=measured.path)
     rows = np.flatnonzero(keep)
     kept = rows.tolist()
     patterns = [_name_of(each, k) for k, each in enumerate(how.cameras)]
@@ -83,7 +89,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
         pictures = [f"{names[row]}/{measured.images[row]}" for row in kept]
     sizes = {**measured.sizes, **_sizes_of_pictures(measured, names, kept, how)}
     shift = 0.5 if how.origin == "corner" else 0.0
-    try:
+    with at_place(Place(measured.path)):
         corners = Corners(
             pictures=pictures,
             cameras=[camera_names.index(names[row]) for row in kept],
@@ -97,8 +103,6 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
             sd=measured.sd[own],
             use=measured.use[own],
         )
-    except InputError as error:
-        raise InputError(error.message, file=measured.path) from None
     return corners, messages
 
 
@@ -111,11 +115,9 @@ def _sizes_of_pictures(
         width, height = measured.picture_sizes[row]
         wide, high = how.size or found.setdefault(names[row], (width, height))
         if (wide, high) != (width, height):
-            raise InputError(
-                f"the picture {measured.images[row]} has {width} x {height} pixels, others of its camera"
-                f" {wide} x {high}: what is calibrated is a camera whose pictures are alike",
-                file=measured.path,
-            )
+            fields = {"width": width, "height": height, "wide": wide, "high": high}
+            message = phrase("targets.sizes", picture=measured.images[row], **fields)
+            raise InputError(message, file=measured.path)
     return found
 
 
@@ -131,14 +133,14 @@ def _cameras_and_views(
         for row, image in enumerate(images):
             found = [(k, match) for k, each in enumerate(patterns) if (match := each.fullmatch(image))]
             if len(found) > 1:
-                raise InputError(f"the image {image} belongs to two cameras of --cameras", file=measured.path)
+                raise InputError(phrase("targets.two-cameras", image=image), file=measured.path)
             keep[row] = bool(found)
             for k, match in found:
                 names[row] = _name_of(how.cameras[k], k)
                 keys[row] = "".join(match.groups())
         left = [images[row] for row in np.flatnonzero(~keep).tolist()]
-        told = [Message(f"left out, no pattern of --cameras names them: {listed(left)}")] if left else []
-        return names, _views_or(measured, keys), keep, told
+        messages = [Message(phrase("targets.no-pattern", names=left))] if left else []
+        return names, _views_or(measured, keys), keep, messages
     if measured.cameras is None:
         return ["camera"] * len(images), _views_or(measured, images), keep, []
     names = list(measured.cameras)
@@ -173,7 +175,7 @@ def _name_of(pattern: str, number: int) -> str:
 
 def _by_time(measured: Measured, rows: Indices, names: Sequence[str], within: float) -> Indices:
     if measured.times is None:
-        raise InputError("has no times, by which --views time goes", file=measured.path)
+        raise InputError(phrase("targets.no-times"), file=measured.path)
     times = measured.times[rows]
     views = np.empty(len(rows), dtype=np.int64)
     view, begin, seen = -1, -np.inf, set[str]()

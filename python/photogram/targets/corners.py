@@ -8,12 +8,23 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, indices, length, names, shaped, whole_number
+from photogram.arguments.arrays import (
+    argument_error,
+    frozen,
+    indices,
+    length,
+    names,
+    repeated_pairs,
+    shaped,
+    value_field,
+    whole_number,
+)
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show.summary import Brief, Rows, few
+from photogram.words import Phrase, phrase
 
 MIN_CORNERS_PER_VIEW = 6
 _MAX_WIDTH_OF_LINE = 1e-3  # width over length of the corners of a view on one line
@@ -87,12 +98,14 @@ class Corners(Valued, Brief):
         for name in ("pictures", "camera_names"):
             given = names(name, getattr(self, name))
             if len(set(given)) < len(given):
-                raise InputError(f"{name}: a name is there twice")
+                repeated = next(each for each in given if given.count(each) > 1)
+                raise InputError(phrase("error.repeated", kind=name, name=repeated))
             self._set(name, tuple(given))
         pictures, corners = len(self.pictures), length("picture", self.picture)
         self._set("sizes", tuple(map(_size, self.sizes)))
         if len(self.sizes) != len(self.camera_names):
-            raise InputError(f"sizes: there are {len(self.camera_names)} cameras, not {len(self.sizes)}")
+            fields = {"count": len(self.camera_names), "actual": len(self.sizes)}
+            raise argument_error("sizes", "count", **fields)
         self._set("cameras", indices("cameras", self.cameras, pictures, len(self.camera_names)))
         self._set("views", indices("views", self.views, pictures, pictures))
         self._set("picture", indices("picture", self.picture, corners, pictures))
@@ -102,19 +115,16 @@ class Corners(Valued, Brief):
         self._set("use", frozen(np.broadcast_to(np.asarray(self.use, dtype=bool), (corners,)).copy()))
         if self.times is not None:
             self._set("times", shaped("times", self.times, (pictures,)))
-        for what, bad in (
-            ("is not a finite position", ~np.isfinite(self.xy).all(axis=1)),
-            ("has no positive standard deviation", ~((self.sd > 0) & np.isfinite(self.sd))),
+        for code, rows in (
+            ("position", np.flatnonzero(~np.isfinite(self.xy).all(axis=1))),
+            ("deviation", np.flatnonzero(~((self.sd > 0) & np.isfinite(self.sd)))),
+            ("repeated-corner", repeated_pairs(self.picture, self.point, 2**31)),
         ):
-            if bad.any():
-                raise InputError(f"{self.title(int(np.argmax(bad)))} {what}")
-        for row in _again(self.picture, self.point):
-            raise InputError(f"{self.title(row)} is there twice")
-        for row in _again(self.views, self.cameras):
-            camera = self.camera_names[self.cameras[row]]
-            raise InputError(
-                f"the picture {self.pictures[row]} is the second of the camera {camera} in its view"
-            )
+            for row in rows.tolist()[:1]:
+                raise InputError(phrase(f"targets.{code}", corner=self.title(row)))
+        for row in repeated_pairs(self.views, self.cameras, len(self.camera_names)).tolist():
+            fields = {"picture": self.pictures[row], "camera": self.camera_names[self.cameras[row]]}
+            raise InputError(phrase("targets.second-picture", **fields))
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -166,19 +176,19 @@ class Corners(Valued, Brief):
             use=self.use[own],
         )
 
-    def poor(self, places: Floats) -> dict[str, str]:
-        """Return the pictures that say nothing of a camera, and why.
+    def poor(self, places: Floats) -> dict[str, Phrase]:
+        """Return the pictures that do not determine a camera, and why.
 
-        Too few corners, or all on one line: of the picture, or of the board, whose points (b, 3) are given.
+        Too few corners, or all on one line: of the picture, or of the board with the points (b, 3).
         """
-        found = {}
+        reasons = {}
         for row, name in enumerate(self.pictures):
-            own = self.use & (self.picture == row)
-            if np.count_nonzero(own) < MIN_CORNERS_PER_VIEW:
-                found[name] = f"{np.count_nonzero(own)} corners, fewer than {MIN_CORNERS_PER_VIEW}"
-            elif _on_a_line(self.xy[own]) or _on_a_line(places[self.point[own]]):
-                found[name] = "all corners lie on one line"
-        return found
+            rows = np.flatnonzero(self.use & (self.picture == row))
+            if len(rows) < MIN_CORNERS_PER_VIEW:
+                reasons[name] = phrase("targets.few", count=len(rows), least=MIN_CORNERS_PER_VIEW)
+            elif _on_a_line(self.xy[rows]) or _on_a_line(places[self.point[rows]]):
+                reasons[name] = phrase("targets.line")
+        return reasons
 
 
 def _on_a_line(places: Floats) -> bool:
@@ -190,15 +200,8 @@ def _size(given: object) -> tuple[int, int] | None:
     if given is None:
         return None
     if not (isinstance(given, Sequence) and len(given) == 2):
-        raise InputError("the size of pictures is a width and a height")
+        raise InputError(phrase("targets.size", value=value_field(given)))
     width, height = (whole_number("size of pictures", each) for each in given)
     if min(width, height) < 1:
-        raise InputError(f"pictures have a width and a height of 1 or more, not {width} x {height}")
+        raise InputError(phrase("targets.size", value=f"{width} x {height}"))
     return width, height
-
-
-def _again(first: Indices, second: Indices) -> list[int]:
-    """Return rows whose pair of indices stands in an earlier row."""
-    pairs = np.stack([first, second], axis=1)
-    kept = np.unique(pairs, axis=0, return_index=True)[1] if len(pairs) else pairs[:, 0]
-    return [int(row) for row in np.setdiff1d(np.arange(len(pairs)), kept)]

@@ -106,10 +106,7 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
 ) -> list[DifferenceTest]:
-    """Test the differences of two parts, of each of K cameras, and of all cameras and sensors together.
-
-    `unit` is the variance of unit weight with its degrees of freedom; infinite where it was known before.
-    """
+    """Test the differences of two parts, of each of K cameras, and of all cameras and sensors together."""
     change, cofactors = changes_between(a, b)
     variance, freedom = unit
     groups = {name: a.parameters(number) for number, name in enumerate(names)}

@@ -22,9 +22,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
+from photogram.words import phrase
 
 Picture = NDArray[np.uint8]
 MAX_REFINEMENT_STEPS, MIN_REFINEMENT_PX = 50, 1e-4
@@ -225,16 +226,12 @@ MIN_CIRCULARITY, MIN_INERTIA_RATIO = 0.5, 0.05  # of circles tilted by 75 degree
 def detected(
     path: Path, files: Sequence[Path], board: Board, progress: Callable[[str], None] | None = None
 ) -> Measured:
-    """Find a board in photographs; where these lie in several folders, each folder is a camera.
-
-    Errors name `path`, what was asked for; `progress` is told which picture is searched.
-    """
+    """Find a board in photographs; where these lie in several folders, each folder is a camera."""
     try:
         import cv2
     except ModuleNotFoundError:
-        raise InputError(
-            "corners of a board in photographs need OpenCV: pip install 'photogram[targets]'", file=path
-        ) from None
+        package = {"what": "detection of boards", "package": "OpenCV", "extra": "targets"}
+        raise InputError(phrase("error.package", **package), file=path) from None
     find = _finder(cv2, board, path)
     found: list[tuple[Path, tuple[int, int], Found]] = []
     without = []
@@ -248,13 +245,20 @@ def detected(
         else:
             found.append((file, (picture.shape[1], picture.shape[0]), corners))
     if not found:
-        raise InputError(
-            f"no board ({board.described}) is found in {counted(len(files), 'picture')}: columns and rows of"
-            " a chessboard are counted in corners between squares",
-            file=path,
-        )
-    told = [Message(f"no board is found in {listed(without)}")] if without else []
-    return _measured(path, found, told)
+        message = phrase("targets.no-board-found", board=board.described, n=len(files))
+        raise InputError(message, file=path)
+    counts = [len(points) for _, _, (points, _) in found]
+    several = len({file.parent for file, _, _ in found}) > 1
+    return Measured(
+        path=path,
+        images=[_name(path, file) for file, _, _ in found],
+        image=np.repeat(np.arange(len(found)), counts),
+        point=np.concatenate([points for _, _, (points, _) in found]),
+        xy=np.concatenate([xy for _, _, (_, xy) in found]),
+        cameras=[file.parent.name for file, _, _ in found] if several else None,
+        picture_sizes=[size for _, size, _ in found],
+        messages=[Message(phrase("targets.without-board", names=without))] if without else [],
+    )
 
 
 def _picture(cv2: Any, file: Path) -> Picture:
@@ -263,7 +267,7 @@ def _picture(cv2: Any, file: Path) -> Picture:
     how = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
     found = cv2.imdecode(content, how) if len(content) else None
     if found is None:
-        raise InputError("is no picture that OpenCV can read", file=file)
+        raise InputError(phrase("targets.no-picture"), file=file)
     return np.asarray(found)
 
 
@@ -271,32 +275,9 @@ def _name(path: Path, file: Path) -> str:
     return file.relative_to(path).as_posix() if path.is_dir() else file.name
 
 
-def _measured(
-    path: Path, found: Sequence[tuple[Path, tuple[int, int], Found]], told: list[Message]
-) -> Measured:
-    folders = [file.parent.name for file, _, _ in found]
-    several = len({file.parent for file, _, _ in found}) > 1
-    counts = [len(points) for _, _, (points, _) in found]
-    total = sum(counts)
-    return Measured(
-        path=path,
-        images=[_name(path, file) for file, _, _ in found],
-        image=np.repeat(np.arange(len(found)), counts),
-        point=np.concatenate([points for _, _, (points, _) in found]),
-        xy=np.concatenate([xy for _, _, (_, xy) in found]),
-        sd=np.ones(total),
-        use=np.ones(total, dtype=bool),
-        cameras=folders if several else None,
-        picture_sizes=[size for _, size, _ in found],
-        messages=told,
-    )
-
-
 def _finder(cv2: Any, board: Board, path: Path) -> Callable[[Picture], Found | None]:
     if board.kind == "points":
-        raise InputError(
-            "targets that lie anywhere are not looked for in photographs: give their corners", file=path
-        )
+        raise InputError(phrase("targets.points-in-photos"), file=path)
     if board.kind in ("charuco", "aprilgrid"):
         tags = charuco_tags(cv2, board) if board.kind == "charuco" else grid_tags(cv2, board)
         return tags.corners

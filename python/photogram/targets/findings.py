@@ -14,17 +14,16 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import KNOTTED
-from photogram.results.findings import block_findings
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.calibration_result import UnknownWeight, Worth, deviation_of_corners
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
-from photogram.targets.maps import distance_text
-from photogram.targets.picture_parts import PARTS, parts_of
+from photogram.targets.maps import PARTS, distance_text, parts_of
+from photogram.targets.unknown_weight import UnknownWeight, deviation_of_corners
 from photogram.targets.vision import rays
-from photogram.words import Phrase
+from photogram.targets.worth import Worth
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
@@ -59,17 +58,17 @@ class Showing:
 
     @property
     def next(self) -> list[Phrase]:
-        """Advice on views that are missing."""
-        found = []
+        """Advice on missing views."""
+        advice = []
         if self.empty:
-            found.append(Phrase("advice.board-parts", {"camera": self.camera, "parts": list(self.empty)}))
+            advice.append(phrase("advice.board-parts", camera=self.camera, parts=list(self.empty)))
         if np.count_nonzero(self.tilts >= MIN_TILT_DEG) < MIN_TILTED_VIEWS:
-            found.append(Phrase("advice.tilt", {"camera": self.camera}))
+            advice.append(phrase("advice.tilt", camera=self.camera))
         if self.distances.max() < MIN_DISTANCE_RATIO * self.distances.min():
             distance = _rounded(np.median(self.distances))
             fields = {"camera": self.camera, "distance": distance, "unit": self.unit}
-            found.append(Phrase("advice.distances", fields))
-        return found
+            advice.append(phrase("advice.distances", **fields))
+        return advice
 
 
 def _rounded(value: float) -> str:
@@ -113,11 +112,6 @@ def _parts(calibrated: Calibrated, number: int) -> tuple[int, tuple[str, ...] | 
 FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 
 
-def unknown_weight_findings(result: UnknownWeight) -> Findings:
-    """Return the tests of a block whose standard deviations of corners are ratios alone."""
-    return replace(block_findings(result), untested=Phrase("untested.corners"))
-
-
 def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | None = None) -> Calibrated:
     """Return a calibration whose parts all have the verdict on it, also by its maps of uncertainty.
 
@@ -139,7 +133,7 @@ def _shortfall(worth: Worth | None, need: float | None) -> Phrase | None:
     worst = max(worth.maps, key=lambda found: found.largest)
     distance = distance_text(worst.distance, worst.unit)
     fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
-    return Phrase("verdict.not-accurate-enough", fields)
+    return phrase("verdict.not-accurate-enough", **fields)
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
@@ -152,14 +146,14 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     unknown = []
     if isinstance(calibrated.result, UnknownWeight):
         sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
-        unknown.append(Phrase("advice.corner-sd", {"sd": float(sd)}))
+        unknown.append(phrase("advice.corner-sd", sd=float(sd)))
     missing = [line for each in shown for line in each.next]
     agreeing = [f"{', '.join(each.cameras)}: {each.verdict}" for each in cross if each.explained]
     return replace(
         found,
         systematic=[*found.systematic, *wrong],
         remarks=[*(each.line for each in shown), *agreeing, *found.remarks],
-        weigh=Phrase("how.board"),
+        weigh=phrase("how.board"),
         calibrate=None,
         if_usable=[*unknown, *other, *missing],
         if_withheld=[*unknown, *other, *missing],
@@ -181,10 +175,10 @@ def _other_model(calibrated: Calibrated) -> list[Phrase]:
         for name, count in FREE_PARAMETERS_OF_LENS.items()
         if count > free and (name == KNOTTED or not wide)
     ]
-    ways = [Phrase("part.free-lens", {"models": lenses})] if lenses else []
+    ways = [phrase("part.free-lens", models=lenses)] if lenses else []
     if calibrated.calibration.shape != "points":
-        ways.append(Phrase("part.free-board", {"how": Phrase("how.board")}))
-    return [Phrase("advice.try", {"ways": ways})] if ways else []
+        ways.append(phrase("part.free-board", how=phrase("how.board")))
+    return [phrase("advice.try", ways=ways)] if ways else []
 
 
 def _systematic(cross: CrossValidation) -> Systematic:

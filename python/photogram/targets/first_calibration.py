@@ -10,11 +10,11 @@ import math
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import number
+from photogram.arguments.arrays import argument_error, number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.corners import MIN_CORNERS_PER_VIEW, Corners
@@ -24,6 +24,7 @@ from photogram.targets.orders import Pictures, rays_shown
 from photogram.targets.regularisation import WEAK_KNOT_SD
 from photogram.targets.sightings import CORNER_ORDERS, Sightings, frontal_tilts, nearest_rotations
 from photogram.targets.vision import composed, inverted
+from photogram.words import Phrase, phrase
 
 WIDE_FAMILY = "fisheye"  # equidistant
 PRIOR_SHIFT_OF_WIDTH = 0.1  # sd of images by each free parameter of a nominal camera, in picture widths
@@ -62,19 +63,17 @@ def nominal_camera(
         shows nothing of such a picture.
     """
     if (field is None) == (focal is None):
-        raise InputError(
-            "a nominal camera has a field of view (field) or a focal length (focal): one of both"
-        )
+        raise InputError(phrase("targets.nominal"))
     if field is None:
         focal = number("focal", focal)
         if not 0 < focal < math.inf:
-            raise InputError(f"focal is a positive number of pixels, not {focal:g}")
+            raise argument_error("focal", "positive", value=focal)
         flat = 2 * math.atan(size[0] / (2 * focal))
         angle = flat if flat < NARROW else size[0] / focal
     else:
         angle = math.radians(number("field", field))
     if not 0 < angle <= 2 * math.pi:
-        raise InputError(f"field is a number of degrees up to 360, not {math.degrees(angle):g}")
+        raise argument_error("field", "range", low=0, high=360, value=math.degrees(angle))
     if focal is None:
         focal = size[0] * (1 / (2 * math.tan(angle / 2)) if angle < NARROW else FAMILIES[WIDE_FAMILY](angle))
     half = math.hypot(*size) / (2 * focal)
@@ -157,10 +156,7 @@ def mean_pose(poses: Floats) -> Floats:
 
 
 def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[Floats, Indices, Bools]:
-    """Return the pose of a second camera by a first, turns of its (m) boards, and which boards disagree.
-
-    Each board gives a pose for each turn. All boards share one: that which is nearest to one of each.
-    """
+    """Return the pose of a second camera by a first, turns of its (m) boards, and which boards disagree."""
     orders = np.array([*turns])
     turned = second[:, np.newaxis] @ np.linalg.inv(np.array([*turns.values()]))
     poses = turned @ np.linalg.inv(first)[:, np.newaxis]
@@ -185,8 +181,6 @@ def _apart(poses: Floats, other: Floats, far: float) -> Floats:
     return np.asarray(turns + shifts)
 
 
-IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
-HIDDEN = f"the lens shows fewer than {MIN_CORNERS_PER_VIEW} of its corners"
 MIN_TILT_RAD = math.radians(3.0)  # less tilted boards do not determine a focal length
 
 
@@ -221,7 +215,7 @@ class FirstCalibration:
     poses: Floats
     picture_poses: Floats
     corners: Corners
-    without: dict[str, str]
+    without: dict[str, Phrase]
     remarks: list[Message]
 
 
@@ -251,16 +245,15 @@ def first_values(
         cannot be.
     """
     seen = Sightings.of_corners(board, corners)
-    without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
+    in_a_plane, hidden_corners = phrase("targets.plane"), phrase("targets.hidden", least=MIN_CORNERS_PER_VIEW)
+    without = {corners.pictures[row]: in_a_plane for row in np.flatnonzero(seen.in_a_plane()).tolist()}
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
     hidden = usable & (rays_shown(seen, corners.cameras, cameras) < MIN_CORNERS_PER_VIEW)
     if (hidden == usable).all():
-        raise InputError(
-            f"model: the lens that was found, {cameras[0].model}, shows the corners of no picture"
-        )
-    without |= {corners.pictures[row]: HIDDEN for row in np.flatnonzero(hidden).tolist()}
+        raise InputError(phrase("targets.no-pose", model=cameras[0].model))
+    without |= {corners.pictures[row]: hidden_corners for row in np.flatnonzero(hidden).tolist()}
     pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable & ~hidden)
     orders, fits, of_orders = pictures.ordered()
     made = pictures.adjusted(orders, fits)
@@ -270,13 +263,8 @@ def first_values(
     remarks += [*of_orders, *_of_rig(rig, corners)]
     frontal = np.flatnonzero(frontal_tilts(made) < MIN_TILT_RAD).tolist() if seen.is_flat else []
     if frontal:
-        names = listed([corners.pictures[row] for row in frontal])
-        remarks.append(
-            Message(
-                f"{counted(len(frontal), 'picture')} of a board that is parallel to the image within 3"
-                f" degrees, and says nothing of the focal length: {names}"
-            )
-        )
+        names = [corners.pictures[row] for row in frontal]
+        remarks.append(Message(phrase("targets.frontal", n=len(frontal), names=names)))
     made, numbers = made @ seen.axes, seen.listings.points
     point = numbers[rig.turned[corners.picture], numbers[orders[corners.picture], corners.point]]
     return FirstCalibration(
@@ -295,7 +283,7 @@ def _cameras(
     seen: Sightings,
     corners: Corners,
     usable: Bools,
-    without: dict[str, str],
+    without: dict[str, Phrase],
     model: str | None,
     knots: tuple[int, int],
 ) -> tuple[list[Camera], list[Message]]:
@@ -304,43 +292,27 @@ def _cameras(
         own = seen.of((corners.cameras == k) & usable)
         if not len(own.xy):
             pictures = [corners.pictures[row] for row in np.flatnonzero(corners.cameras == k).tolist()]
-            why = listed([f"{each} ({without[each]})" for each in pictures]) or "it has none"
-            raise InputError(f"camera {name}: no picture has enough corners: {why}")
+            reasons = [f"{each} ({without[each]})" for each in pictures] or ["none"]
+            raise InputError(phrase("targets.few-corners", camera=name, pictures=reasons))
         size = picture_size(own, corners.sizes[k])
         if corners.sizes[k] is None:
-            said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
-            remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
-        camera, told = first_camera(own, size, name, model, knots)
+            fields = {"camera": name, "width": size[0], "height": size[1]}
+            remarks.append(Message(phrase("targets.assumed-size", **fields)))
+        camera, messages = first_camera(own, size, name, model, knots)
         cameras.append(camera)
-        remarks += told
+        remarks += messages
     return cameras, remarks
 
 
 def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
-    told = [
-        Message(
-            f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those of"
-            f" other cameras in this view: taken for listed {CORNER_ORDERS[rig.turned[row]]}"
-        )
-        for row in np.flatnonzero(rig.turned).tolist()
-    ]
-    apart = [corners.pictures[row] for row in np.flatnonzero(rig.apart).tolist()]
-    if apart:
-        told.append(
-            Message(
-                f"pictures {listed(apart)}: their poses do not agree with the place of the camera on the rig:"
-                " are they of the same moment as those of the other cameras?"
-            )
-        )
-    alone = [k for k in range(1, len(corners.camera_names)) if rig.references[k] == k]
-    told += [
-        Message(
-            f"camera {corners.camera_names[k]} has no view in common with those before: its place on the rig"
-            " is not known, and it is adjusted apart"
-        )
-        for k in alone
-    ]
-    return told
+    messages = []
+    for row in np.flatnonzero(rig.turned).tolist():
+        fields = {"picture": corners.pictures[row], "order": CORNER_ORDERS[rig.turned[row]]}
+        messages.append(Message(phrase("targets.relisted", **fields)))
+    if apart := [corners.pictures[row] for row in np.flatnonzero(rig.apart).tolist()]:
+        messages.append(Message(phrase("targets.moved", names=apart)))
+    alone = [name for k, name in enumerate(corners.camera_names) if k and rig.references[k] == k]
+    return messages + [Message(phrase("targets.alone", camera=name)) for name in alone]
 
 
 def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:

@@ -30,6 +30,7 @@ from photogram.targets.sightings import (
     ray_homographies,
 )
 from photogram.targets.vision import photo_poses, vision_poses
+from photogram.words import phrase
 
 ROUGH_TOLERANCE = 1e-3  # convergence limit of initial values, in standard deviations
 
@@ -130,10 +131,7 @@ def rays_of(camera: Camera, xy: Floats) -> Floats:
 
 
 def misfits(seen: Sightings, rays: Floats) -> Floats:
-    """Return (P,) the median angle (rad) between the rays of each picture and those of the board.
-
-    It is infinite for a picture that has no rays, or one.
-    """
+    """Return (P,) the median angle (rad) between the rays of each picture and those of the board."""
     found = ray_homographies(seen.coordinates, rays)
     angles = angles_apart(seen.coordinates, rays, found)
     angles[np.isnan(angles).all(axis=1)] = np.inf
@@ -239,7 +237,7 @@ def first_camera(
     family = (trial.camera if adjusted is None else adjusted.camera).replace(name=name)
     remarks = []
     if adjusted is None:
-        remarks.append(Message(f"camera {name}: no trial lens could be adjusted; the first values are rough"))
+        remarks.append(Message(phrase("targets.rough", camera=name)))
     reach = RADIUS_MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
     own = used.listed(trial.orders)
     splined = model == KNOTTED
@@ -249,10 +247,8 @@ def first_camera(
         field = float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1)))
         models = usual_models(field, farthest)
     elif farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
-        raise InputError(
-            f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
-            f" {model} cannot show; opencv_fisheye can"
-        )
+        angle = math.degrees(farthest)
+        raise InputError(phrase("targets.wide", camera=family.name, angle=angle, model=model))
     else:
         models = [model]
     for wanted in models:
@@ -263,13 +259,12 @@ def first_camera(
             and adjusted is not None
             and done.variance > MAX_VARIANCE_RATIO * adjusted.variance
         ):
-            times = math.sqrt(done.variance / adjusted.variance)
-            why = f"{wanted} fits its corners {times:.0f} times worse than a plain {family.model} lens does"
-            remarks.append(Message(f"camera {name}: {why}: another lens is needed"))
+            factor = math.sqrt(done.variance / adjusted.variance)
+            fields = {"camera": name, "model": wanted, "factor": factor, "family": family.model}
+            remarks.append(Message(phrase("targets.poor-lens", **fields)))
         if done is not None and done.is_whole:
             break
-        why = f"its corners alone hardly determine the terms of {wanted}"
-        remarks.append(Message(f"camera {name}: {why}: priors, or another lens, would help"))
+        remarks.append(Message(phrase("targets.weak-lens", camera=name, model=wanted)))
     found = camera if done is None else done.camera
     return (fitted(found, KNOTTED, size, knots=knots) if splined else found), remarks
 

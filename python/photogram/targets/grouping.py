@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -21,8 +21,11 @@ from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
 from photogram.show.quantity import Axis, Quantity, chosen
-from photogram.targets.calibration import weighted_block
-from photogram.targets.calibration_result import Calibrated
+from photogram.targets.regularisation import weighted_block
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 Groups = Literal["camera", "level", "point", "cell", "radius"]
 
@@ -162,7 +165,7 @@ def corner_components(
     groups: GroupsArgument = list(by)
     if "level" in by:
         if others := [each for each in by if each not in ("level", "camera")]:
-            raise InputError(f"groups by level go with those by camera, not by {', '.join(others)}")
+            raise InputError(phrase("targets.levels", others=others))
         levels = np.log2(block.image_sd[:, 0] / block.image_sd.min()).round().astype(int).tolist()
         names = [f"level {level}" for level in levels]
         if "camera" in by:

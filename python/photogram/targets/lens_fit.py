@@ -13,16 +13,16 @@ from typing import Self
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import shown
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 from photogram.targets.housing import transformed
 from photogram.targets.maps import image_grid
 from photogram.targets.vision import TURNED, motion_partials, moved_by, rays, values_of
+from photogram.words import phrase
 
 MAX_STEPS, TOLERANCE, SPLINE_TOLERANCE = 100, 1e-10, 1e-6  # relative decrease of the sum of squares
 MIN_DAMPING, FIRST_DAMPING, MAX_DAMPING = 1e-14, 1e-6, 1e8
@@ -172,20 +172,19 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
     models = dict(_photocore.camera_models())
     if own not in models:
-        raise InputError(f"model: there is no lens {shown(model)}{nearest(model, [*LENS_TERMS, *models])}")
+        raise InputError(unknown_name("lens model", model, [*LENS_TERMS, *models]))
     names = [name for name, _ in models[own][1]]
     splined = own == KNOTTED
     constants = {*()} if splined else {*names[len(names) - models[own][2] :]} - {"w", "h"}
-    if not ({"f", "fx"} & {*names} and "cx" in names) or constants:
-        raise InputError(
-            f"model: {model} has no focal length and principal point in pixels to begin with"
-            + "".join(f", and a constant {each} that nothing says" for each in sorted(constants))
-        )
+    if not ({"f", "fx"} & {*names} and "cx" in names):
+        raise InputError(phrase("targets.no-lens", model=model))
+    if constants:
+        raise InputError(phrase("targets.constants", model=model, names=sorted(constants)))
     start = _start(source, size, "w" in names)
     free = {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
     if splined:
         if min(knots) < ORDER + 1:
-            raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
+            raise InputError(phrase("targets.knots", order=ORDER, least=ORDER + 1))
         field = min(FIELD_MARGIN * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
         start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": field}
         free = set()
@@ -202,9 +201,7 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
 def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str, float]:
     given = source.parameters
     if "cx" not in given or not ({"f", "fx"} & {*given}):
-        raise InputError(
-            f"the camera {source.title}, {source.model}, has no focal length and principal point in pixels"
-        )
+        raise InputError(phrase("targets.no-focal", camera=source.title, model=source.model))
     fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
     start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
     # cx and cy count from the first pixel, or in models with w and h from the middle of the picture
@@ -239,13 +236,14 @@ def fitted(
     """
     start = lens_of(model, source, size, knots)
     if unknown := sorted({*held} - {*start.names}):
-        raise InputError(f"held: {start.model} has no {', '.join(unknown)}, but {', '.join(start.names)}")
+        fields = {"model": start.model, "names": unknown, "known": list(start.names)}
+        raise InputError(phrase("targets.no-held", **fields))
     xy = grid_of_pixels(size, radius)
     shown = Points(rays(source, xy), xy)
     there = shows(start, shown.points)
     free = [name for name in free_names(start) if name not in held]
     if 2 * np.count_nonzero(there) < len(free) and start.knots is None:
-        raise InputError(f"model: {model} shows nothing of what the camera {source.title} shows")
+        raise InputError(phrase("targets.shows-nothing", model=model, camera=source.title))
     return fitted_in_stages(Moved(start), Points(shown.points[there], xy[there]), free).camera.replace(
         sd=dict.fromkeys([name for name in free if name in start.names], math.inf)
     )

@@ -21,6 +21,7 @@ from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
 from photogram.network.unknowns import Sensor
 from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, composed, photo_poses
+from photogram.words import phrase
 
 MAX_GAP_SECONDS = 0.2  # between views that determine the motion of the board
 EACH_SIDE = 2
@@ -30,7 +31,7 @@ POWERS = 2 * EACH_SIDE  # of time
 def dated(corners: Corners, tied: Bools) -> Floats:
     """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without."""
     if corners.times is None:
-        raise InputError("offsets between cameras need the times of their pictures: a column time")
+        raise InputError(phrase("targets.no-shown-times"))
     found = np.full(corners.view_count, np.nan)
     own = ~tied[corners.cameras]
     found[corners.views[own]] = corners.times[own]
@@ -70,7 +71,8 @@ def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indic
         rows = rows[np.argsort(times[rows], kind="stable")]
         gaps = np.diff(times[rows])
         if (gaps <= 0).any():
-            raise InputError(f"two views are of one time: {times[rows[int(np.argmin(gaps))]]!r} s")
+            time = float(times[rows[int(np.argmin(gaps))]])
+            raise InputError(phrase("targets.equal-times", time=time))
         for k, row in enumerate(rows.tolist()):
             # gaps[k] is that behind the k-th view.
             sides = [
@@ -104,11 +106,7 @@ def pictures_in_motion(
     sensors: Sequence[Sensor],
     clocks: Sequence[Clock | None],
 ) -> list[Timed]:
-    """Return the pictures: each view is a trajectory whose pose is unknown, and whose motion is known.
-
-    Poses, motion and times are (V, 4, 4), (V, 4, 6), (V,) of views; sensors and clocks of each camera, no
-    clock of one that is not tied.
-    """
+    """Return the pictures: each view is a trajectory whose pose is unknown, and whose motion is known."""
     assert corners.times is not None
     places, attitudes = photo_poses(poses)
     flights = []

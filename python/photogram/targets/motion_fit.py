@@ -17,6 +17,7 @@ from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.sightings import nearest_rotations
 from photogram.targets.vision import imaged, motion_partials, moved_by, rays
+from photogram.words import phrase
 
 Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
 
@@ -71,7 +72,7 @@ def fitted_motion(
     numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
     usable = np.isfinite(numbers).all(axis=1)
     if (count := int(np.count_nonzero(usable))) < MIN_PIXELS:
-        raise InputError(f"the two cameras both see {count} of the pixels: too few to compare them")
+        raise InputError(phrase("targets.few-pixels", count=count))
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
     unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]

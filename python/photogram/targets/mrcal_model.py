@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import argument_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
+from photogram.io.places import Place, at_place
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board
@@ -27,6 +29,7 @@ from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
+from photogram.words import Phrase, phrase
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")
@@ -55,10 +58,7 @@ def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera
             knots=np.reshape(values[4:], (int(ny), int(nx), 2)),
         )
     if said not in LENSES:
-        raise InputError(
-            f"{model} is none of the lenses that are taken, {', '.join(LENSES)}, splined ones:"
-            f" `mrcal-convert-lensmodel --sampled --intrinsics-only {PREFIX}OPENCV8 FILE` fits one that is"
-        )
+        raise InputError(phrase("targets.mrcal-lens", model=model, names=[*LENSES, "splined models"]))
     own, count = LENSES[said]
     _count(model, values, count)
     names = Camera(own, dict.fromkeys(CORE, 1.0)).names[:count]
@@ -67,7 +67,7 @@ def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera
 
 def _count(model: str, values: Sequence[float], needed: int) -> None:
     if len(values) != needed:
-        raise InputError(f"{model} has {needed} values, not {len(values)}")
+        raise argument_error(model, "count", count=needed, actual=len(values))
 
 
 def freed(camera: Camera, model: str, core: bool, lens: bool) -> Camera:
@@ -86,28 +86,28 @@ def read_model(path: Path) -> Calibration:
     """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start."""
     packed = _content(path).get(KEY)
     if not isinstance(packed, bytes):
-        raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
+        raise InputError(phrase("targets.mrcal-no-corners", key=KEY), file=path)
     try:
         archive = base64.b85decode(packed)
     except ValueError as error:
-        raise InputError(f"its {KEY} are damaged: {error}", file=path) from None
+        raise InputError(phrase("targets.mrcal-damaged", key=KEY, reason=str(error)), file=path) from None
     arrays = read_arrays(path, archive)
     for name in ("observations_point", "observations_point_triangulated"):
         if name in arrays:
-            raise arrays.error(name, "is not taken: corners of a board are")
+            raise arrays.refusal("targets.mrcal-points", name)
     seen = arrays.arrays["observations_board"] if "observations_board" in arrays else None
     if seen is None or seen.ndim != 4:
-        raise InputError(f"its {KEY} hold no corners of a board", file=path)
+        raise InputError(phrase("targets.mrcal-no-corners", key="observations_board"), file=path)
     observed = arrays.numbers("observations_board", None, None, None, 3)
     if INDICES not in arrays:
-        raise InputError(f"its {KEY} have no {INDICES}", file=path)
+        raise InputError(phrase("error.missing", name=INDICES), file=path)
     # View, camera and sensor of each picture; sensor -1 is at the reference
     indices = arrays.numbers(INDICES, len(observed), 3).astype(np.int64)
     if (indices[:, :2] < 0).any() or (indices[:, 2] < -1).any():
-        raise arrays.error(INDICES, "counts from 0, sensors from -1")
-    for held in ("do_optimize_frames", "do_optimize_extrinsics"):
-        if held in arrays and not arrays.says(held):
-            raise arrays.error(held, "is false: poses that were held are not taken")
+        raise arrays.refusal("targets.mrcal-counts", INDICES)
+    for name in ("do_optimize_frames", "do_optimize_extrinsics"):
+        if name in arrays and not arrays.says(name):
+            raise arrays.refusal("targets.mrcal-fixed", name)
     cameras = _cameras(arrays)
     sensors, poses = _poses(arrays, indices, len(cameras))
     warp = arrays.numbers("calobject_warp", 2) if "calobject_warp" in arrays else np.zeros(2)
@@ -136,7 +136,9 @@ def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
         width, height = map(int, content["imagersize"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        message = error.message if isinstance(error, InputError) else f"is no camera model: {error!r}"
+        message = phrase("targets.mrcal-no-model", reason=repr(error))
+        if isinstance(error, InputError) and error.phrase:
+            message = error.phrase
         raise InputError(message, file=path) from None
     return camera, (width, height)
 
@@ -147,16 +149,15 @@ def _content(path: Path) -> dict[str, Any]:
         # Literals only: names, calls and operations are refused.
         content: Any = ast.literal_eval(text.lstrip())
     except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
-        reason, record = "it has names, calls, operations or deep brackets", None
+        reason: str | Phrase = phrase("targets.mrcal-code")
+        record = None
         if isinstance(error, SyntaxError):
             reason, record = error.msg, error.lineno
-        raise InputError(
-            f"must be a dictionary of Python literals, but {reason}: write it again with mrcal",
-            file=path,
-            record=record,
-        ) from None
+        message = phrase("targets.mrcal-dictionary", reason=reason)
+        raise InputError(message, file=path, record=record) from None
     if not isinstance(content, dict) or "lensmodel" not in content:
-        raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
+        missing = phrase("error.missing", name="lensmodel")
+        raise InputError(phrase("targets.mrcal-no-model", reason=missing), file=path)
     return content
 
 
@@ -164,11 +165,9 @@ def _cameras(arrays: Arrays) -> list[Camera]:
     core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
     lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
     model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
-    try:
-        own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
-    except InputError as error:
-        raise InputError(error.message, file=arrays.path) from None
-    return [freed(each, model, arrays.says(core), arrays.says(lens)) for each in own]
+    with at_place(Place(arrays.path)):
+        cameras = [lens_of_mrcal(model, row, f"camera {k}") for k, row in enumerate(rows.tolist())]
+    return [freed(camera, model, arrays.says(core), arrays.says(lens)) for camera in cameras]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
@@ -177,14 +176,14 @@ def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats
     mounted = [each for each in ("extrinsics_rt_fromref", "rt_cam_ref") if each in arrays]
     to_camera = of_vectors(arrays.numbers(mounted[0], None, 6)) if mounted else np.zeros((0, 4, 4))
     if indices[:, 0].max() >= len(views) or indices[:, 2].max() >= len(to_camera):
-        raise arrays.error(INDICES, "names a view or a sensor that is not there")
+        raise arrays.refusal("targets.mrcal-index", INDICES)
     if set(indices[:, 1].tolist()) != set(range(count)):
-        raise arrays.error(INDICES, f"does not name each of the {count} cameras")
+        raise arrays.refusal("targets.mrcal-cameras", INDICES, count=count)
     from_reference = np.empty((count, 4, 4))
     for camera in range(count):
         of = np.unique(indices[indices[:, 1] == camera, 2])
         if len(of) > 1:
-            raise arrays.error(INDICES, f"has the camera {camera} in several places: a camera that moves")
+            raise arrays.refusal("targets.mrcal-moving", INDICES, camera=camera)
         from_reference[camera] = np.eye(4) if of[0] < 0 else to_camera[of[0]]
     first = from_reference[0]
     seen = np.unique(indices[:, 0])

@@ -71,10 +71,7 @@ class Added:
         return np.asarray((gained + gained.T) / 2)
 
     def likely_gain(self, cofactors: Floats, rows: Indices) -> Floats:
-        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q.
-
-        It is the same if the points are fixed.
-        """
+        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q."""
         of_points = cofactors[self.places[:, :, np.newaxis], self.places[:, np.newaxis]]
         noise = np.eye(2) + self.by_place @ of_points @ self.by_place.transpose(0, 2, 1)
         both, count = np.hstack([self.by_cameras, self.by_pose]), len(self.touched)
@@ -161,10 +158,7 @@ class Suggestions(Brief):
 
 
 def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Floats]:
-    """Return which of (n, 3) points in its axes a picture would show, and their images; none below 12.
-
-    `size` is (2,) width and height of the pictures of the camera.
-    """
+    """Return which of (n, 3) points in its axes a picture would show, and their images; none below 12."""
     xy = camera.project(places * TURNED)
     with np.errstate(invalid="ignore"):
         inside: Bools = np.asarray(
@@ -199,10 +193,7 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
 
 
 def placed_cofactors(housing: Housing) -> Floats:
-    """Return the cofactors of cameras and sensors, and of the places (x, y, z) of all points of the board.
-
-    All points of a fixed board have the same three rows, which are zero.
-    """
+    """Return the cofactors of cameras and sensors, and of the places (x, y, z) of all points of the board."""
     before, own = housing.board.start, housing.cofactors[: housing.common, : housing.common]
     points = len(housing.points) if housing.points_by_board.shape[2] else 1
     by_board = housing.points_by_board[:points].reshape(3 * points, housing.common - before)

@@ -16,7 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
-from photogram.words import Phrase
+from photogram.words import phrase
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
@@ -31,47 +31,51 @@ class Arrays:
         # Empty text stands for None, as mrcal writes it.
         return name in self.arrays and not (self.arrays[name].dtype.kind == "U" and self.text(name) == "")
 
-    def error(self, name: str, message: str | Phrase) -> InputError:
-        """Return an error that names file and array."""
-        return InputError(f"{name} {message}", file=self.path)
+    def refusal(self, code: str, name: str, **fields: object) -> InputError:
+        """Return an error of an array, which the sentence names."""
+        return InputError(phrase(code, name=name, **fields), file=self.path)
+
+    def _wrong(self, name: str, code: str, **fields: object) -> InputError:
+        return self.refusal("targets.array", name, message=phrase(code, **fields))
 
     def first(self, *names: str) -> str:
-        """Return the first of some names that is there; versions of a program write others."""
-        found = next((each for each in names if each in self), None)
-        if found is None:
-            raise InputError(f"has no {' or '.join(names)}", file=self.path)
-        return found
+        """Return the first existing name; versions of a program write different names."""
+        existing = next((name for name in names if name in self), None)
+        if existing is None:
+            raise InputError(phrase("error.missing", name=" or ".join(names)), file=self.path)
+        return existing
 
     def text(self, name: str) -> str:
         """Return an array of one text."""
-        found = self.arrays[name]
-        if found.dtype.kind not in "US" or found.ndim:
-            raise self.error(name, "is no text")
-        return str(found)
+        array = self.arrays[name]
+        if array.dtype.kind not in "US" or array.ndim:
+            raise self._wrong(name, "error.text", value=str(array.dtype))
+        return str(array)
 
     def says(self, name: str) -> bool:
-        """Return whether an array is true; False where it is missing."""
+        """Return whether an array is true; False if it is missing."""
         if name not in self:
             return False
-        found = self.arrays[name]
-        if found.ndim or found.dtype.kind not in "biu":
-            raise self.error(name, "is neither true nor false")
-        return bool(found)
+        array = self.arrays[name]
+        if array.ndim or array.dtype.kind not in "biu":
+            raise self._wrong(name, "error.flag", value=str(array.dtype))
+        return bool(array)
 
     def numbers(self, name: str, *shape: int | None) -> Floats:
-        """Return an array of finite numbers; None in the shape stands for any length."""
-        found = self.arrays[name]
-        if found.dtype.kind not in "fiu":
-            raise self.error(name, f"holds no numbers: its type is {found.dtype}")
-        fits = found.ndim == len(shape) and all(
-            own is None or own == each for own, each in zip(shape, found.shape, strict=True)
+        """Return an array of finite numbers; None in the shape permits any length."""
+        array = self.arrays[name]
+        if array.dtype.kind not in "fiu":
+            raise self._wrong(name, "error.array", of="numbers", value=str(array.dtype))
+        fits = array.ndim == len(shape) and all(
+            length is None or length == actual for length, actual in zip(shape, array.shape, strict=True)
         )
         if not fits:
-            wanted = " x ".join("n" if each is None else str(each) for each in shape) or "a number"
-            raise self.error(name, f"has the shape {found.shape}, not {wanted}")
-        numbers = found.astype(np.float64)
+            wanted = " x ".join("n" if length is None else str(length) for length in shape) or "1"
+            raise self._wrong(name, "error.shape", shape=wanted, actual=str(array.shape))
+        numbers = array.astype(np.float64)
         if not np.isfinite(numbers).all():
-            raise self.error(name, "holds what is not finite")
+            value = float(numbers[~np.isfinite(numbers)][0])
+            raise self._wrong(name, "error.finite", value=value)
         return numbers
 
 
@@ -89,7 +93,8 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
     except InputError:
         raise
     except (*UNPACKABLE, ValueError) as error:
-        raise InputError(f"cannot be read as an archive of arrays: {error}", file=path) from None
+        message = phrase("error.parse", format="archive of arrays (npz)", reason=str(error))
+        raise InputError(message, file=path) from None
     return Arrays(path, arrays)
 
 
@@ -101,17 +106,12 @@ def _array(path: Path, name: str, content: bytes) -> NDArray[Any]:
         shape, by_columns, kind = _HEADERS[version](stream)
         announced = math.prod(shape) * kind.itemsize
     except Exception as error:  # whatever a damaged header makes the parser raise
-        what = f"the header of the array {name} is damaged ({type(error).__name__}: {error})"
-        raise InputError(f"{what}: write the file again with numpy.savez", file=path) from None
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(phrase("targets.array-header", name=name, reason=reason), file=path) from None
     if kind.hasobject:
-        raise InputError(
-            f"the array {name} holds Python objects, which are not unpickled: save plain arrays", file=path
-        )
-    own = len(content) - stream.tell()
-    if announced != own or min(shape, default=0) < 0:
-        raise InputError(
-            f"the header of the array {name} announces the shape {shape} of {kind}, {announced} bytes, but"
-            f" {own} bytes follow: write the file again with numpy.savez",
-            file=path,
-        )
+        raise InputError(phrase("targets.array-objects", name=name), file=path)
+    actual = len(content) - stream.tell()
+    if announced != actual or min(shape, default=0) < 0:
+        fields = {"shape": str(shape), "kind": str(kind), "announced": announced, "actual": actual}
+        raise InputError(phrase("targets.array-bytes", name=name, **fields), file=path)
     return np.ndarray(shape, kind, content, stream.tell(), order="F" if by_columns else "C")

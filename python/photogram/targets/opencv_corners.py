@@ -18,6 +18,7 @@ from photogram.io.yaml_text import read_yaml_text
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
 from photogram.targets.npz_arrays import read_arrays
+from photogram.words import phrase
 
 POINTS = "image_points"
 BEGIN_BYTES = 1 << 20  # of a file, with a name that identifies the format
@@ -45,7 +46,7 @@ def read_storage(path: Path, board: Board | None) -> Measured:
         content = Tree(_xml(path) if suffix == ".xml" else read_yaml_text(path), path)
     xy = _matrix(content[POINTS])
     if xy.ndim != 3 or xy.shape[2] != 2:
-        raise content[POINTS].error("is no matrix of views by corners of x and y")
+        raise content[POINTS].error(phrase("targets.matrix", what="views by corners of x and y"))
     sizes = {}
     if "image_width" in content and "image_height" in content:
         sizes[""] = content["image_width"].whole(1), content["image_height"].whole(1)
@@ -59,12 +60,9 @@ def read_storage(path: Path, board: Board | None) -> Measured:
         if grid is not None:
             places, points = grid.reshape(-1, grid.shape[-1]), content["grid_points"]
             if places.shape != board.places.shape:
-                raise points.error(f"are not the points of the board, {board.described}")
+                raise points.error(phrase("targets.other-points", board=board.described))
             if np.abs(places - board.places).max() > MAX_GRID_ERROR * min(board.pitch):
-                raise points.error(
-                    f"lie elsewhere than those of the board, {board.described}: write them to a table for a"
-                    " board.toml of the kind points"
-                )
+                raise points.error(phrase("targets.other-places", board=board.described))
     return _measured(path, xy, board, sizes)
 
 
@@ -76,23 +74,17 @@ def _measured(
 ) -> Measured:
     views, points = xy.shape[:2]
     if board is not None and len(board.places) != points:
-        raise InputError(
-            f"has {points} corners in each view, but the board has {len(board.places)}: {board.described}",
-            file=path,
-        )
+        fields = {"points": points, "count": len(board.places), "board": board.described}
+        raise InputError(phrase("targets.corner-count", **fields), file=path)
     rows = xy.reshape(-1, 2)
-    # A corner that was not found is NaN.
-    found = np.isfinite(rows).all(axis=1)
+    detected = np.isfinite(rows).all(axis=1)  # others are NaN
     image, point = np.repeat(np.arange(views), points), np.tile(np.arange(points), views)
-    count = int(found.sum())
     return Measured(
         path=path,
         images=[f"view{view:03d}" for view in range(views)],
-        image=image[found],
-        point=point[found],
-        xy=rows[found],
-        sd=np.ones(count),
-        use=np.ones(count, dtype=bool),
+        image=image[detected],
+        point=point[detected],
+        xy=rows[detected],
         sizes=sizes,
         board=board,
     )
@@ -104,12 +96,12 @@ def _matrix(tree: Tree) -> Floats:
     kind = tree["dt"].text() if isinstance(tree["dt"].value, str) else str(tree["dt"].value)
     match = re.fullmatch(r"\"?(\d*)([fd])\"?", kind.strip())
     if match is None:
-        raise tree["dt"].error("is no matrix of floating-point numbers")
+        raise tree["dt"].error(phrase("targets.matrix", what="floating-point numbers"))
     channels = int(match[1] or 1)
     data = tree["data"]
     given = data.value if isinstance(data.value, list) else None
     if given is None or len(given) != rows * cols * channels:
-        raise data.error(f"is not {rows} x {cols} x {channels} numbers")
+        raise data.error(phrase("targets.matrix", what=f"{rows} x {cols} x {channels} numbers"))
     numbers = np.array([_coordinate(each) for each in data])
     return numbers.reshape((rows, cols, channels) if channels > 1 else (rows, cols))
 
@@ -125,10 +117,10 @@ def _xml(path: Path) -> dict[str, Any]:
     """Return what a storage in XML holds: matrices with their numbers, plain values as text or numbers."""
     try:
         root = ElementTree.fromstring(read_bytes(path))
-    except ElementTree.ParseError as error:
-        raise InputError(f"is no XML: {error}", file=path, record=error.position[0]) from None
-    except (ValueError, LookupError) as error:
-        raise InputError(f"is no XML: {error}: save it as UTF-8", file=path) from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        record = error.position[0] if isinstance(error, ElementTree.ParseError) else None
+        message = phrase("error.parse", format="XML (UTF-8)", reason=str(error))
+        raise InputError(message, file=path, record=record) from None
     return {each.tag: _element(each) for each in root}
 
 
@@ -178,5 +170,5 @@ def _gridded(path: Path, places: Floats) -> Board:
     if board is not None and len(board.places) == len(first):
         far = float(np.abs(places - first[0] - board.places).max())
     if board is None or far > MAX_GRID_ERROR * min(spacing):
-        raise InputError("objpoints are no grid, row by row, alike in all views: give the board", file=path)
+        raise InputError(phrase("targets.no-grid"), file=path)
     return board

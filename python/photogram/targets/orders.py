@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.targets.first_camera import MAX_VIEW_MISFIT, adjusted_views, rays_of
 from photogram.targets.sightings import (
@@ -17,6 +17,7 @@ from photogram.targets.sightings import (
     poses,
     ray_homographies,
 )
+from photogram.words import phrase
 
 MIN_MISFIT_RAD = 1e-6
 EQUAL_MISFIT_RATIO = 1.5  # misfit over the best misfit of an order that is as good
@@ -88,10 +89,7 @@ class Pictures:
         return orders, fit, self._told(orders, fits, right)
 
     def _tried(self) -> tuple[Floats, Floats]:
-        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera.
-
-        Pictures that are as most are in the order of their numbers are not tried in others.
-        """
+        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera."""
         rows, listings = np.flatnonzero(self.usable), self.seen.listings
         misfit = np.full((len(rows), len(listings.points)), np.inf)
         front = np.full(misfit.shape, -1.0)
@@ -119,28 +117,19 @@ class Pictures:
         return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
-        """Return what is to be said of pictures whose corners are not listed as the board's are."""
+        """Return remarks on pictures whose corners are not listed in the order of the board."""
         names = np.array(self.names)[self.usable]
         own = orders[self.usable]
         mirrored = fits.any(axis=1) & (~right.any(axis=1) | (fits[:, 0] & (own > 0)))
         other = right.any(axis=1) & ~mirrored
-        told = []
+        remarks = []
         if (bad := ~fits.any(axis=1)).any():
-            told.append(
-                f"corners of {listed(names[bad].tolist())} fit the board more than {MAX_VIEW_MISFIT:g} times"
-                " worse than those of most pictures, in whatever order: some are probably not where they"
-                " should be"
-            )
-        for order in np.unique(own[mirrored]).tolist():
-            those = listed(names[mirrored & (own == order)].tolist())
-            told.append(
-                f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows"
-                " or columns stand in a wrong order"
-                + (f": taken for listed {CORNER_ORDERS[order]}" if order else "")
-            )
-        for order in np.unique(own[other & (own > 0)]).tolist():
-            those = listed(names[other & (own == order)].tolist())
-            told.append(f"corners of {those} were listed in another order: {CORNER_ORDERS[order]}")
+            fields = {"names": names[bad].tolist(), "factor": MAX_VIEW_MISFIT}
+            remarks.append(phrase("targets.odd-orders", **fields))
+        for which, code in ((mirrored, "targets.mirrored-order"), (other & (own > 0), "targets.other-order")):
+            for order in np.unique(own[which]).tolist():
+                fields = {"names": names[which & (own == order)].tolist(), "order": CORNER_ORDERS[order]}
+                remarks.append(phrase(code if order else "targets.mirrored", **fields))
         if len(own) > 1 and other.all() and (own > 0).all():
-            told.append("no picture lists its corners as the board does: are its columns its rows?")
-        return [Message(each) for each in told]
+            remarks.append(phrase("targets.all-orders"))
+        return [Message(remark) for remark in remarks]

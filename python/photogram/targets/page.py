@@ -1,22 +1,44 @@
-"""The page of a calibration: that of its block, with what it is worth, the board and the views before it."""
+"""The document of a calibration, its JSON members (`docs/json.md`), and its maps as files.
+
+They are those of the block, with the board, the views and the uncertainty of projection.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import asdict, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.results.document import block_members
 from photogram.show.cells import page_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
+from photogram.show.quantity import Quantity, members, records
 from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.calibration_result import Worth
-from photogram.targets.drawing import plot_cross_validation, plot_difference, plot_uncertainty
+from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
+from photogram.targets.drawing import (
+    plot_board_residuals,
+    plot_cross_validation,
+    plot_difference,
+    plot_poorest_views,
+    plot_uncertainty,
+)
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
-from photogram.targets.residual_drawing import plot_board_residuals, plot_poorest_views
-from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
+from photogram.targets.new_views import Suggestions
+from photogram.targets.tables import (
+    STRETCHES,
+    board_facts,
+    board_fit,
+    prior_shift,
+    spline_lines,
+    splines,
+    views,
+    worst_points,
+)
+from photogram.targets.worth import Worth
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
@@ -143,3 +165,114 @@ def _of_difference(found: CameraDifference) -> Drawing:
 
 def _title(found: UncertaintyMap) -> str:
     return f"{found.camera} {distance_text(found.distance, found.unit)}"
+
+
+def calibration_members(calibrated: Calibrated) -> dict[str, Any]:
+    """Return the members of the document."""
+    sensors = [
+        {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row].tolist()}
+        for row in calibrated.sensors_adjusted()
+    ]
+    moved = prior_shift(calibrated)
+    return {
+        **block_members(calibrated.result),
+        "board": _board(calibrated),
+        "views": records([*views(calibrated), Quantity(calibrated.poses, member="pose")]),
+        **({"sensors": sensors} if sensors else {}),
+        **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.members()}),
+        **({"moved_by_priors": records(moved)} if moved else {}),
+        **({"splines": [asdict(each) for each in told]} if (told := splines(calibrated)) else {}),
+        **({} if calibrated.worth is None else worth_members(calibrated.worth)),
+    }
+
+
+def _board(calibrated: Calibrated) -> dict[str, Any]:
+    calibration, fit = calibrated.calibration, board_fit(calibrated)
+    board = calibration.board
+    names = np.array(board.names, dtype=object)
+    found: dict[str, Any] = {
+        **members(board, "kind", "columns", "rows", "unit"),
+        "shape": calibration.shape,
+        "points": records(
+            [
+                Quantity(names, kind="name", member="id"),
+                Quantity(board.places, member="nominal"),
+                Quantity(calibrated.points, member="adjusted"),
+            ]
+        ),
+    }
+    if (bend := calibrated.bend) is not None:
+        found["bend"] = bend.position[:2].tolist()
+        found["bend_covariance"] = bend.covariance.tolist()
+    if fit is not None:
+        found["plane"] = fit.plane.tolist()
+        found["rms_out_of_plane"] = fit.rms_out_of_plane
+        found["spacing_ppm"] = dict(zip(STRETCHES, fit.stretch.tolist(), strict=True))
+        found["sd_spacing_ppm"] = dict(zip(STRETCHES, fit.sd.tolist(), strict=True))
+    return found
+
+
+def worth_files(worth: Worth) -> dict[str, bytes]:
+    """Return the maps as tables and arrays, by their names: `map-left-infinity.csv`."""
+    files = {}
+    for each in worth.maps:
+        name = f"map-{map_name(each)}"
+        files[f"{name}.csv"], files[f"{name}.npz"] = each.to_csv(), each.to_npz()
+    return files
+
+
+def worth_members(worth: Worth) -> dict[str, Any]:
+    """Return what the JSON document has of it."""
+    return {
+        "maps": [_map(each) for each in worth.maps],
+        "cross_validation": [_cross(each) for each in worth.cross],
+        "difference": [_difference(each) for each in worth.differences],
+        "suggested_views": [_suggested(each) for each in worth.suggestions],
+        "worth": worth.sentences,
+    }
+
+
+def _finite(distance: float) -> float | None:
+    return distance if math.isfinite(distance) else None
+
+
+def _map(uncertainty: UncertaintyMap) -> dict[str, Any]:
+    names = ("camera", "datum", "noise_only", "model", "columns", "rows", "sd", "covariances")
+    own = members(uncertainty, *names, largest_where_seen="largest")
+    return {**own, "distance": _finite(uncertainty.distance)}
+
+
+def _cross(cross: CrossValidation) -> dict[str, Any]:
+    splits = [
+        {
+            "views": [list(part) for part in parts],
+            "tests": [_test(test) for test in tests],
+            "dk": changes_between(*housings)[0][: cross.whole.board.start],
+        }
+        for parts, tests, housings in zip(cross.parts, cross.tests, cross.housings, strict=True)
+    ]
+    return {**members(cross, "into", "explained", "factor"), "splits": splits}
+
+
+def _test(test: DifferenceTest) -> dict[str, Any]:
+    return members(test, "name", "chi2", "dof", p="probability")
+
+
+def _difference(difference: CameraDifference) -> dict[str, Any]:
+    names = ("cameras", "rms", "largest", "columns", "rows", "vectors", "covariances", "remarks")
+    others = {"motion": "fitted.motion", "rotation_deg": "rotation", "shared_corners": "shared"}
+    return {
+        **members(difference, *names, **others),
+        "distances": [_finite(distance) for distance in difference.distances],
+        "test": difference.test and _test(difference.test),
+    }
+
+
+def _suggested(suggestions: Suggestions) -> dict[str, Any]:
+    names = {"name": "candidate.name", "pose": "candidate.pose"}
+    return {
+        "camera": suggestions.camera,
+        "distance": _finite(suggestions.distance),
+        "largest_before": float(np.max(suggestions.before)),
+        "views": [members(view, "corners", "largest", "rms", **names) for view in suggestions.views],
+    }

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
 from photogram.targets.board_files import picture_size, read_board
@@ -25,10 +25,7 @@ from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz
 from photogram.targets.regularisation import with_knot_sd
 from photogram.targets.start import Regularisation, Synchronisation
-
-NO_BOARD_SEEN = "pictures, but no board: write board.toml or give --board 9x6 --spacing 0.025"
-UNIT_ASSUMED = "does not say the unit of its board: metres are assumed (--unit)"
-NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
+from photogram.words import phrase
 
 
 def read(
@@ -93,37 +90,37 @@ def read(
     own = board if isinstance(board, Board) else _only_board(described)
     size = size or next(map(picture_size, described), None)
     if knots is not None and (models or model != KNOTTED):
-        raise InputError(f"knots: the lens has a number of them where it is {KNOTTED}, and no file says it")
+        raise InputError(phrase("targets.knots-of", model=KNOTTED))
     if models:
-        given = _given(path, models, corners, own)
-        prior = None if knot_sd and not regularise else regularise or given.regularise
-        given = given.replace(cameras=with_knot_sd(given.cameras, knot_sd, prior), regularise=prior, sd0=sd0)
+        calibration = _of_models(path, models, corners, own)
+        prior = None if knot_sd and not regularise else regularise or calibration.regularise
+        cameras_of_model = with_knot_sd(calibration.cameras, knot_sd, prior)
         if sync != "known" or offsets:
-            raise InputError(
-                f"{models[0].name} says which pictures are of one view: --sync, --offset go without",
-                file=path,
-            )
-        given = given.replace(messages=[*given.messages, *_not_used(given.corners)])
-        return given if shape is None else given.replace(board=given.board.replace(shape=shape))
+            raise InputError(phrase("targets.model-has-views", name=models[0].name), file=path)
+        messages = [*calibration.messages, *_not_used(calibration.corners)]
+        board = calibration.board if shape is None else calibration.board.replace(shape=shape)
+        return calibration.replace(
+            cameras=cameras_of_model, regularise=prior, sd0=sd0, messages=messages, board=board
+        )
     how = Grouping(
         cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
     )
     pictures = [] if corners else [each for each in files_at(path) if is_picture(each)]
     if pictures and own is None:
-        raise InputError(NO_BOARD_SEEN, file=path)
+        raise InputError(phrase("targets.no-board"), file=path)
     if pictures and own is not None:
         found = detected(path, pictures, own, progress)
     else:
         found = _measured(path, corners, own)
-    assumed = [Message(UNIT_ASSUMED, found.path)] if own is None and unit is None else []
+    assumed = [Message(phrase("targets.unit"), found.path)] if own is None and unit is None else []
     own = found.board if own is None else own
     if own is None:
-        raise InputError(NO_BOARD, file=path)
+        raise InputError(phrase("targets.no-board"), file=path)
     if shape is not None:
         own = own.replace(shape=shape)
     if unit is not None:
         own = own.replace(unit=unit)
-    seen, told = grouped(found, how)
+    seen, remarks = grouped(found, how)
     with at_place(Place(path)):
         start = first_values(own, seen, model, knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses
@@ -137,58 +134,48 @@ def read(
         sd0=sd0,
         sync=sync,
         regularise=regularise,
-        messages=[*assumed, *found.messages, *told, *_not_used(seen), *start.remarks],
+        messages=[*assumed, *found.messages, *remarks, *_not_used(seen), *start.remarks],
     )
     return calibration.with_offsets(offsets) if offsets else calibration
 
 
 def _not_used(corners: Corners) -> list[Message]:
-    left = int(np.count_nonzero(~corners.use))
-    return [Message(f"{counted(left, 'corner')} not used, as the file says")] if left else []
+    unused = int(np.count_nonzero(~corners.use))
+    return [Message(phrase("targets.unused", n=unused))] if unused else []
 
 
 def _only_board(boards: Sequence[Path]) -> Board | None:
     if len(boards) > 1:
-        names = listed([each.name for each in boards])
-        raise InputError(
-            f"there are {len(boards)} boards, {names}: several boards that are fixed to each other are one of"
-            " the kind points; those whose relative pose is unknown are not taken yet",
-            file=boards[1],
-        )
+        names = [each.name for each in boards]
+        raise InputError(phrase("targets.boards", count=len(boards), names=names), file=boards[1])
     return read_board(boards[0]) if boards else None
 
 
-def _given(
+def _of_models(
     path: Path, models: Sequence[Path], corners: dict[Form, list[Path]], board: Board | None
 ) -> Calibration:
-    """Return the calibration of the one model of mrcal that lies there; those of one solution are alike."""
+    """Return the calibration of models of mrcal; the models of one solution have equal calibrations."""
     if corners or board is not None:
-        raise InputError(
-            f"{models[0].name} has corners and a board of its own, and others lie beside it", file=path
-        )
-    found = read_model(models[0])
+        raise InputError(phrase("targets.own-corners", name=models[0].name), file=path)
+    calibration = read_model(models[0])
     for other in models[1:]:
-        if read_model(other) != found:
-            raise InputError(
-                f"{models[0].name} and {other.name} are of different calibrations: give one of them",
-                file=path,
-            )
-    return found
+        if read_model(other) != calibration:
+            names = {"first": models[0].name, "second": other.name}
+            raise InputError(phrase("targets.other-calibration", **names), file=path)
+    return calibration
 
 
 def _measured(path: Path, corners: dict[Form, list[Path]], board: Board | None) -> Measured:
     if not corners:
-        raise InputError(
-            "holds no corners of a board in any format that is known (docs/targets.md)", file=path
-        )
+        raise InputError(phrase("targets.no-format"), file=path)
     if len(corners) > 1:
-        told = " and ".join(f"{form.title} ({files[0].name})" for form, files in corners.items())
-        raise InputError(f"holds {told}: give the file that is meant", file=path)
+        names = [f"{form.title}: {files[0].name}" for form, files in corners.items()]
+        raise InputError(phrase("targets.formats", names=names), file=path)
     ((form, files),) = corners.items()
     if board is None and form.clear is False and form.read is not read_npz:
-        raise InputError(NO_BOARD, file=path)
-    found = [form.read(each, board) for each in files]
-    return found[0] if len(found) == 1 else _together(path, files, found)
+        raise InputError(phrase("targets.no-board"), file=path)
+    parts = [form.read(each, board) for each in files]
+    return parts[0] if len(parts) == 1 else _together(path, files, parts)
 
 
 def _together(path: Path, files: Sequence[Path], parts: Sequence[Measured]) -> Measured:
@@ -196,19 +183,15 @@ def _together(path: Path, files: Sequence[Path], parts: Sequence[Measured]) -> M
     apart = len({each.stem for each in files}) == len(files)
     names = [each.stem if apart else f"{each.parent.name}" for each in files]
     if len(set(names)) < len(names):
-        raise InputError(
-            f"holds {counted(len(files), 'file')} of corners whose names tell no cameras apart", file=path
-        )
-    if any(each.times is None for each in parts) and not all(each.times is None for each in parts):
-        raise InputError("has times of corners in some files, but not in all", file=path)
+        raise InputError(phrase("targets.camera-names", count=len(files)), file=path)
+    timed = [each.times for each in parts if each.times is not None]
+    if timed and len(timed) < len(parts):
+        raise InputError(phrase("targets.some-times"), file=path)
     boards = [each.board for each in parts if each.board is not None]
     if any(each != boards[0] for each in boards[1:]):
-        raise InputError("has files of corners with different boards", file=path)
+        raise InputError(phrase("targets.different-boards"), file=path)
     starts = np.cumsum([0, *(len(each.images) for each in parts)])[:-1].tolist()
     views = [own for each in parts for own in (each.views or each.images)]
-    times = None
-    if all(each.times is not None for each in parts):
-        times = np.concatenate([each.times for each in parts if each.times is not None])
     return Measured(
         path=path,
         images=[own for each in parts for own in each.images],
@@ -219,7 +202,7 @@ def _together(path: Path, files: Sequence[Path], parts: Sequence[Measured]) -> M
         use=np.concatenate([each.use for each in parts]),
         cameras=[name for each, name in zip(parts, names, strict=True) for _ in each.images],
         views=views,
-        times=times,
+        times=np.concatenate(timed) if timed else None,
         sizes={name: each.sizes[""] for each, name in zip(parts, names, strict=True) if "" in each.sizes},
         board=boards[0] if boards else None,
         messages=[*dict.fromkeys(own for each in parts for own in each.messages)],

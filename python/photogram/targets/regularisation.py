@@ -17,12 +17,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.network.block import Block
+    from photogram.targets.start import Start
 
 CORE = ("fx", "fy", "f", "cx", "cy")
 DENOMINATOR = ("k4", "k5", "k6")
@@ -34,10 +41,7 @@ ROUGH_KNOTS, ACROSS = 0.04, 10.0
 def regularised(
     cameras: Sequence[Camera], sizes: Sequence[tuple[int, int] | None], observed: int
 ) -> list[Camera]:
-    """Return cameras with the priors of mrcal on what is free in them.
-
-    Sizes are width and height of their pictures. `observed` is n: two for each corner and picture.
-    """
+    """Return cameras with the priors of mrcal on what is free in them."""
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
     mu = math.sqrt(SHARE * observed / (2 * len(cameras) * FAR**2))
@@ -45,7 +49,7 @@ def regularised(
     found = []
     for camera, size, own in zip(cameras, sizes, terms, strict=True):
         if size is None:
-            raise InputError(f"the camera {camera.title}: the centre of its pictures needs their size")
+            raise InputError(phrase("targets.no-size", camera=camera.title))
         firm = math.sqrt(SHARE * observed / (ROUGH * count)) if count else math.inf
         priors = {name: (0.0, 1 / (firm * (FIRMER if name in DENOMINATOR else 1.0))) for name in own}
         priors |= {
@@ -69,6 +73,14 @@ def regularised(
     return found
 
 
+def weighted_block(start: Start) -> Block:
+    """Return the block of a calibration with the priors of its cameras."""
+    if start.regularise is None:
+        return start.block()
+    observed = 2 * len(start.board.places) * len(start.corners.pictures)
+    return start.block(regularised(start.cameras, start.corners.sizes, observed))
+
+
 def _free(camera: Camera, name: str) -> bool:
     return float(camera.deviations[camera.names.index(name)]) > 0
 
@@ -86,11 +98,11 @@ def with_knot_sd(
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):
-            raise InputError(f"knot_sd is two positive numbers, radial and tangential, not {knot_sd}")
+            raise argument_error("knot_sd", "positive", value=knot_sd)
         if regularise is not None:
-            raise InputError(f"knot_sd: {regularise} has standard deviations of knots of its own")
+            raise InputError(phrase("error.exclusive", first="knot_sd", second="regularise"))
         if not any(each.model == KNOTTED for each in cameras):
-            raise InputError(f"knot_sd: {cameras[0].model} has no knots; {KNOTTED} has")
+            raise InputError(phrase("error.not-applicable", name="knot_sd", other=cameras[0].model))
     if regularise is not None:
         return list(cameras)
     own = WEAK_KNOT_SD if knot_sd is None else knot_sd

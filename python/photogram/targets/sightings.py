@@ -18,6 +18,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
+from photogram.words import phrase
 
 _MIN_COLUMN_RATIO = 1e-9  # of a homography of corners that are not on one line
 
@@ -154,10 +155,7 @@ def _equations(board: Floats, rays: Floats) -> Floats:
 
 
 def _smallest(rows: Floats, seen: Bools) -> Floats:
-    """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least.
-
-    NaN for a picture whose points are all in one place.
-    """
+    """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least."""
     used = np.where(seen[..., np.newaxis, np.newaxis], rows, 0.0).reshape(len(rows), -1, rows.shape[-1])
     squares = used.transpose(0, 2, 1) @ used
     finite = np.isfinite(squares).all(axis=(1, 2))[:, np.newaxis, np.newaxis]
@@ -246,7 +244,8 @@ class Sightings:
         beyond = corners.point >= len(places)
         if beyond.any():
             row = int(np.argmax(beyond))
-            raise InputError(f"{corners.title(row)}: the board has {len(places)} points, {board.described}")
+            fields = {"count": len(places), "board": board.described}
+            raise InputError(phrase("targets.corner-beyond", corner=corners.title(row), **fields))
         axes = np.eye(4)
         if board.kind == "points":  # axes of the least-squares plane, from the centroid
             middle = places.mean(axis=0)

@@ -8,12 +8,12 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import indices, one_of, shaped, shown
+from photogram.arguments.arrays import argument_error, indices, one_of, shaped, value_field
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.moving_photos import Timed
@@ -26,6 +26,7 @@ from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
+from photogram.words import phrase
 
 Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
@@ -61,15 +62,17 @@ class Start(Valued, Brief):
         if self.regularise is not None:
             one_of("regularise", self.regularise, get_args(Regularisation))
         if self.sd0 is not None and not 0 < self.sd0 < np.inf:
-            raise InputError(f"the standard deviation of a corner is a positive number, not {self.sd0:g}")
+            raise argument_error("sd0", "positive", value=self.sd0)
         count = len(self.corners.camera_names)
-        given = [each for each in self.cameras if isinstance(each, Camera) and each.unit == "px"]
-        if len(given) != count or len(self.cameras) != count:
-            raise InputError(f"cameras are {count} cameras in pixels, not {shown(self.cameras)}")
-        named = [each.replace(name=name) for each, name in zip(given, self.corners.camera_names, strict=True)]
+        cameras = [each for each in self.cameras if isinstance(each, Camera) and each.unit == "px"]
+        if len(cameras) != count or len(self.cameras) != count:
+            value = value_field(self.cameras)
+            raise InputError(phrase("targets.cameras", count=count, value=value))
+        names = self.corners.camera_names
+        named = [camera.replace(name=name) for camera, name in zip(cameras, names, strict=True)]
         self._set("cameras", tuple(named))
         if self.sensors is None and count > 1 and self.sync != "none":
-            raise InputError("several cameras that are synchronised have sensors: camera 0 -> camera k")
+            raise argument_error("sensors", "empty")
         sensors = np.tile(np.eye(4), (count, 1, 1)) if self.sensors is None else self.sensors
         self._set("sensors", shaped("sensors", sensors, (count, 4, 4)))
         references = np.zeros(count, dtype=np.int64) if self.references is None else self.references
@@ -80,16 +83,16 @@ class Start(Valued, Brief):
         self._set("poses", poses)
         over = np.flatnonzero(self.corners.point >= len(self.board.places))
         if len(over):
-            raise InputError(
-                f"{self.corners.title(int(over[0]))}: the board has {len(self.board.places)} points, from 0"
-            )
+            fields = {"count": len(self.board.places), "board": self.board.described}
+            corner = self.corners.title(int(over[0]))
+            raise InputError(phrase("targets.corner-beyond", corner=corner, **fields))
         self._leave_out(poses)
         for name in ("offsets", "sd_offsets"):
             self._set(name, shaped(name, getattr(self, name), (count,)))
         for name, shape in (("sd_sensors", (count, 6)), ("sd_bend", (2,))):
             self._set(name, shaped(name, getattr(self, name), shape))
             if not (np.asarray(getattr(self, name)) > 0).all():
-                raise InputError(f"{name} are positive, or infinite where it is free: it is not held")
+                raise InputError(phrase("targets.free-sd", name=name))
         if self.sync == "offset":
             self._set_motion()
 
@@ -107,15 +110,11 @@ class Start(Valued, Brief):
         self._set("motion", found)
         lost = tied & ~(np.isfinite(found).all(axis=(1, 2)) & np.isfinite(times))[corners.views]
         if not (tied & ~lost).any():
-            raise InputError(
-                "no picture tells an offset between cameras: views need a picture by the reference camera,"
-                f" and others of it within {MAX_GAP_SECONDS:g} s before and after"
-            )
+            raise InputError(phrase("targets.no-offset", seconds=MAX_GAP_SECONDS))
         if lost.any():
             names = [corners.pictures[row] for row in np.flatnonzero(lost).tolist()]
-            told = Message(f"left out, nothing tells how the board moved about them: {listed(names)}")
             self._keep(~lost)
-            self._set("messages", (*self.messages, told))
+            self._set("messages", (*self.messages, Message(phrase("targets.no-motion", names=names))))
 
     def _keep(self, pictures: Bools) -> None:
         views = np.unique(self.corners.views[pictures])
@@ -125,20 +124,20 @@ class Start(Valued, Brief):
         self._set("corners", self.corners.of_pictures(pictures))
 
     def _leave_out(self, poses: Floats) -> None:
-        """Leave out pictures that say nothing, or whose pose nobody knows, and name them."""
+        """Leave out pictures without enough corners or without a pose, and name them."""
         poor = self.corners.poor(self.board.places)
         keep = np.array([name not in poor for name in self.corners.pictures], dtype=bool)
         unposed = keep & ~np.isfinite(poses[self.corners.views]).all(axis=(1, 2))
         keep &= ~unposed
-        found = [Message(f"{name} is left out: {why}") for name, why in poor.items()]
+        remarks = [phrase("targets.left-out", picture=name, reason=why) for name, why in poor.items()]
         if unposed.any():
             names = [self.corners.pictures[row] for row in np.flatnonzero(unposed).tolist()]
-            found.append(Message(f"left out, no pose was found: {listed(names)}"))
+            remarks.append(phrase("targets.unposed", names=names))
         if not keep.any():
-            raise InputError("; ".join(["no picture is left", *map(str, found)]))
+            raise InputError(phrase("targets.no-pictures", reasons=remarks))
         if not keep.all():
             self._keep(keep)
-        self._set("messages", (*self.messages, *found))
+        self._set("messages", (*self.messages, *map(Message, remarks)))
 
     def brief(self) -> tuple[str, Rows]:
         """Return what is adjusted in a few lines."""
@@ -171,8 +170,8 @@ class Start(Valued, Brief):
         places = {each.name: row for row, each in enumerate(self.cameras)}
         there = [name for name, row in places.items() if self.tied[row] and self.sync == "offset"]
         if strange := [name for name in known if name not in there]:
-            why = f"cameras with one are {', '.join(there)}" if there else "--sync offset makes them unknowns"
-            raise InputError(f"the camera {strange[0]} has no offset: {why}")
+            fields = {"camera": strange[0], "names": there or ["none"]}
+            raise InputError(phrase("targets.no-offset-of", **fields))
         offsets, sd = np.array(self.offsets), np.array(self.sd_offsets)
         for name, own in known.items():
             offsets[places[name]], sd[places[name]] = own
@@ -297,8 +296,8 @@ class Start(Valued, Brief):
         """Return the calibration without some images (m,) of its block."""
         use = self.corners.use.copy()
         use[np.flatnonzero(use)[images]] = False
-        found = Message(f"{np.count_nonzero(images)} corners are taken out, as mrcal would")
-        return self.replace(corners=self.corners.replace(use=use), messages=(*self.messages, found))
+        remark = Message(phrase("targets.removed", n=int(np.count_nonzero(images))))
+        return self.replace(corners=self.corners.replace(use=use), messages=(*self.messages, remark))
 
     def with_images_of(self, block: Block) -> Self:
         """Return the calibration with the corners that a block still has."""

@@ -14,14 +14,21 @@ from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housing import Housing, middle_of, transformed
-from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
-from photogram.targets.maps import image_grid
+from photogram.targets.housing import (
+    Housing,
+    camera_number,
+    housed_with,
+    housing_of,
+    middle_of,
+    size_of,
+    transformed,
+)
+from photogram.targets.maps import image_grid, parts_of
 from photogram.targets.new_views import Candidate, Suggestions, best_views, shown_of
-from photogram.targets.picture_parts import parts_of
 from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted, rays
+from photogram.words import phrase
 
 DISTANCE_QUANTILES = (0.1, 0.5, 0.9)  # of the boards
 TILT_DEG, TURN_DEG = 30.0, 90.0
@@ -81,7 +88,7 @@ def suggest_views(
         housing, functions[known], list(candidates), sizes, float(housing.seen.sd.min()), views
     )
     if not found:
-        raise InputError("none of the candidates shows the board to a camera")
+        raise InputError(phrase("targets.no-candidate"))
     return Suggestions(
         camera=result.cameras[number].name,
         distance=float(distance),
@@ -134,10 +141,7 @@ def views_towards(
     tilts: Collection[str] = TILTS,
     turns: Collection[str] = TURNS,
 ) -> list[Candidate]:
-    """Return views, board -> camera, with the middle of the board in a direction (3,), called `place`.
-
-    Distances are rounded to two figures; tilts and turns are names of `TILTS` and `TURNS`.
-    """
+    """Return views, board -> camera, with the middle of the board in a direction (3,), called `place`."""
     found, middle = [], middle_of(board.places)
     # The shortest rotation that turns z, the normal of the board, to the direction
     axis = np.cross([0.0, 0.0, 1.0], towards)

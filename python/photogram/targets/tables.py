@@ -6,12 +6,13 @@ Of splined lenses what is to be said of knots that hang on their priors, and of 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.unknowns import Prior
@@ -19,12 +20,13 @@ from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
 
 MAX_POINTS_LISTED = 10
-CRITICAL_TEST_VALUE = 3.0
+NOTABLE_STRETCH = 3.0  # standard deviations of the spacing of a board
 _PIXELS = (Axis.of("px", "px"),)
 
 
@@ -40,6 +42,7 @@ def views(calibrated: Calibrated) -> list[Quantity]:
     largest = np.zeros(count)
     np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
     left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
+    marked = np.bincount(view[outlying_images(calibrated)], minlength=count) > 0
     names = np.array(corners.view_names(), dtype=object)
     return [
         Quantity(names, (), "name", "view", "name", "first picture of the view", head="View"),
@@ -49,10 +52,23 @@ def views(calibrated: Calibrated) -> list[Quantity]:
         _of_views("rms_px", rms, "rms", axes=_PIXELS, kind="value"),
         _of_views("redundancy", _sums(view, result.redundancy, count), "Redundancy"),
         _of_views("chi2", _sums(view, weighted, count), "chi²", figures=4),
-        _of_views(
-            "largest_standardized", largest, "Largest standardized", marked=largest > CRITICAL_TEST_VALUE
-        ),
+        _of_views("largest_standardized", largest, "Largest standardized", marked=marked),
     ]
+
+
+def outlying_images(calibrated: Calibrated) -> Bools:
+    """Return (m,) which images are outliers of the verdict."""
+    codes = {"test.images", "test.image_coordinates"}
+    return _outlying(calibrated, codes, len(calibrated.result.residuals))
+
+
+def _outlying(calibrated: Calibrated, codes: Collection[str], count: int) -> Bools:
+    """Return (count,) which rows of kinds of observations are outliers of the verdict."""
+    outliers = np.zeros(count, dtype=bool)
+    for kind, places in calibrated.verdict.outlying.items():
+        if isinstance(kind, Phrase) and kind.code in codes:
+            outliers[[place[0] for place in places]] = True
+    return outliers
 
 
 def _of_views(name: str, values: Floats | Indices, head: str, **how: Any) -> Quantity:
@@ -90,7 +106,7 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
         return found
     found.append(Fact("Out of its plane, rms", significant(fit.rms_out_of_plane, 3), unit))
     for name, value, sd in zip(STRETCHES, fit.stretch.tolist(), fit.sd.tolist(), strict=True):
-        tone: Tone = "look" if abs(value) > CRITICAL_TEST_VALUE * sd else ""
+        tone: Tone = "look" if abs(value) > NOTABLE_STRETCH * sd else ""
         found.append(Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", tone))
     return found
 
@@ -104,19 +120,19 @@ _SHAPES = {
 
 
 def worst_points(calibrated: Calibrated) -> list[str]:
-    """Return the points of the board that are farthest from their places, in sentences, largest first."""
+    """Return the points of the board that are outliers of the verdict, in sentences, largest first."""
     result = calibrated.result
     if calibrated.calibration.shape != "points":
         return []
-    tests = np.nan_to_num(np.abs(result.point_standardized))
-    worst = np.argsort(-tests.max(axis=1), kind="stable")[:MAX_POINTS_LISTED]
+    tests = np.nan_to_num(np.abs(result.point_standardized)).max(axis=1)
+    codes = {"test.control", "test.components_of_control"}
+    rows = np.flatnonzero(_outlying(calibrated, codes, len(tests)))
     unit, lines = calibrated.calibration.board.unit, []
-    for row in worst.tolist():
-        if (largest := tests[row].max()) > CRITICAL_TEST_VALUE:
-            differences = zip("xyz", result.point_differences[row].tolist(), strict=True)
-            apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in differences)
-            name = result.block.point_ids[row]
-            lines.append(f"point {name}: {apart} {unit} off its place, {largest:.1f} standard deviations")
+    for row in rows[np.argsort(-tests[rows], kind="stable")][:MAX_POINTS_LISTED].tolist():
+        differences = zip("xyz", result.point_differences[row].tolist(), strict=True)
+        apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in differences)
+        name = result.block.point_ids[row]
+        lines.append(f"point {name}: {apart} {unit} off its place, {tests[row]:.1f} standard deviations")
     return lines
 
 
@@ -166,10 +182,7 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
 
 
 def prior_shift(calibrated: Calibrated) -> list[Quantity]:
-    """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors.
-
-    The adjustment without the priors is where the one with them began.
-    """
+    """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors."""
     before = calibrated.unregularised
     if before is None:
         return []

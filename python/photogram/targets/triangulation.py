@@ -18,16 +18,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import length, shaped
+from photogram.arguments.arrays import argument_error, length, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housing import Housing, transformed
-from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
+from photogram.targets.housing import Housing, camera_number, housed_with, housing_of, size_of, transformed
 from photogram.targets.maps import image_grid
 from photogram.targets.projection import housing_rows
 from photogram.targets.vision import imaged, motion_partials, rays
+from photogram.words import phrase
 
 STEPS = 30
 TOLERANCE = 1e-12  # in distances of the point
@@ -179,7 +179,7 @@ def triangulate(
     housing, numbers = _of_rig(result, cameras)
     where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
     if not 0 < pixel_sd < np.inf:
-        raise InputError(f"the standard deviation of pixels is a positive number, not {pixel_sd:g}")
+        raise argument_error("pixel_sd", "positive", value=pixel_sd)
     still = housing_rows(housing) if datum == "corners" else None
     return triangulated(housing, numbers, where, pixel_sd, still)
 
@@ -212,7 +212,7 @@ def distance_uncertainty(
         As of :func:`triangulate`; pictures whose size nobody knows, a depth that is not positive.
     """
     if not 0 < depth < np.inf:
-        raise InputError(f"a depth is a positive number, not {depth:g}")
+        raise argument_error("depth", "positive", value=depth)
     housing, numbers = _of_rig(result, cameras)
     sizes = [size_of(result, camera_number(result, each)) for each in cameras]
     pixels = image_grid(sizes[0], grid)[2]
@@ -235,10 +235,10 @@ def distance_uncertainty(
 def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, list[int]]:
     numbers = [camera_number(result, each) for each in cameras]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
-        raise InputError("points are triangulated by two cameras or more, each of them once")
+        raise InputError(phrase("targets.two-cameras-once"))
     housed = housed_with(result, numbers[0])
     if not set(numbers) <= set(housed):
-        raise InputError("points are triangulated by cameras that are tied to each other: these are not")
+        raise InputError(phrase("targets.not-tied"))
     return housing_of(result, numbers[0])[0], [housed.index(each) for each in numbers]
 
 

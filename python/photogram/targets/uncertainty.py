@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import length, shaped, shown
+from photogram.arguments.arrays import argument_error, length, shaped, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.knots import beyond_knots
 from photogram.targets.calibration_difference import CameraDifference, Side, compared
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housings import camera_number, housing_of, size_of
+from photogram.targets.housing import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import Criterion, points_at
 from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
+from photogram.words import phrase
 
 IMAGE_GRID = (60, 40)  # rays that define the datum `image`
 
@@ -168,7 +169,7 @@ def uncertainty_against_distance(
 def checked_distance(distance: float) -> float:
     """Return a distance; an InputError where it is not positive."""
     if not distance > 0:
-        raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
+        raise argument_error("distance", "positive", value=distance)
     return float(distance)
 
 
@@ -213,10 +214,10 @@ def difference(
     """
     distances = [distance] if isinstance(distance, float | int) else list(distance)
     if not distances:
-        raise InputError("two calibrations are compared at a distance: none is given")
+        raise argument_error("distance", "empty")
     if size is None:
         if not isinstance(a, Calibrated):
-            raise InputError("two cameras are compared over a picture: give its size")
+            raise argument_error("size", "empty")
         size = size_of(a, camera_number(a, camera))
     unit = next((each.calibration.board.unit for each in (a, b) if isinstance(each, Calibrated)), "m")
     return compared(
@@ -235,7 +236,7 @@ def _side(given: object, camera: int | str, name: str) -> Side:
     if isinstance(given, Camera):
         return Side(given.name or name, given)
     if not isinstance(given, Calibrated):
-        raise InputError(f"{name} is neither a calibration that was adjusted nor a camera: {shown(given)}")
+        raise InputError(phrase("targets.no-calibration", name=name, value=value_field(given)))
     number = camera_number(given, camera)
     housing, own = housing_of(given, number)
     columns = housing.parameters(own)

@@ -9,22 +9,25 @@ import numpy as np
 
 from photogram.adjustment.adjustment import adjust
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import whole_number
+from photogram.arguments.arrays import argument_error, whole_number
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
 from photogram.targets.appraisal import median_distance
 from photogram.targets.board import Board
-from photogram.targets.calibration import Calibration, weighted_block
-from photogram.targets.calibration_result import Calibrated, Worth
+from photogram.targets.calibration import Calibration
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
 from photogram.targets.first_calibration import weakly_known
 from photogram.targets.housing import transformed
 from photogram.targets.new_views import Candidate, shown_of
+from photogram.targets.regularisation import weighted_block
 from photogram.targets.suggestions import GRID, TILTS, suggest_views, views_over_picture, views_towards
 from photogram.targets.uncertainty import checked_distance, uncertainty_map
 from photogram.targets.view_plan_result import PlannedView, ViewPlan
 from photogram.targets.vision import rays
+from photogram.targets.worth import Worth
+from photogram.words import phrase
 
 __all__ = ["plan_views"]
 
@@ -78,10 +81,10 @@ def plan_views(
         Fewer than four views, values that are none, a board that the picture cannot show.
     """
     if whole_number("views", views) < len(FIRST_TILTS):
-        raise InputError(f"a plan has {len(FIRST_TILTS)} views or more, not {views}")
+        raise argument_error("views", "least", low=len(FIRST_TILTS), value=views)
     for each in (*distances, *away):
         checked_distance(each)
-    told = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     board = board.replace(shape=board.shape_of(views))
     centre = (np.array(size) - 1) / 2
     middle, beside = rays(camera, np.stack([centre, centre + np.array([1.0, 0.0])]))
@@ -95,7 +98,7 @@ def plan_views(
     while True:
         found = _predicted(known, board, size, sd0, taken)
         largest.append(float(np.nanmax(uncertainty_map(found, 0, worst, GRID).sd)))
-        told(f"view {len(taken)}: largest standard deviation {largest[-1]:.3g} px")
+        report(f"view {len(taken)}: largest standard deviation {largest[-1]:.3g} px")
         if len(taken) >= views or largest[-1] <= need:
             break
         taken.append(suggest_views(found, worst, candidates).views[0].candidate)
@@ -119,7 +122,7 @@ def _predicted(
     shown = [shown_of(camera, np.array(size), transformed(each.pose, board.places)) for each in views]
     for each, (points, _) in zip(views, shown, strict=True):
         if not len(points):
-            raise InputError(f"{each.name}: the picture shows fewer than 12 points of the board there")
+            raise InputError(phrase("targets.not-shown", name=each.name))
     count = len(views)
     corners = Corners(
         pictures=[f"view {number}" for number in range(1, count + 1)],

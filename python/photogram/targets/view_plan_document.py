@@ -8,15 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.annotations import check_arguments
+from photogram.lazy_dataclasses import replace
 from photogram.network.attitudes import Attitudes
+from photogram.network.hull import hull
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
 from photogram.show.quantity import Axis, Quantity, Table, of_each
-from photogram.targets.document import worth_members
-from photogram.targets.page import drawings, worth_facts
-from photogram.targets.plan_drawing import plot_planned_views
+from photogram.show.sketch.declared import Panel
+from photogram.show.sketch.marks import Mark, Markers, Polygons
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import BLUE, FAINT, VERMILION
+from photogram.targets.drawing import in_pixels
+from photogram.targets.page import drawings, worth_facts, worth_members
 
 if TYPE_CHECKING:
     from photogram.targets import ViewPlan
+
 
 CAPTION = "Where the corners of the board are in each picture; red: its point 0."
 PREDICTED = "This is a plan: the standard deviations follow from the planned board poses only."
@@ -82,3 +89,40 @@ def _views(plan: ViewPlan) -> Table:
     ]
     about = "Largest is the largest standard deviation over the picture with this view and those before it."
     return Table("views", "Views to take", columns, about=about)
+
+
+__all__ = ["plot_planned_views"]
+
+PANELS_PER_ROW, PANEL_INCHES = 4, 2.2
+
+
+def plot_planned_views(plan: ViewPlan) -> Plot:
+    """Plot where the corners of the board are in each picture; the point 0 is red where it is shown.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    """
+    corners = plan.calibrated.calibration.corners
+    (size,) = corners.sizes
+    assert size is not None
+    rows = -(-len(plan.views) // PANELS_PER_ROW)
+    panels = list[Panel]()
+    for number in range(len(plan.views)):
+        own = corners.xy[corners.picture == number]
+        marks: list[Mark] = [
+            Polygons(hull(own)[np.newaxis], FAINT, 0.5, BLUE, 0.5, 1.0),
+            Markers(own, ".", 2.5, BLUE),
+        ]
+        if corners.point[corners.picture == number][0] == 0:
+            marks.append(Markers(own[:1], "o", 5.0, VERMILION))
+        title = f"{number + 1}"
+        panels.append(replace(in_pixels(size), marks=marks, title=title, across="", up="", unnumbered=True))
+    every = [*panels, *[None] * (rows * PANELS_PER_ROW - len(panels))]
+    return Plot(
+        PANEL_INCHES * PANELS_PER_ROW, rows * (0.3 + PANEL_INCHES * size[1] / size[0]), every, PANELS_PER_ROW
+    )
+
+
+check_arguments(globals(), __all__)

@@ -48,10 +48,7 @@ def inverted(pose: Floats) -> Floats:
 
 
 def sensor_pose(position: Floats, attitude: Floats) -> Floats:
-    """Return (4, 4) the pose frame -> sensor of one with the position c and the attitude A on its frame.
-
-    A = F R'F and c = -F R't.
-    """
+    """Return (4, 4) the pose frame -> sensor of one with the position c and the attitude A on its frame."""
     rotation = FLIP @ attitude.T @ FLIP
     return composed(rotation, -rotation @ FLIP @ position)
 

@@ -76,12 +76,13 @@ def residual_lines(residuals: Residuals) -> list[str]:
         f"{point:7d}{x:15.2f}{y:13.2f}{vx:13.3f}{vy:11.3f}{point:15d}{gx:12.3f}{gy:11.3f}"
         for point, (x, y), (vx, vy), (gx, gy) in rows
     ]
-    squares = _sums("SUM VV", residuals.squares_um2)
-    sigma = _sums("SIGMA", residuals.sigma_um)
+    squares = sums("SUM VV", residuals.squares_um2, 35, 15)
+    sigma = sums("SIGMA", residuals.sigma_um, 35, 15)
     unit = f"STANDARD ERROR OF UNIT WEIGHT ={number(residuals.sigma0_um, 9, 4)} MICRONS"
     return [*HEAD, *lines, "", squares, f"  N = {len(residuals.points)}", sigma, "", unit]
 
 
-def _sums(name: str, values: tuple[float, ...]) -> str:
+def sums(name: str, values: Iterable[float], width: int, gap: int) -> str:
+    """Return a line of sums in both systems."""
     x, y, grid_x, grid_y = (number(value, 11, 4) for value in values)
-    return f"  {name:<35}{x}{y}{'':15}{grid_x}{grid_y}"
+    return f"  {name:<{width}}{x}{y}{'':{gap}}{grid_x}{grid_y}"

@@ -41,9 +41,9 @@ def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[
     ]
 
 
-def polynomial_lines(x: Floats, y: Floats, covariance: Floats) -> list[str]:
+def polynomial_lines(polynomial: Polynomial, covariance: Floats) -> list[str]:
     """Return the coefficients in metre units with standard deviations (one covariance for both axes)."""
-    sd = np.sqrt(np.diag(covariance))
+    (x, y), sd = polynomial.coefficients, np.sqrt(np.diag(covariance))
     lines = [
         "  CORRECTION = A X**4 + B Y**4 + C X**3 + D Y**3 + E X**2 + F Y**2 + G X + H Y + J   (METERS)",
         f"  {'':12}{'IN X':>16}{'SIGMA':>16}{'IN Y':>16}{'SIGMA':>16}",
@@ -71,12 +71,11 @@ def case_linear_page(case: CaseResult) -> list[str]:
 
 def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str]:
     """Return the polynomials of one case."""
-    x, y = single.polynomial.coefficients
     return [
         *centred(f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"),
         nearest(case),
         "",
-        *polynomial_lines(x, y, single.covariance),
+        *polynomial_lines(single.polynomial, single.covariance),
         "  VARIANCES AND COVARIANCES, IN X AND IN Y (METERS)",
         *triangle(LETTERS, single.covariance[:9, :9]),
         "",
@@ -108,11 +107,10 @@ def combined_polynomial_page(calibration: Calibration) -> list[str]:
     nonlinear = calibration.nonlinear
     if nonlinear is None:
         return []
-    x, y = nonlinear.polynomial.coefficients
     sigma_x, sigma_y = nonlinear.sigma_um
     return [
         *centred(f"COMBINED NONLINEAR ADJUSTMENT OF {len(calibration.cases)} CASES"),
-        *polynomial_lines(x, y, nonlinear.covariance),
+        *polynomial_lines(nonlinear.polynomial, nonlinear.covariance),
         "  VARIANCES AND COVARIANCES, IN X AND IN Y (METERS)",
         *triangle(LETTERS, nonlinear.covariance[:9, :9]),
         "",
@@ -152,7 +150,8 @@ def correction_table(calibration: Calibration, case: CaseResult | None = None) -
     for row in nodes:
         values = polynomial.evaluate(row)
         gap = "" if len(row) == len(nodes) else " " * 11
-        marks = [" " if there else "*" for there in _inside(polynomial, row)]
+        reach = np.abs(polynomial.frame.arguments(row)).max(axis=1)
+        marks = [" " if distance <= 1 + 1e-9 else "*" for distance in reach.tolist()]
         outside = outside or "*" in marks
         for axis, head in enumerate((f"X={row[0, 0] / 1e6:7.4f} M.", " " * 12)):
             cells = [f"{value:10.3f}{mark}" for value, mark in zip(values[:, axis], marks, strict=True)]
@@ -161,12 +160,6 @@ def correction_table(calibration: Calibration, case: CaseResult | None = None) -
     places = "".join(f"{y / 1e6:10.4f} " for y in nodes[0][:, 1])
     lines += [f"Y= (METERS) {places}", "UPPER NUMBER IN X, LOWER NUMBER IN Y"]
     return [*lines, "* OUTSIDE THE RANGE MEASURED"] if outside else lines
-
-
-def _inside(polynomial: Polynomial, places_um: Floats) -> list[bool]:
-    """Say of places (n, 2) whether both coordinates were measured; beyond, the polynomials extrapolate."""
-    furthest = np.abs(polynomial.frame.arguments(places_um)).max(axis=1)
-    return [distance <= 1 + 1e-9 for distance in furthest.tolist()]
 
 
 def summary_page(calibration: Calibration) -> list[str]:
@@ -185,8 +178,8 @@ def summary_page(calibration: Calibration) -> list[str]:
         *linear_lines(combined.correction, combined.covariance),
     ]
     if nonlinear:
-        x, y = nonlinear.polynomial.coefficients
-        lines += ["", "NONLINEAR PARAMETERS", *polynomial_lines(x, y, nonlinear.covariance)]
+        polynomial = polynomial_lines(nonlinear.polynomial, nonlinear.covariance)
+        lines += ["", "NONLINEAR PARAMETERS", *polynomial]
     return lines
 
 
@@ -269,9 +262,7 @@ def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
     ]
     polynomial = correction.polynomial
     if calibration.nonlinear and polynomial is not None:
-        x, y = polynomial.coefficients
-        covariance = joint.sigma0**2 * polynomial.cofactors
-        lines += ["", *polynomial_lines(x, y, covariance)]
+        lines += ["", *polynomial_lines(polynomial, joint.sigma0**2 * polynomial.cofactors)]
     for plate, own in joint.plates.items():
         lines += ["", f"CORRECTIONS OF GRID {plate} IN ITS OWN AXES (MICRONS)", *_grid(own)]
     return lines

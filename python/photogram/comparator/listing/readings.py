@@ -10,16 +10,19 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.comparator.averages import LocationAverages
-from photogram.comparator.case import exchanged
-from photogram.comparator.closeout import Closeout
+from photogram.comparator.case import Closeout, exchanged
 from photogram.comparator.grid import Grid
-from photogram.comparator.listing.forms import centred, nearest, number
+from photogram.comparator.listing.forms import centred, nearest, number, sums
 from photogram.comparator.pointing import Precision
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, CaseResult, PlateResult
 
 COLUMNS = 3  # Readings in a line of the input listing
+
+
+# Remarks of the program of 1971
+PRINTED = frozenset(f"comparators.{name}" for name in ("special-grid", "legs", "identical", "no-closeout"))
 
 
 def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
@@ -32,10 +35,11 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
     operators = "".join(f"{case.number:4d}" for case in calibration.cases)
     named = "".join(f"{case.placed.case.operator:4d}" for case in calibration.cases)
     stage = " SECONDARY STAGE" if session.secondary else ""
+    words = ("NO", "YES")
     settings = [
-        ("LEFT HANDED DATA", _yes(left_handed)),
-        ("INPUT DATA IS IN SORT", _yes(session.sorted_input)),
-        ("LEAST COUNT OF ONE MICRON", _yes(session.least_count_one_micrometre)),
+        ("LEFT HANDED DATA", words[left_handed]),
+        ("INPUT DATA IS IN SORT", words[session.sorted_input]),
+        ("LEAST COUNT OF ONE MICRON", words[session.least_count_one_micrometre]),
         ("COMPARATOR NUMBER", f"{session.comparator}{stage}"),
         ("CASE", operators),
         ("OPERATOR NUMBER", named),
@@ -52,13 +56,8 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
 
 def _printed(calibration: Calibration) -> list[str]:
     """Return the remarks of the program itself, which are in capitals; that on placements has its page."""
-    remarks = [str(each.text) for each in calibration.messages if each.code != "comparator.rotations"]
-    found = [text.upper() for text in remarks if (own := text.split(": ", 1)[-1]) == own.upper()]
-    return ["", *(f"  {text}" for text in found)] if found else []
-
-
-def _yes(value: bool) -> str:
-    return "YES" if value else "NO"
+    remarks = [str(message.text).upper() for message in calibration.messages if message.code in PRINTED]
+    return ["", *(f"  {text}" for text in remarks)] if remarks else []
 
 
 def _grid(grid: Grid, left_handed: bool) -> list[str]:
@@ -146,7 +145,8 @@ def _page(
     counts = f"({cases} CASES, {operators} OPERATORS)"
     ellipse = (
         f"ERROR ELLIPSE OF A POINTING (39 PERCENT): SEMI-AXES {total.ellipse.major_um:.3f} AND"
-        f" {total.ellipse.minor_um:.3f} MICRONS, MAJOR AXIS {_degrees(total):.1f} DEGREES FROM X TOWARD Y"
+        f" {total.ellipse.minor_um:.3f} MICRONS, MAJOR AXIS {math.degrees(total.ellipse.angle_rad):.1f}"
+        " DEGREES FROM X TOWARD Y"
         if total.degrees_of_freedom > 0
         else "NO REPEATED READINGS"
     )
@@ -161,10 +161,6 @@ def _page(
         f"BASIS / {basis} {counts}",
         ellipse,
     ]
-
-
-def _degrees(precision: Precision) -> float:
-    return precision.ellipse.angle_rad * 57.29577951308232
 
 
 def _row(name: str, own: Precision, mean_x: float | None = None, mean_y: float | None = None) -> str:
@@ -187,7 +183,7 @@ def averages_page(title: str, result: PlateResult) -> list[str]:
     """Return a page of average residuals of one plate."""
     averages, listed = result.averages, result.listed
     first = averages.by_location[0] if averages.by_location else None
-    located = _located(first) if first else {}
+    located = dict(zip(first.locations.tolist(), first.residuals_um.tolist(), strict=True)) if first else {}
     rows = zip(averages.points.tolist(), averages.xy_um.tolist(), averages.grid_um.tolist(), strict=True)
     lines = []
     for point, (x, y), (grid_x, grid_y) in rows:
@@ -214,9 +210,9 @@ def averages_page(title: str, result: PlateResult) -> list[str]:
         *lines,
         *(line for place in averages.by_location[1:] for line in _elsewhere(place)),
         "",
-        _sums("SUM VV", (*of_locations, *squares)),
+        sums("SUM VV", (*of_locations, *squares), 45, 14),
         f"  N = {points}" if places in (0, points) else f"  N = {places} LOCATIONS, {points} POINTS",
-        _sums("SIGMA", sigmas),
+        sums("SIGMA", sigmas, 45, 14),
         f"  STANDARD DEVIATION{number(listed.mean_comparator_um, 43, 4)}{number(listed.mean_grid_um, 47, 4)}",
         "",
         f"RANDOM ERRORS SIGMA X = {number(random_x, 8, 4)}   SIGMA Y = {number(random_y, 8, 4)}",
@@ -227,10 +223,6 @@ def averages_page(title: str, result: PlateResult) -> list[str]:
         "NOTE - GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF ALL AVERAGE RESIDUALS ARE COMPUTED FROM A",
         "       MULTIPLE OF FOUR EXACTLY 90 DEGREE ROTATION CASES.",
     ]
-
-
-def _located(place: LocationAverages) -> dict[int, list[float]]:
-    return dict(zip(place.locations.tolist(), place.residuals_um.tolist(), strict=True))
 
 
 def _elsewhere(place: LocationAverages) -> list[str]:
@@ -245,8 +237,3 @@ def _elsewhere(place: LocationAverages) -> list[str]:
             for location, (x, y), (vx, vy) in rows
         ),
     ]
-
-
-def _sums(name: str, values: Iterable[float]) -> str:
-    x, y, grid_x, grid_y = (number(value, 11, 4) for value in values)
-    return f"  {name:<45}{x}{y}{'':14}{grid_x}{grid_y}"

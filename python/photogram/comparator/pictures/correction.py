@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.listing.parameters import table_nodes
-from photogram.comparator.pictures.style import MAIN, MM, OF_COMPARATOR, plan
+from photogram.comparator.pictures.vectors import MAIN, MM, OF_COMPARATOR, plan
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Contours, Line, Mark, Markers, Shades

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import (
+from photogram.comparator.pictures.vectors import (
     ACCENT,
     MAIN,
     MM,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, MAIN
+from photogram.comparator.pictures.vectors import ACCENT, MAIN
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Line, Polygons, Texts, boxes
 from photogram.show.sketch.plot import Plot

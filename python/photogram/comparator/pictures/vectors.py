@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.case import exchanged
-from photogram.comparator.pictures.style import (
-    ACCENT,
-    MM,
-    OF_COMPARATOR,
-    OF_PLATE,
-    PANELS_ACROSS,
-    arrows,
-    limits_of,
-    magnification,
-    plan,
-)
 from photogram.comparator.pointing import Ellipse
+from photogram.errors import InputError
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import around
-from photogram.show.sketch.marks import Ellipses, Names
+from photogram.show.sketch.declared import Panel, around
+from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot, side_by_side
-from photogram.show.style import FAINT, SOFT
+from photogram.show.style import BLUE, FAINT, SOFT, VERMILION
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -114,7 +106,7 @@ def joint_grid(calibration: Calibration, plate: int) -> Plot:
     """Draw the corrections of the grid by the joint adjustment, with their standard ellipses."""
     joint = calibration.joint
     if joint is None:
-        raise ValueError("there is no joint adjustment")
+        raise InputError(phrase("comparators.no-joint"))
     own = joint.plates[plate]
     grid = calibration.session.grids[plate]
     places = grid.xy_um[grid.rows_of(own.points)]
@@ -135,3 +127,46 @@ def joint_grid(calibration: Calibration, plate: int) -> Plot:
     key = scale, round_length(float(np.hypot(*own.corrections_um.T).max()))
     title = f"Corrections of grid {plate} by the joint adjustment, standard ellipses"
     return Plot(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, key)])
+
+
+MAIN, ACCENT = BLUE, VERMILION
+MM = 1000.0
+PANELS_ACROSS = 4
+OF_PLATE = ("X of the plate, mm", "Y of the plate, mm")
+OF_COMPARATOR = ("x, mm", "y, mm")
+
+
+def plan(
+    limits: Floats,
+    marks: Sequence[Mark],
+    title: str,
+    axes: tuple[str, str],
+    key: tuple[float, float] | None = None,
+) -> Panel:
+    """Return a map of equal scales; `key`: mm for a micrometre, and micrometres that are shown."""
+    bars = [(key[0] * key[1], ACCENT, f"{key[1]:g} µm")] if key else []
+    return Panel(limits, marks, title, *axes, equal=True, bars=bars)
+
+
+def magnification(places_mm: Floats, vectors_um: Floats) -> float:
+    """Return millimetres of the picture a micrometre: the longest vector almost spans the spacing."""
+    longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
+    return 0.9 * spacing(places_mm) / longest if longest > 0 else 1.0
+
+
+def spacing(places: Floats) -> float:
+    """Return how far places are apart, which fill a square."""
+    extent = float(np.ptp(places, axis=0).max()) or 1.0
+    return extent / max(math.sqrt(len(places)) - 1, 1)
+
+
+def arrows(places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> list[Mark]:
+    """Return vectors from places, `scale` millimetres of the picture for each micrometre."""
+    places = places_um / MM
+    dots = Markers(places, ".", 5.0, FAINT, layer=1.0)
+    return [dots, Arrows(places, vectors_um * scale, colour, 0.006)]
+
+
+def limits_of(places_um: Floats, vectors_um: Floats, scale: float) -> Floats:
+    """Return the limits of a map of vectors."""
+    return around(np.vstack([places_um / MM, places_um / MM + vectors_um * scale]))

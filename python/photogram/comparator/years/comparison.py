@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration
-from photogram.comparator.correction import Correction
-from photogram.comparator.grid import Grid
-from photogram.comparator.gridfile import corrected
+from photogram.comparator.correction import Correction, partials_of
+from photogram.comparator.grid import Grid, with_corrections
 from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.record import RecordedCalibration
@@ -31,6 +31,7 @@ from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
+from photogram.words import phrase
 
 DEGREE = 4
 NODES = 7  # In each direction: what is taken apart is a polynomial of fourth degree
@@ -57,7 +58,7 @@ def common_range(records: Sequence[RecordedCalibration]) -> Frame:
     low = np.max([each.low_um for each in identities if each], axis=0)
     high = np.min([each.high_um for each in identities if each], axis=0)
     if not (low < high).all():
-        raise InputError(f"the calibrations of {records[0].comparator} have no range of readings in common")
+        raise InputError(phrase("comparators.no-range", name=records[0].comparator))
     return Frame.of(np.array([low, high]))
 
 
@@ -67,17 +68,13 @@ def quantities_of(
     covariance: Floats,
     frame: Frame,
 ) -> Quantities:
-    """Return what is compared of one comparator, over the range that its calibrations have in common.
-
-    The corrections are those that were adjusted together, with the covariance (k, 21, k, 21) of their
-    parameters.
-    """
+    """Return what is compared of one comparator, over the range that its calibrations have in common."""
     bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
     taken, names, units = _figures(frame, bent)
     nodes, apart = _apart(frame)
     values, jacobians = [], []
     for each in corrections:
-        by_parameters, _ = each._partials(nodes)
+        by_parameters, _ = partials_of(each, nodes)
         coefficients = apart @ (each.apply(nodes) - nodes)
         values.append(taken @ coefficients.ravel())
         jacobians.append(
@@ -136,28 +133,24 @@ def _precision(records: Sequence[RecordedCalibration]) -> tuple[Floats, Floats, 
     A standard deviation from f degrees of freedom has a logarithm of variance 1 / (2 f). That of the
     comparator itself is what pointings leave of the means, with the variance of both.
     """
-    names, values, variances = [], [], []
-    if all(each.pointing_freedom > 0 and min(each.pointing_um) > 0 for each in records):
-        for axis in (0, 1):
-            names.append(f"pointing in {'xy'[axis]}")
-            values.append([math.log(each.pointing_um[axis]) for each in records])
-            variances.append([0.5 / each.pointing_freedom for each in records])
-    if all(each.random_um > LEAST_UM for each in records):
-        names.append("random comparator")
-        values.append([math.log(each.random_um) for each in records])
-        variances.append([0.5 / each.freedom * _share(each) ** 2 for each in records])
-    logs, scatter = (
-        np.array(values).reshape(-1, len(records)).T,
-        np.array(variances).reshape(-1, len(records)).T,
-    )
-    return PERCENT * (logs - logs.mean(axis=0)), PERCENT**2 * scatter, tuple(names)
+    rows: dict[str, list[tuple[float, float]]] = {}
+    if all(record.pointing_freedom > 0 and min(record.pointing_um) > 0 for record in records):
+        for axis, name in enumerate("xy"):
+            rows[f"pointing in {name}"] = [
+                (record.pointing_um[axis], 0.5 / record.pointing_freedom) for record in records
+            ]
+    if all(record.random_um > LEAST_UM for record in records):
+        rows["random comparator"] = [(record.random_um, _variance(record)) for record in records]
+    pairs = np.array([*rows.values()]).reshape(-1, len(records), 2)
+    logs, variances = np.log(pairs[..., 0]).T, pairs[..., 1].T
+    return PERCENT * (logs - logs.mean(axis=0)), PERCENT**2 * variances, tuple(rows)
 
 
-def _share(record: RecordedCalibration) -> float:
-    """Return the variance of a mean reading over that of the comparator in it."""
+def _variance(record: RecordedCalibration) -> float:
+    """Return the variance of the logarithm of the standard deviation of the comparator."""
     counts = np.concatenate([case.counts for case in record.cases])
     pointing = float(np.mean(np.square(record.pointing_um)) * (1 / counts).mean())
-    return 1 + pointing / record.random_um**2
+    return 0.5 / record.freedom * (1 + pointing / record.random_um**2) ** 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -230,17 +223,22 @@ def compare(
         The measurements do not determine the unknowns.
     """
     records: list[RecordedCalibration] = []
-    for place, each in enumerate(calibrations, 1):
+    for number, each in enumerate(calibrations, 1):
         if isinstance(each, Calibration):
-            records.append(RecordedCalibration.of(each, f"calibration {place}"))
+            records.append(RecordedCalibration.of(each, f"calibration {number}"))
+        elif isinstance(each, RecordedCalibration):
+            records.append(each)
         else:
-            records += (
-                [each] if isinstance(each, RecordedCalibration) else RecordedCalibration.read(Path(each))
-            )
+            records += RecordedCalibration.read(Path(each))
     if len(records) < 2:
-        raise InputError("a comparison needs two calibrations at least")
-    records.sort(key=lambda each: each.day)
-    _refuse_twice(records)
+        raise InputError(phrase("comparators.two"))
+    records.sort(key=lambda record: record.day)
+    for first, second in combinations(records, 2):
+        if first.day == second.day and all(
+            np.array_equal(case.means_um, other.means_um)
+            for case, other in zip(first.cases, second.cases, strict=False)
+        ):
+            raise InputError(phrase("comparators.same", first=first.name, second=second.name))
     together = adjust_together(records)
     corrections = _corrections(records, together)
     histories, ranges = {}, {}
@@ -257,16 +255,6 @@ def compare(
         grids={plate: _certified(records, together, plate) for plate in together.grids},
         operators=_operators(records),
     )
-
-
-def _refuse_twice(records: Sequence[RecordedCalibration]) -> None:
-    for k, first in enumerate(records):
-        for second in records[k + 1 :]:
-            if first.day == second.day and all(
-                own.means_um.shape == other.means_um.shape and (own.means_um == other.means_um).all()
-                for own, other in zip(first.cases, second.cases, strict=False)
-            ):
-                raise InputError(f"{first.name} and {second.name} are the same calibration")
 
 
 def _corrections(records: Sequence[RecordedCalibration], together: Together) -> list[Correction]:
@@ -319,7 +307,7 @@ def _certified(records: Sequence[RecordedCalibration], together: Together, plate
     days = [each.day.isoformat() for each in records if plate in each.grids]
     sigma = math.sqrt(float(np.diag(together.covariance_um2[plate]).mean()))
     when = f"{days[0]} to {days[-1]}, {len(days)} calibrations"
-    return corrected(grid, grid.points, together.corrections_um[plate], sigma, when)
+    return with_corrections(grid, grid.points, together.corrections_um[plate], sigma, when)
 
 
 def _operators(records: Sequence[RecordedCalibration]) -> dict[int, tuple[float, float, int]]:

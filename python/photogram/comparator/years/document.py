@@ -13,7 +13,7 @@ from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.comparator.years import Comparison
@@ -79,23 +79,23 @@ def comparison_findings(comparison: Comparison) -> Findings:
     ]
     values = np.concatenate([own.ravel() for each in comparison.together.standardized for own in each])
 
-    def name(index: tuple[int, ...]) -> str:
+    def name(index: tuple[int, ...]) -> Phrase:
         record, case, point, axis = places[index[0]]
-        return f"{axis} of point {point} of case {case} of {record}"
+        return phrase("comparators.axis-of-record", axis=axis, point=point, case=case, record=record)
 
     test = comparison.together.test
     wrong = test.problem() is not None
     return Findings(
         status="converged",
-        observations=[Tested("readings of the grids", values, name, "w")],
+        observations=[Tested(phrase("comparators.all-readings"), values, name, "w")],
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
-        spoiled=Phrase("harmful.grids") if wrong else "",
+        spoiled=phrase("harmful.grids") if wrong else "",
         changed=changed_of(comparison.histories),
         systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
         remarks=unchanged_of(comparison.histories),
-        if_usable=[Phrase("advice.adjusted-grid")],
-        if_withheld=[Phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
+        if_usable=[phrase("advice.adjusted-grid")],
+        if_withheld=[phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
     )
 
 

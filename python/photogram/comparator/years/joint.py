@@ -17,16 +17,17 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.comparator.case import exchanged
-from photogram.comparator.correction import PARAMETERS
+from photogram.comparator.correction import PARAMETERS, parameters_of, partials_of
 from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.grid import Grid
 from photogram.comparator.years.record import RecordedCalibration, RecordedCase
 from photogram.errors import AdjustmentError, InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     # Every given coordinate is an observation and an unknown.
     test = global_test(squares, count - sum(each.unknowns for each in reduced))
     if test is None:
-        raise AdjustmentError("the calibrations have as many unknowns as observations")
+        raise AdjustmentError(phrase("comparators.no-redundancy"))
     scale = test.variance
     places = {
         plate: slice(2 * starts[plate], 2 * (starts[plate] + len(grid.points)))
@@ -99,8 +100,8 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     }
     return Together(
         parameters=[
-            _parameters(record) + _spread(each, own[: len(each.active)])
-            for record, each, own in zip(records, reduced, values, strict=True)
+            parameters_of(record.correction) + _spread(each.active, steps[: len(each.active)])
+            for record, each, steps in zip(records, reduced, values, strict=True)
         ],
         covariance=scale * _covariance(reduced, back, cofactors),
         grids=grids,
@@ -113,38 +114,21 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
 
 def _grids(records: Sequence[RecordedCalibration]) -> dict[int, Grid]:
     """Return all plates with all points that anybody measured, as the first calibrations took them."""
-    found: dict[int, Grid] = {}
+    plates: dict[int, Grid] = {}
     for record in records:
         for plate, grid in record.grids.items():
-            if plate not in found:
-                found[plate] = grid
-                continue
-            own = found[plate]
+            own = plates.setdefault(plate, grid)
             there = np.isin(grid.points, own.points)
             given = own.xy_um[own.rows_of(grid.points[there])] * _growth(own, grid)
             if there.any() and np.abs(given - grid.xy_um[there]).max() > SAME_UM:
-                raise InputError(
-                    f"plate {plate} has other coordinates in {record.name} than before: give all calibrations"
-                    " the same ones"
-                )
-            found[plate] = _joined(own, grid, ~there)
-    return found
+                raise InputError(phrase("comparators.other-grid", name=record.name, plate=plate))
+            points = np.concatenate([own.points, grid.points[~there]])
+            more = grid.xy_um[~there] / _growth(own, grid)
+            plates[plate] = replace(own, points=points, xy_um=np.vstack([own.xy_um, more]))
+    return plates
 
 
-SAME_UM = 1e-3  # Given coordinates of a plate may differ by rounding
-
-
-def _joined(own: Grid, other: Grid, new: Bools) -> Grid:
-    return Grid(
-        own.number,
-        np.concatenate([own.points, other.points[new]]),
-        np.vstack([own.xy_um, other.xy_um[new] / _growth(own, other)]),
-        own.sigma_um,
-        own.adopted,
-        None,
-        own.temperature_c,
-        own.expansion_per_k,
-    )
+SAME_UM = 1e-3  # rounding of given coordinates of a plate
 
 
 def _growth(own: Grid, other: Grid) -> float:
@@ -192,7 +176,7 @@ def _equations(
     rows = grid.rows_of(case.points)
     given = exchanged(grid.xy_um[rows] * _growth(grid, record.grids[case.plate]), case.left_handed)
     correction = record.correction
-    by_parameters, by_reading = correction._partials(case.means_um)
+    by_parameters, by_reading = partials_of(correction, case.means_um)
     corrected = correction.apply(case.means_um)
     turn = rotation_matrix(case.rotation_rad)
     # A shift of the corrected readings is one of the case: both count from its middle.
@@ -213,7 +197,7 @@ def _inverse(normal: Floats, what: str) -> Floats:
     try:
         root = np.linalg.cholesky(normal / np.outer(scale, scale))
     except np.linalg.LinAlgError:
-        raise AdjustmentError(f"the measurements do not determine the unknowns of {what}") from None
+        raise AdjustmentError(phrase("comparators.undetermined", what=what)) from None
     inverse = np.linalg.inv(root)
     return np.asarray((inverse.T @ inverse) / np.outer(scale, scale))
 
@@ -250,15 +234,9 @@ def _residuals(
     return standardized, squares, count
 
 
-def _parameters(record: RecordedCalibration) -> Floats:
-    own = record.correction
-    coefficients = np.zeros(18) if own.polynomial is None else own.polynomial.scaled_um.ravel()
-    return np.concatenate([[own.scale_x, own.scale_y, own.nonorthogonality_rad], coefficients])
-
-
-def _spread(each: _Reduced, values: Floats) -> Floats:
+def _spread(active: Indices, values: Floats) -> Floats:
     full = np.zeros(PARAMETERS)
-    full[each.active] = values
+    full[active] = values
     return full
 
 

@@ -20,7 +20,7 @@ from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import quoted
+from photogram.words import phrase
 
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
 OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
@@ -128,33 +128,28 @@ class RecordedCalibration:
 
 def day_of(text: str) -> date:
     """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it."""
-    written = text.strip()
-    if found := ISO.match(written):
-        year, month, day = (int(part) for part in found.groups())
-    elif found := OF_THE_REPORT.match(written):
-        month, day, year = (int(part) for part in found.groups())
-        if len(found[3]) == 2:
+    year = month = day = 0
+    if match := ISO.match(text.strip()):
+        year, month, day = map(int, match.groups())
+    elif match := OF_THE_REPORT.match(text.strip()):
+        month, day, year = map(int, match.groups())
+        if len(match[3]) == 2:
             year += 1900 if year >= FIRST_YEAR else 2000
-    else:
-        raise InputError(
-            f"the date of the calibration is {quoted(text)}: '# date = 1972-07-17' or 7/17/72 (month first)"
-            " says it"
-        )
     try:
         return date(year, month, day)
-    except ValueError as error:
-        raise InputError(f"the date of the calibration is {quoted(text)}: {error}") from None
+    except ValueError:
+        raise InputError(phrase("comparators.date", date=text)) from None
 
 
 def _from_document(document: Any, name: str) -> RecordedCalibration:
     if document.get("usable") is False:
-        raise InputError("holds a calibration whose correction is withheld: see its messages")
+        raise InputError(phrase("comparators.withheld"))
     joint = document["joint"]
     if joint is None or joint["correction"] is None:
-        raise InputError("holds a calibration without a joint adjustment: nothing to compare")
+        raise InputError(phrase("comparators.no-joint"))
     correction = Correction.from_document(joint["correction"])
     if correction.identity is None:
-        raise InputError("holds a calibration that does not say of which comparator it is")
+        raise InputError(phrase("comparators.no-identity"))
     counts = {(each["case"], each["point"]): each["readings"] for each in document["pointing"]["points"]}
     total = document["pointing"]["total"]
     freedom = int(total["degrees_of_freedom"])
@@ -165,8 +160,8 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
     }
     cases = tuple(_case(each, placed[each["case"]], counts) for each in document["cases"])
     for case in cases:
-        if not np.isin(case.points, grids[case.plate].points).all():
-            raise ValueError(f"case {case.number} has points that plate {case.plate} has not")
+        if (missing := np.setdiff1d(case.points, grids[case.plate].points)).size:
+            raise InputError(phrase("comparators.no-point", plate=case.plate, point=int(missing[0])))
     return RecordedCalibration(
         name=name,
         day=day_of(str(document["date"])),
@@ -190,31 +185,31 @@ def _pair(values: Any) -> tuple[float, float]:
 def _finite(value: Any) -> float:
     number = float(value)
     if not math.isfinite(number):
-        raise ValueError(f"{number} is no finite number")
+        raise InputError(phrase("error.finite", value=number))
     return number
 
 
 def _positive(value: Any) -> float:
-    number = _finite(value)
-    if number <= 0:
-        raise ValueError(f"{number:g} is not positive")
+    if (number := _finite(value)) <= 0:
+        raise InputError(phrase("error.positive", value=number))
     return number
 
 
 def _operators(members: Iterable[Any]) -> dict[int, tuple[float, float, int]]:
-    found = {}
-    for each in members:
-        if (freedom := int(each["degrees_of_freedom"])) > 0:
-            x, y = _pair(each["sd_um"])
-            found[int(each["operator"])] = (x**2, y**2, freedom)
-    return found
+    operators = {}
+    for member in members:
+        if (freedom := int(member["degrees_of_freedom"])) > 0:
+            x, y = _pair(member["sd_um"])
+            operators[int(member["operator"])] = (x**2, y**2, freedom)
+    return operators
 
 
 def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> RecordedCase:
     points = np.array(members["points"], dtype=np.int64)
     means = np.array(members["means_um"], dtype=float)
     if means.shape != (len(points), 2) or not np.isfinite(means).all():
-        raise ValueError(f"case {members['case']} has not two coordinates for each of its points")
+        name = phrase("comparators.case", case=int(members["case"]))
+        raise InputError(phrase("error.at", what=name, message=phrase("comparators.grid-shape")))
     return RecordedCase(
         number=int(members["case"]),
         operator=int(members["operator"]),

@@ -1,11 +1,11 @@
 """Calibrations of cameras compared: histories of each camera that was calibrated more than once.
 
-What is compared does not depend on the model of a camera and its balance. Principal distance and radial terms
-share what they explain, and laboratories balance curves differently: parameters cannot be compared. In the
-field that all calibrations have in common, up to the angle alpha, the images of directions are taken apart
-into fields that are orthogonal over a disc: a shift, a scale (the principal distance that suits the whole
-field), the radial shapes R_3, R_5, R_7 of Zernike, decentring, affinity and shear. With
-rho = tan(angle) / tan(alpha) each has the length 1 at the edge, where rho = 1.
+The comparison does not depend on the model of a camera and its balance: principal distance and radial terms
+are correlated, and laboratories balance curves differently, so parameters cannot be compared. In the field of
+all calibrations, up to the angle alpha, the images of directions are decomposed into orthogonal fields over a
+disc: a shift, a scale (principal distance of the whole field), the radial shapes R_3, R_5, R_7 of Zernike,
+decentring, affinity and shear. With rho = tan(angle) / tan(alpha) each has the length 1 at the edge, where
+rho = 1.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import listed
 from photogram.network.cameras import Camera
 from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
@@ -28,18 +27,16 @@ from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
+from photogram.words import Phrase, phrase
 
-NODES = 9
-"""Radii, by Gauss and Legendre."""
+NODES = 9  # radii, by Gauss and Legendre
 AZIMUTHS = 12
-STEP = 0.01
-"""Of differences, in standard deviations."""
+STEP = 0.01  # of differences, in standard deviations
 UM = 1e3
-"""In a millimetre."""
 LEAST = 1e-4
-"""Part of the largest of the other standard deviations below which a figure is held, not estimated."""
+"""Least standard deviation of an estimated figure, in parts of the largest of the others."""
 ALONE = 1e-3
-"""Part of its standard deviation that the figures before it must leave a figure."""
+"""Least part of the standard deviation of a figure that is independent of the figures before it."""
 
 _RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
 """Coefficients of rho, rho^3, ...: R_1, which is rho, R_3, R_5, R_7."""
@@ -53,7 +50,7 @@ class CameraFigures:
     covariances: Floats
     names: tuple[str, ...]
     units: tuple[str, ...]
-    held: tuple[str, ...]  # Names of what some calibrations estimated, and others held: it cannot be compared
+    held: tuple[str, ...]  # Names of figures that only some calibrations estimated: they cannot be compared
 
 
 def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
@@ -63,7 +60,7 @@ def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
     """
     units = {each.unit for each in cameras}
     if len(units) > 1:
-        raise InputError(f"calibrations of {cameras[0].title} are in mm and in px: they cannot be compared")
+        raise InputError(phrase("films.two-units", camera=cameras[0].title))
     directions, apart = _apart(angle)
     names, factors, of_units = _named(cameras[0].unit == "mm", angle)
     values, roots = [], []
@@ -83,7 +80,7 @@ def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
 
 
 def _estimated(root: Floats) -> Bools:
-    """Return which figures have variances of their own: those of held terms follow others, by very little."""
+    """Return which figures are estimated: those of fixed terms depend on others, with small variances."""
     sd = np.linalg.norm(root, axis=1)
     found: Bools = sd > LEAST * sd.max()
     before = np.zeros((0, root.shape[1]))
@@ -97,7 +94,7 @@ def _estimated(root: Floats) -> Bools:
 
 
 def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
-    """Return names, factors to the units in which people read them, and these, in the order of fields."""
+    """Return names, factors to the units of tables, and these units, in the order of fields."""
     names = ["principal distance", "shift x", "shift y", "radial 3", "radial 5", "radial 7"]
     names += ["decentring x", "decentring y", "affinity", "shear"]
     small = UM if metric else 1.0
@@ -106,7 +103,7 @@ def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
 
 
 def _apart(angle: float) -> tuple[Floats, Floats]:
-    """Return directions (n, 3), and what takes their images apart: (10, 2n), without a turn."""
+    """Return directions (n, 3), and the decomposition (10, 2n) of their images, without a rotation."""
     rho = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
     azimuth = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
     r, a = (each.ravel() for each in np.meshgrid(rho, azimuth))
@@ -129,10 +126,10 @@ def _with_root(camera: Camera, directions: Floats, apart: Floats) -> tuple[Float
     """Return the figures of a camera, and F of their covariance F F'."""
 
     def at(changes: dict[str, float]) -> Floats:
-        own = camera.replace(parameters={**camera.parameters, **changes}) if changes else camera
-        images = own.project(directions)
+        changed = camera.replace(parameters={**camera.parameters, **changes}) if changes else camera
+        images = changed.project(directions)
         if not np.isfinite(images).all():
-            raise InputError(f"the camera {camera.title} has no image within the angle that is compared")
+            raise InputError(phrase("films.no-image", camera=camera.title))
         return apart @ (images * [1.0, -1.0 if camera.image_y == "down" else 1.0]).ravel()
 
     assert camera.covariance is not None
@@ -173,9 +170,10 @@ class DatedCamera:
 
     def __post_init__(self) -> None:
         if self.camera.covariance is None:
-            raise InputError(f"the camera {self.camera.title} has no covariance matrix to compare by")
+            raise InputError(phrase("films.no-covariance", camera=self.camera.title))
         if self.angle is not None and not 0 < self.angle < math.pi / 2:
-            raise InputError(f"the angle from the axis is between 0 and 90 degrees, not {self.angle} rad")
+            limits = phrase("error.range", low="0", high="pi/2", value=self.angle)
+            raise InputError(phrase("error.at", what="angle", message=limits))
 
     @classmethod
     def of(cls, certificate: Certificate, terms: int | None = None) -> DatedCamera:
@@ -187,7 +185,7 @@ class DatedCamera:
             It has no date, or no focal length.
         """
         if certificate.day is None:
-            raise InputError(f"the certificate {certificate.name} has no date", file=certificate.file)
+            raise InputError(phrase("films.undated", certificate=certificate.name), file=certificate.file)
         angle = None if certificate.radial is None else float(certificate.radial.angle.max())
         source = certificate.file.stem if certificate.file else certificate.name
         return cls(certificate.day, certificate.camera(terms=terms), angle, source)
@@ -206,13 +204,13 @@ class CameraComparison(Documented, Judged, Brief):
     angles
         rad from the axis up to which each was compared.
     remarks
-        What could not be compared, as sentences.
+        Remarks on figures that could not be compared.
     """
 
     calibrations: tuple[DatedCamera, ...]
     histories: Mapping[str, History]
     angles: Mapping[str, float]
-    remarks: tuple[str, ...]
+    remarks: tuple[Phrase, ...]
 
     def document(self) -> Document:
         """Return the document of the comparison: changes, control charts, calibrations, all values."""
@@ -249,20 +247,20 @@ def compare_cameras(
         of several units; an angle that nothing says.
     """
     records = sorted(_dated(calibrations), key=lambda each: each.day)
-    remarks: list[str] = []
+    remarks: list[Phrase] = []
     histories, angles = {}, {}
     for title in dict.fromkeys(each.camera.title for each in records):
         name, own = f"camera {title}", [each for each in records if each.camera.title == title]
         if len(own) < 2:
-            remarks.append(f"{name} has one calibration only")
+            remarks.append(phrase("films.single-calibration", camera=name))
             continue
         _refuse_twice(own)
         angles[name] = _common_angle(own, name) if angle is None else angle
         histories[name], held = _history(own, angles[name], level)
         if held:
-            remarks.append(f"{name}: not estimated by all, and so not compared: {listed(list(held))}")
+            remarks.append(phrase("films.not-compared", camera=name, figures=held))
     if not histories:
-        raise InputError("a comparison needs two calibrations of a camera at least")
+        raise InputError(phrase("films.two-calibrations"))
     return CameraComparison(tuple(records), histories, angles, tuple(remarks))
 
 
@@ -283,13 +281,13 @@ def _refuse_twice(records: Sequence[DatedCamera]) -> None:
     for k, first in enumerate(records):
         for second in records[k + 1 :]:
             if first.day == second.day and first.camera.parameters == second.camera.parameters:
-                raise InputError(f"{first.source} and {second.source} are the same calibration")
+                raise InputError(phrase("films.repeated", first=first.source, second=second.source))
 
 
 def _common_angle(records: Sequence[DatedCamera], name: str) -> float:
     known = [each.angle for each in records if each.angle is not None]
     if not known:
-        raise InputError(f"nothing says up to which angle {name} was calibrated: give one")
+        raise InputError(phrase("films.unknown-angle", camera=name))
     return min(known)
 
 

@@ -82,7 +82,7 @@ def comparison_document(comparison: CameraComparison) -> Document:
         members={
             "verdict": verdict.document(),
             "cameras": {part.title: record(part) for part in parts},
-            "remarks": list(comparison.remarks),
+            "remarks": [*map(str, comparison.remarks)],
         },
     )
 

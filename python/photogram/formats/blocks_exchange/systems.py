@@ -10,12 +10,13 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain.tables import covariances_of
+from photogram.formats.point_table import PointTable
 from photogram.formats.project import Frame
 from photogram.formats.xml_stream import Element
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed
-from photogram.network.observations import Control, Observation, Position
-from photogram.words import Phrase, option_sd
+from photogram.messages import Message
+from photogram.network.observations import Observation, Position
+from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "local"
 
@@ -66,10 +67,11 @@ class Systems:
                 centres = np.array([each.centre for each in photos])
                 known = centres[np.isfinite(centres).all(axis=1)]
                 if not len(known):
-                    raise InputError(f"no photo has a position in {definition}", file=photos[0].place.file)
+                    raise InputError(
+                        phrase("blocks-exchange.centres", crs=definition), file=photos[0].place.file
+                    )
                 self.frame = Frame("topocentric", "EPSG:4979", amid(definition, known))
-                text = f"positions in {definition} are adjusted in a frame that is {self.frame}"
-                messages.append(Message(text))
+                messages.append(Message(phrase("format.frame", crs=definition, frame=self.frame.phrase)))
         self.same = definition
 
     def definition(self, srs: str) -> str:
@@ -82,14 +84,12 @@ class Systems:
         if definition == self.same and (definition == LOCAL or definition.upper().startswith("ENU:")):
             return xyz, covariances
         if LOCAL in (definition, self.same):
-            raise InputError(
-                f"positions in {definition} have no place in the frame of the block, {self.same}"
-            )
+            raise InputError(phrase("blocks-exchange.systems", crs=definition, frame=self.same))
         from photogram.formats.crs import to_frame
 
         found, turned, remarks = to_frame(definition, xyz, covariances, self.frame)
-        known = {each.text for each in self.messages}
-        self.messages += [Message(text) for text in remarks if text not in known]
+        known = {message.phrase for message in self.messages}
+        self.messages += [Message(remark) for remark in remarks if remark not in known]
         return found, turned
 
     def poses(self, photos: list[PhotoRecord], centres: Floats, matrices: Floats) -> tuple[Floats, Floats]:
@@ -106,46 +106,30 @@ class Systems:
             centres[own] = self._carried(srs, centres[own], np.zeros((int(own.sum()), 3, 3)))[0]
         return centres, matrices
 
-    def points(
-        self, points: list[PointRecord], names: list[str]
-    ) -> tuple[Floats, Floats, Floats, Floats, list[Observation]]:
-        """Return starts, known positions and their standard deviations, and control with full covariances.
-
-        The second standard deviations are those of check points.
-        """
-        count = len(points)
-        starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
-        positions, check_sd = starts.copy(), starts.copy()
-        observed: list[Observation] = []
-        for srs in dict.fromkeys(each.srs for each in points):
-            rows = [row for row, each in enumerate(points) if each.srs == srs]
-            given = np.array([points[row].position for row in rows])
-            whole = np.isfinite(given).all(axis=1)
+    def points(self, records: list[PointRecord], names: list[str]) -> PointTable:
+        """Return the points, with control and check points."""
+        points = PointTable(names)
+        for srs in dict.fromkeys(record.srs for record in records):
+            rows = [row for row, record in enumerate(records) if record.srs == srs]
+            own = [records[row] for row in rows]
+            xyz = np.array([record.position for record in own])
+            whole = np.isfinite(xyz).all(axis=1)
             local = self.definition(srs) == self.same and self.frame.kind == "cartesian"
-            for k, row in enumerate(rows):
-                if not local and points[row].sd is not None and not whole[k]:
-                    text = "a part of a position cannot be carried into another system"
-                    raise points[row].place.error(text)
-            deviation = np.array([np.zeros(3) if points[row].sd is None else points[row].sd for row in rows])
-            found, turned = given.copy(), covariances_of(np.nan_to_num(deviation))
+            for record, complete in zip(own, whole, strict=True):
+                if not local and record.sd is not None and not complete:
+                    raise record.place.error(phrase("blocks-exchange.part"))
+            sd = np.array([np.zeros(3) if record.sd is None else record.sd for record in own])
+            covariances = covariances_of(np.nan_to_num(sd))
             if whole.any():
-                found[whole], turned[whole] = self._carried(srs, given[whole], turned[whole])
-            for k, row in enumerate(rows):
-                each = points[row]
-                starts[row] = found[k]
-                if each.sd is None:
-                    continue
-                positions[row] = found[k]
-                if each.check:
-                    variances = np.diag(turned[k])
-                    check_sd[row] = np.where(variances > 0, np.sqrt(variances), np.nan)
-                    continue
-                if (turned[k] == np.diag(np.diag(turned[k]))).all():
-                    sd[row] = np.where(np.isnan(found[k]), np.inf, np.sqrt(np.diag(turned[k])))
+                xyz[whole], covariances[whole] = self._carried(srs, xyz[whole], covariances[whole])
+            for row, record, position, covariance in zip(rows, own, xyz, covariances, strict=True):
+                if record.sd is None:
+                    points.starts[row] = position
+                elif record.check:
+                    points.check(row, position, np.diag(covariance))
                 else:
-                    positions[row] = np.nan
-                    observed.append(Control(names[row], found[k], covariance=(turned[k] + turned[k].T) / 2))
-        return starts, positions, sd, check_sd, observed
+                    points.control(row, position, covariance)
+        return points
 
     def gnss(self, photos: list[PhotoRecord], names: list[str], wishes: Wishes) -> list[Observation]:
         """Return positions that photos were given as observations, where there are standard deviations."""
@@ -170,5 +154,5 @@ class Systems:
                 continue
             found.append(Position(names[row], own[0], covariance=(turned[0] + turned[0].T) / 2))
         if lost:
-            self.messages.append(Message(f"GNSS positions in another system are left out: {listed(lost, 3)}"))
+            self.messages.append(Message(phrase("blocks-exchange.gnss", n=len(lost), names=lost)))
         return found

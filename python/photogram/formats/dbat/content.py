@@ -17,12 +17,13 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
+from photogram.formats.point_table import PointTable
 from photogram.formats.project import Options, Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 
 @dataclass(frozen=True)
@@ -75,11 +76,7 @@ def sensors_of_table(
     found = {}
     for camera, size, pixel in zip(cameras, sizes, pixels, strict=True):
         if size is None or pixel is None or camera.image_y != "up":
-            raise InputError(
-                f"the camera {camera.title} needs c, width, height and pixel_mm: measurements are in pixels,"
-                " its lens in mm",
-                file=path,
-            )
+            raise InputError(phrase("dbat.camera", camera=camera.title), file=path)
         found[camera.name] = Sensor(camera, size, pixel)
     return found
 
@@ -117,7 +114,7 @@ class Content:
 def project_of(content: Content, wishes: Wishes) -> Project:
     """Return the project; standard deviations of measurements that a user gives are in pixels, as these."""
     if not content.image_photos:
-        raise InputError("has no measurements in photos", file=content.path)
+        raise InputError(phrase("format.missing", what="image observations"), file=content.path)
     order = {number: row for row, number in enumerate(content.photos)}
     centres, matrices = np.full((len(order), 3), np.nan), np.full((len(order), 3, 3), np.nan)
     posed = [number for number in order if number in content.poses]
@@ -128,17 +125,16 @@ def project_of(content: Content, wishes: Wishes) -> Project:
         matrices[rows] = Attitudes.of("omega_phi_kappa", angles).matrices
     points = list(dict.fromkeys([*content.image_points, *content.control, *content.checks]))
     places = {number: row for row, number in enumerate(points)}
-    starts, positions = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.nan)
-    sd, check_sd = np.full((len(points), 3), np.inf), np.full((len(points), 3), np.nan)
+    table = PointTable([str(number) for number in points])
     for number, position in content.starts.items():
         if number in places:
-            starts[places[number]] = position
+            table.starts[places[number]] = position
     for number, position in content.checks.items():
-        starts[places[number]] = positions[places[number]] = position
-        check_sd[places[number]] = content.check_sd.get(number, np.nan)
+        table.starts[places[number]] = table.positions[places[number]] = position
+        table.check_sd[places[number]] = content.check_sd.get(number, np.nan)
     for number, (position, deviations) in content.control.items():
-        starts[places[number]] = positions[places[number]] = position
-        sd[places[number]] = deviations
+        table.starts[places[number]] = table.positions[places[number]] = position
+        table.sd[places[number]] = deviations
     sensors = list(content.sensors.values())
     sensor_rows = {name: row for row, name in enumerate(content.sensors)}
     photo_cameras = np.array([sensor_rows[content.cameras[number]] for number in order])
@@ -165,11 +161,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
         matrices=matrices,
         photo_position_sd=held,
         photo_attitude_sd=held,
-        point_ids=[str(number) for number in points],
-        starts=starts,
-        point_positions=positions,
-        point_sd=sd,
-        point_check_sd=check_sd,
+        **table.arguments(),
         image_photos=image_photos,
         image_points=np.array([places[number] for number in content.image_points], dtype=np.int64),
         image_xy=by_camera(content.pixels, of_images, lambda row, own: sensors[row].images(own)),
@@ -188,7 +180,5 @@ def _names(content: Content) -> list[str]:
         return short
     if all(whole) and len(set(whole)) == len(whole):
         return whole
-    content.messages.append(
-        Message(f"photos have their numbers as names: {listed(sorted(set(short)), 3)} do not tell them apart")
-    )
+    content.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
     return [str(number) for number in content.photos]

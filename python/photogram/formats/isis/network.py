@@ -12,6 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.pvl import Group
 from photogram.lazy_dataclasses import dataclass, field, fields
+from photogram.words import phrase
 
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
 """What types of points mean; `Tie` and `Ground` are what old networks have for `Free` and `Fixed`."""
@@ -56,8 +57,12 @@ _WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_cova
 _TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
 _CODES = {"types", "apriori_source", "apriori_radius_source"}
 _NO_COLUMNS = ("serials", "rest")
-_NAMES = ("ids", "serial", *_NO_COLUMNS)
-"""What is handed to the core apart from the columns of numbers."""
+_NAMES = ("ids", "serial", *_NO_COLUMNS)  # What is handed to the core apart from the columns of numbers
+
+
+def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
+    if np.shape(values) != shape:
+        raise InputError(phrase("format.shape", name=name, required=str(shape), got=str(np.shape(values))))
 
 
 class _Columns:
@@ -74,11 +79,8 @@ class _Columns:
             if each.name in _NO_COLUMNS:
                 continue
             shape = (rows, _WIDTHS[each.name]) if each.name in _WIDTHS else (rows,)
-            found = np.shape(getattr(self, each.name))
-            if found != shape:
-                raise InputError(f"{each.name} has the shape {found}, not {shape}")
-        if self.rest[1].shape != (rows + 1,):
-            raise InputError(f"rest begins in {len(self.rest[1])} places, not {rows + 1}")
+            _check_shape(each.name, getattr(self, each.name), shape)
+        _check_shape("rest[1]", self.rest[1], (rows + 1,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,8 +191,7 @@ class ControlNetwork:
     header_rest: bytes = b""
 
     def __post_init__(self) -> None:
-        if self.firsts.shape != (len(self.points) + 1,):
-            raise InputError(f"firsts has the shape {self.firsts.shape}, not {(len(self.points) + 1,)}")
+        _check_shape("firsts", self.firsts, (len(self.points) + 1,))
 
     @property
     def point_of_measure(self) -> NDArray[np.int64]:

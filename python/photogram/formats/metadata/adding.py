@@ -1,35 +1,47 @@
-"""Positions that files of photographs carry, as observations of a project."""
+"""Positions of photographs in their systems, as observations of a project and as plain tables."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import GnssFile, PhotoFiles, Wishes
-from photogram.formats.metadata.gnss_file import read_gnss_file
-from photogram.formats.metadata.merged import WITHOUT, Metadata, counts, read_metadata, remarks_on, told
-from photogram.formats.metadata.record import ELLIPSOIDAL
-from photogram.formats.metadata.rtklib import SOURCE as EVENTS
+from photogram.formats.metadata.merged import (
+    WITHOUT,
+    Metadata,
+    PhotoRecord,
+    counts,
+    read_gnss_file,
+    read_metadata,
+    remarks_on,
+    told,
+)
+from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, Said
+from photogram.formats.metadata.record import SOURCE as EVENTS
 from photogram.formats.metadata.search import Photos
-from photogram.formats.metadata.systems import GNSS_CRS, LEVER_SD, PHOTOS_CRS, SHIFT_SD, Located, located
 from photogram.formats.models import carried, is_free
+from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project
-from photogram.messages import Message, counted, listed
+from photogram.io.csv_text import csv_text
+from photogram.lazy_dataclasses import dataclass
+from photogram.messages import Message
+from photogram.network.geometry import Spheroid
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 SIMILAR = 10.0
 """How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
-DETERMINED = 3.0
-"""How much wider than their misfit positions must spread across their line to turn a model."""
+DETERMINED = 3.0  # How much wider than their misfit positions must spread across their line to turn a model
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
@@ -58,13 +70,10 @@ def with_gnss_file(
     ]
     messages = list(project.messages)
     if replaced := len(project.block.observations) - len(others):
-        text = f"{counted(replaced, 'observed position')} of the project are replaced by those of this file"
-        messages.append(Message(text, file.path))
+        messages.append(Message(phrase("photos.replaced", n=replaced), file.path))
     if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
-        text = "events belong to photos in their order"
-        if file.antenna is None:
-            text += "; they are antenna positions, and --gnss-antenna X,Y,Z gives the lever arm (assumed: 0)"
-        messages.append(Message(text, file.path))
+        code = "photos.events" if file.antenna else "photos.events-without-lever"
+        messages.append(Message.of(code, file.path))
     project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
     return _with_positions(project, metadata, keys, file.crs, sd, GNSS_CRS, file.antenna)
 
@@ -134,16 +143,12 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
             strange.append(name)
             continue
         if len(keys) > 1:
-            raise InputError(
-                f"the photo {name} may be {listed(keys, 3)}: photos need the names of their folders",
-                file=metadata.directory,
-            )
+            raise InputError(phrase("photos.ambiguous", photo=name, names=keys), file=metadata.directory)
         if name not in observed:
             found[name] = keys[0]
     if len(strange) == len(block.photo_ids):
         raise InputError(
-            f"holds none of the photos {listed(strange, 3)}, but {listed(list(metadata.photos), 3)}",
-            file=metadata.directory,
+            phrase("photos.none", names=strange, known=list(metadata.photos)), file=metadata.directory
         )
     return found
 
@@ -153,23 +158,16 @@ def _told(
 ) -> list[Message]:
     """Return what is said of positions that are observations: their sources, and what they have in common."""
     records = known.records
-    count = counted(len(records), "position")
     positions = told(counts(each.position for each in records))
-    deviations = counts(each.deviations for each in records)
-    given = deviations.pop(WITHOUT, 0)
-    said = [*([told(deviations)] if deviations else []), *([f"{given} given (--sd gnss)"] if given else [])]
-    text = f"{count} of photos are observations ({positions}); standard deviations: {', '.join(said)}"
-    found = [Message(text, metadata.directory)]
-    if flights := {each for each in known.flights if each}:
-        arm = f"a lever arm ({LEVER_SD:g} m)" if antenna is None else "the lever arm of the antenna"
-        found.append(
-            Message(
-                f"{counted(len(flights), 'flight')} of RTK: a shift ({SHIFT_SD:g} m a priori) and {arm}"
-                " for each, as standard deviations of receivers leave out the base and the"
-                " shutter's time"
-            )
-        )
-    return found
+    sources = counts(each.deviations for each in records)
+    specified = sources.pop(WITHOUT, 0)
+    deviations = [told(sources)] * bool(sources) + [f"{specified} of --sd gnss"] * bool(specified)
+    fields = {"n": len(records), "positions": positions, "deviations": deviations}
+    messages = [Message.of("photos.observed", metadata.directory, **fields)]
+    if flights := {flight for flight in known.flights if flight}:
+        code = "photos.flights" if antenna is None else "photos.flights-antenna"
+        messages.append(Message.of(code, n=len(flights), shift=SHIFT_SD, lever=LEVER_SD))
+    return messages
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
@@ -178,11 +176,11 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
     frame = project.frame
     if project.block.linear_unit != "m":
-        raise InputError("with positions of photos the unit of length is the metre", file=project.path)
+        raise InputError(phrase("photos.metres"), file=project.path)
     if not known.systems[0]:
         if frame.kind == "geographic":
-            raise InputError(f"positions of photos need their system of coordinates: {GNSS_CRS} CRS")
-        xyz, covariances, remarks = known.xyz, covariances_of(known.sd), list[str]()
+            raise InputError(phrase("photos.crs", option=GNSS_CRS))
+        xyz, covariances, remarks = known.xyz, covariances_of(known.sd), list[Phrase]()
         if is_free(project) and not np.isfinite(project.block.point_sd).any():
             project = _placed(project, photos, xyz, frame)
     elif frame.kind == "cartesian" and frame.crs:
@@ -192,23 +190,15 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
         xyz, covariances, remarks = known.in_frame(frame)
     else:
         if not is_free(project) or np.isfinite(project.block.point_sd).any():
-            raise InputError(
-                "has control or positions in axes that have no place on the earth: positions of photos cannot"
-                " be carried there; a crs of its control, or [frame] with an origin, gives it one",
-                file=project.path,
-            )
+            raise InputError(phrase("photos.place"), file=project.path)
         crs = known.systems[0]
         frame = Frame(
             "topocentric", ELLIPSOIDAL, amid(crs, known.xyz[[each == crs for each in known.systems]])
         )
         xyz, covariances, remarks = known.in_frame(frame)
         project = _placed(project, photos, xyz, frame)
-    said = [Message(text) for text in remarks]
-    return (
-        project.replace(messages=(*project.messages, *said)),
-        xyz,
-        (covariances + covariances.transpose(0, 2, 1)) / 2,
-    )
+    project = project.replace(messages=(*project.messages, *map(Message, remarks)))
+    return project, xyz, (covariances + covariances.transpose(0, 2, 1)) / 2
 
 
 def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) -> Project:
@@ -224,18 +214,16 @@ def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) 
             return project
         across = np.linalg.svd(xyz[posed] - xyz[posed].mean(axis=0), compute_uv=False)[1]
         if DETERMINED * misfit * np.sqrt(3 * np.count_nonzero(posed)) < across:
-            text = f"the model is carried onto {np.count_nonzero(posed)} positions of photos by a similarity:"
-            text += f" scale {scale:.6g}, {misfit:.3g} m rms left; frame: {frame}"
-            return carried(project, (scale, turn, shift), frame, Message(text))
-    text = f"positions of photos are adjusted in a frame that is {frame}"
-    if posed.any():
-        text += "; poses of the model do not fit them by a similarity, and are found anew"
+            fields = {"n": int(np.count_nonzero(posed)), "scale": scale, "rms": misfit}
+            message = Message.of("photos.transformed", **fields, frame=frame.phrase)
+            return carried(project, (scale, turn, shift), frame, message)
+    message = Message.of("photos.new-poses" if posed.any() else "photos.frame", frame=frame.phrase)
     lost = np.full_like(block.photo_positions, np.nan)
     return project.replace(
         block=block.replace(photo_positions=lost, photo_attitudes=lost.copy()),
         starts=np.full_like(project.starts, np.nan),
         frame=frame,
-        messages=(*project.messages, Message(text)),
+        messages=(*project.messages, message),
     )
 
 
@@ -269,3 +257,170 @@ def _observations(
             photos, xyz, covariances, groups, known.flights, strict=True
         )
     ]
+
+
+SHIFT_SD = 0.05  # Metres: a priori standard deviation of the shift that positions of a flight have in common
+LEVER_SD = 0.01  # Metres: that of a lever arm which is already applied
+ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
+PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"  # Options that name the system of positions
+_UNKNOWN = "above the geoid or above the ellipsoid"
+GROUPS = "gnss_groups.csv"
+_COMMENT = (
+    "longitude and latitude (degrees), height above the ellipsoid (metres) of WGS 84, standard deviations of"
+    f' east, north, height (metres); project.toml: [gnss] crs = "{ELLIPSOIDAL}"'
+)
+_WGS84 = (Spheroid.wgs84().a, Spheroid.wgs84().b)
+
+
+@dataclass(frozen=True)
+class Located:
+    """Positions of n photos with the system of each.
+
+    `xyz` are (n, 3) longitude (degrees) or easting, latitude or northing, height;
+    `sd` are (n, 3) standard deviations of east, north and height, metres; NaN without.
+    """
+
+    records: tuple[PhotoRecord, ...]
+    systems: tuple[str, ...]
+    xyz: Floats
+    sd: Floats
+
+    @property
+    def flights(self) -> list[str]:
+        """The flight of each position that has a shift and a lever arm in common with others; else empty."""
+        return [each.flight if each.rtk else "" for each in self.records]
+
+    def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
+        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it."""
+        from photogram.formats.crs import to_frame
+
+        turned = covariances_of(self.sd)
+        xyz, remarks = np.empty_like(self.xyz), list[Phrase]()
+        for crs in dict.fromkeys(self.systems):
+            own = np.array([each == crs for each in self.systems])
+            xyz[own], turned[own], said = to_frame(crs, self.xyz[own], turned[own], frame)
+            remarks += [each for each in said if each not in remarks]
+        return xyz, turned, remarks
+
+    def geographic(self) -> tuple[Floats, Floats]:
+        """Return (n, 3) longitudes, latitudes (degrees), heights above the ellipsoid (WGS 84), and (n, 3) sd.
+
+        What already is so stays as it stands.
+        """
+        if set(self.systems) <= {ELLIPSOIDAL}:
+            return self.xyz, self.sd
+        frame = Frame("geographic", ELLIPSOIDAL, ellipsoid=_WGS84)
+        known = np.nan_to_num(self.sd)
+        xyz, turned, _ = Located(self.records, self.systems, self.xyz, known).in_frame(frame)
+        xyz[:, :2] = np.degrees(xyz[:, :2])
+        sd = np.sqrt(np.maximum(np.diagonal(turned, axis1=1, axis2=2), 0.0))
+        return xyz, np.where(np.isnan(self.sd), np.nan, sd)
+
+
+def located(
+    records: Sequence[PhotoRecord],
+    crs: str | None = None,
+    sd: Sequence[float] | None = None,
+    option: str = PHOTOS_CRS,
+) -> Located:
+    """Return the positions of photos that have one; heights have to be of one kind.
+
+    `crs` is the system of positions whose source does not say it, or not what heights are above; `sd` are
+    standard deviations where no source has any: one number or three, metres. `option` names the system;
+    positions of `--gnss` without any system are in the frame of the project, and their system is empty.
+    """
+    known = [each for each in records if each.position is not None]
+    said = [each.position for each in known if each.position is not None]
+    if option == GNSS_CRS and crs is None and not any(each.crs for each in said):
+        systems = [""] * len(said)
+    else:
+        systems = _systems(said, crs, option)
+        _check_heights(known, said, systems, option)
+    default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
+    deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
+    return Located(
+        tuple(known),
+        tuple(systems),
+        np.array([each.position for each in said], dtype=float).reshape(-1, 3),
+        np.array(deviations, dtype=float).reshape(-1, 3),
+    )
+
+
+def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
+    """Return the system of each position: its own, else the one that a user names; empty without both."""
+    from photogram.formats.crs import is_on
+
+    if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
+        first = next(each for each in said if each.crs and each.heights)
+        raise first.place.error(phrase("photos.wgs84", crs=crs, option=option))
+    for each in said:
+        if not each.crs and crs is None:
+            raise each.place.error(phrase("photos.crs", option=option))
+    return [each.crs if each.crs and not each.heights else crs or "" for each in said]
+
+
+def _check_heights(
+    records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str], option: str
+) -> None:
+    kinds: dict[str, list[str]] = {}
+    for record, own, system in zip(records, said, systems, strict=True):
+        kinds.setdefault(_kind(own, system), []).append(f"{record.photo} ({own.source})")
+    if len(kinds) > 1:
+        (one, first), (other, second), *_ = kinds.items()
+        raise InputError(phrase("photos.heights", one=one, first=first, other=other, second=second))
+    for own, system in zip(said, systems, strict=True):
+        if own.heights == SEA_LEVEL and not _is_above_geoid(system):
+            raise own.place.error(phrase("photos.sea-level", option=option))
+    if "" in systems:
+        raise said[0].place.error(phrase("photos.height-kind", option=option))
+
+
+def _kind(said: Said, system: str) -> str:
+    """Return what heights are above."""
+    if said.heights == SEA_LEVEL:
+        return ABOVE[True]
+    return ABOVE[_is_above_geoid(system)] if system else _UNKNOWN
+
+
+def _is_above_geoid(system: str) -> bool:
+    from photogram.formats.crs import has_geoid_heights
+
+    return system not in ("", ELLIPSOIDAL) and has_geoid_heights(system)
+
+
+def gnss_files(
+    metadata: Metadata, path: Path, crs: str | None = None, sd: Sequence[float] | None = None
+) -> dict[Path, bytes]:
+    """Return a table `gnss` of a plain project, and `gnss_groups` beside it where positions need it."""
+    known = located(list(metadata.photos.values()), crs, sd)
+    if not known.records:
+        raise InputError(phrase("format.missing", what="positions of photos"), file=metadata.directory)
+    files = {path: csv_text(_positions(known), [_COMMENT])}
+    flights = list(dict.fromkeys(each for each in known.flights if each))
+    if flights:
+        files[path.with_name(GROUPS)] = csv_text(_groups(flights))
+    return files
+
+
+def _positions(known: Located) -> dict[str, Any]:
+    """Return the columns: names of photos without their folders, where that is enough."""
+    xyz, sd = known.geographic()
+    names = {each.photo: PurePosixPath(each.photo).name for each in known.records}
+    often = Counter(names.values())
+    return {
+        "photo": [photo if often[name] > 1 else name for photo, name in names.items()],
+        **dict(zip(("longitude", "latitude", "height"), xyz.T, strict=True)),
+        **dict(zip(deviation_columns(AXES), sd.T, strict=True)),
+        "group": known.flights,
+        "source": [each.position.source if each.position else "" for each in known.records],
+        "sd_source": [each.deviations.source if each.deviations else "" for each in known.records],
+    }
+
+
+def _groups(flights: Sequence[str]) -> dict[str, Any]:
+    """Return the columns of what positions of a flight have in common."""
+    count = len(flights)
+    columns: dict[str, Any] = {"group": list(flights), "shift": ["true"] * count}
+    for kind, deviation in (("lever", LEVER_SD), ("shift", SHIFT_SD)):
+        columns |= {f"sd_{kind}_{axis}": [deviation] * count for axis in AXES}
+    return columns

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,21 +32,21 @@ from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import ASSUMED_SD, Project
+from photogram.io.parquet import coded
+from photogram.messages import missing_columns, unknown_name
 from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.observations.photos import with_epochs
+from photogram.words import phrase
 
-TIES = ("distances", "height_differences", "coordinate_differences")
-"""Tables of observations between points."""
+TIES = ("distances", "height_differences", "coordinate_differences")  # Tables of observations between points
 HELD = (
     *("cameras", "photos", "control", "gnss", "gnss_groups", "attitudes", "attitude_groups"),
     *("relative_poses", "instruments", *TIES),
 )
 """Tables that are held in memory."""
-BATCH = 2**18
-"""Rows that are read at once."""
-BUCKET = 2**22
-"""Rows of a bucket, about: one is in memory at a time."""
+BATCH = 2**18  # Rows that are read at once
+BUCKET = 2**22  # Rows of a bucket, about: one is in memory at a time
 
 
 def streamable(path: Path) -> bool:
@@ -69,11 +70,7 @@ class Streamed:
     def __init__(self, path: Path, wishes: Wishes, folder: Path) -> None:
         settings = read_settings(path / SETTINGS if path.is_dir() else path, wishes)
         if settings.features:
-            raise InputError(
-                "[features] take joint covariances of points, which a block in parts does not keep: leave"
-                " them out, or adjust in one process",
-                file=settings.path,
-            )
+            raise InputError(phrase("plain.parts-features"), file=settings.path)
         self._folder = folder / "buckets"
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
@@ -81,18 +78,10 @@ class Streamed:
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
         if self.project.options.datum in ("inner", "minimum"):
-            raise InputError(
-                "the datum of a project that is read batch by batch is that of its observations: take it"
-                " out, or photogram.adjust_in_parts(photogram.formats.read(path).block, ..., datum=...)",
-                file=settings.path,
-            )
+            raise InputError(phrase("plain.parts-datum"), file=settings.path)
         if self.project.block.timed:
-            raise InputError(
-                f"the photo {self.project.block.timed[0].photo} has a rolling shutter, or is on a trajectory,"
-                " and images in Parquet are read batch by batch: keep them in CSV, or"
-                " photogram.adjust_in_parts(photogram.formats.read(path).block, ...)",
-                file=settings.path,
-            )
+            photo = self.project.block.timed[0].photo
+            raise InputError(phrase("plain.parts-moving", photo=photo), file=settings.path)
         refuse_passages(self.project.block, "blocks in parts")
         block = started(checked(self.project.block))
         # A node has some of the observations of a drift only.
@@ -103,17 +92,10 @@ class Streamed:
         if self._photos.names != self.block.photo_ids or len(self._cameras.cameras) != len(
             self.block.cameras
         ):
-            raise InputError(
-                "cameras for each photo or group are read whole: without parts", file=settings.path
-            )
+            raise InputError(phrase("plain.parts-cameras"), file=settings.path)
         known = (self.block.point_sd, self.block.photo_position_sd)
         if not (self.block.observations or any(np.isfinite(each).any() for each in known)):
-            raise InputError(
-                "nothing gives the block a datum (no control, no weighted position, no observation), and what"
-                " to hold is found of blocks that are read whole:"
-                " photogram.adjust_in_parts(photogram.formats.read(path).block, ...)",
-                file=settings.path,
-            )
+            raise InputError(phrase("plain.parts-free"), file=settings.path)
         named = {name for each in self.block.observations for name in each.points}
         self._tied = {name: row for row, name in enumerate(sorted(named))}
 
@@ -170,13 +152,16 @@ class Streamed:
         schema = pyarrow.parquet.read_schema(settings.tables["images"])
         columns = {name.strip().lower(): name for name in schema.names}
         if not {"photo", "point"} <= columns.keys():
-            raise InputError("has no columns photo and point", file=settings.tables["images"])
+            message = missing_columns(["photo", "point"], schema.names)
+            raise InputError(message, file=settings.tables["images"])
         if "use" in columns:
-            raise InputError("the column use is read whole: without parts", file=settings.tables["images"])
+            message = phrase("plain.parts-column", column="use")
+            raise InputError(message, file=settings.tables["images"])
         if "points" in settings.tables and any(
             name.strip().lower().startswith("sd") for name in read_head(settings.tables["points"])
         ):
-            raise InputError("standard deviations of points are read whole", file=settings.tables["points"])
+            message = phrase("plain.parts-column", column="sd_x")
+            raise InputError(message, file=settings.tables["points"])
         self._columns = columns
         images, points = self._folder / "images.parquet", self._folder / "points.parquet"
         pyarrow.parquet.write_table(schema.empty_table(), images)
@@ -217,12 +202,12 @@ class Streamed:
             try:
                 for batch in file.iter_batches(BATCH):
                     table = pyarrow.Table.from_batches([batch])
-                    photos, of_photos = _names(table.column(self._columns["photo"]))
-                    points, of_points = _names(table.column(self._columns["point"]))
+                    photos, of_photos = _stripped(table.column(self._columns["photo"]))
+                    points, of_points = _stripped(table.column(self._columns["point"]))
                     known = np.array([rows.get(each, -1) for each in photos], dtype=np.int64)
                     for each, row in zip(photos, known.tolist(), strict=True):
                         if row < 0 and each not in unused:
-                            raise InputError(f"there is no photo {each!r}", file=path)
+                            raise InputError(unknown_name("photo", each, rows), file=path)
                     used = known[of_photos] >= 0
                     counts += np.bincount(known[of_photos][used], minlength=len(rows))
                     hashed = pd.util.hash_array(np.array(points, dtype=object)) % np.uint64(buckets)
@@ -356,15 +341,7 @@ def read_head(path: Path) -> list[str]:
     return list(read_columns(path).columns)
 
 
-def _names(column: object) -> tuple[list[str], Indices]:
-    """Return the different names of a column, without blanks at both ends, and which each row has."""
-    import pyarrow
-    import pyarrow.compute
-
-    whole = column.combine_chunks()  # type: ignore[attr-defined]
-    # A batch may come with all names that the file has.
-    if not pyarrow.types.is_dictionary(whole.type) or len(whole.dictionary) > len(whole):
-        whole = pyarrow.compute.dictionary_encode(whole.cast(pyarrow.string()))
-    return [str(each).strip() for each in whole.dictionary.to_pylist()], whole.indices.to_numpy(
-        zero_copy_only=False
-    ).astype(np.int64)
+def _stripped(column: Any) -> tuple[list[str], Indices]:
+    """Return the names of a column without blanks at both ends, and the name of each row."""
+    names, rows = coded(column)
+    return [str(name).strip() for name in names], rows

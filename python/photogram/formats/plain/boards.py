@@ -15,6 +15,7 @@ from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape
 from photogram.targets.start import Regularisation
+from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
@@ -28,17 +29,15 @@ def read_boards(tables: Tables) -> dict[str, Board]:
     """Read boards of columns and rows; points of others are the control of the project."""
     table = tables.rows("boards")
     if table.count > 1:
-        raise table.error(1, "several boards: those fixed to each other are one of the kind points")
+        raise table.error(1, phrase("plain.several-boards"))
     return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
 
 
 def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
-    kind, shape = (table.texts(name)[row] for name in ("kind", "shape"))
     given: dict[str, Any] = {"unit": tables.settings.length}
-    for name, word, words in (("kind", kind, get_args(BoardKind)), ("shape", shape, get_args(Shape))):
-        if word and word not in words:
-            raise table.error(row, f"column {name}: {word} is none of {', '.join(words)}")
-        given |= {name: word} if word else {}
+    for name, words in (("kind", get_args(BoardKind)), ("shape", get_args(Shape))):
+        if word := table.words(name, words, "", optional=True)[row]:
+            given[name] = word
     if given.get("kind") == "points":
         # Their places are those of the control, which is read later.
         given["points"] = np.zeros((0, 3))
@@ -48,7 +47,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
     given |= {name: lengths[name] for name in PITCHES[2:] if not np.isnan(lengths[name])}
     if "tag_size" not in given:
         given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
-    return made(table, row, lambda: Board(**given))
+    return made(table, row, Board, **given)
 
 
 def read_regularised(tables: Tables) -> str | None:
@@ -56,10 +55,7 @@ def read_regularised(tables: Tables) -> str | None:
     table = tables.rows("boards")
     if not table.count:
         return None
-    word = table.texts(REGULARISED)[0]
-    if word and word not in get_args(Regularisation):
-        raise table.error(0, f"column {REGULARISED}: {word} is none of {', '.join(get_args(Regularisation))}")
-    return word or None
+    return table.words(REGULARISED, get_args(Regularisation), "", optional=True)[0] or None
 
 
 def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
@@ -93,12 +89,9 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
     if regularise:
         columns[REGULARISED] = [regularise] * len(boards)
     bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
-    if bends:
-        found = [bends.get(name) for name in boards]
-        for k, name in enumerate(BENDS):
-            columns[name] = [None if own is None else own.position[k] for own in found]
-        for k, name in enumerate(deviation_columns(BENDS)):
-            columns[name] = [None if own is None else own.deviations[k] for own in found]
+    for names, what in ((BENDS, "position"), (deviation_columns(BENDS), "deviations")) if bends else ():
+        for k, name in enumerate(names):
+            columns[name] = [getattr(bends[board], what)[k] if board in bends else None for board in boards]
     return columns
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
@@ -21,10 +20,11 @@ from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import listed, quoted
+from photogram.messages import unknown_name
 from photogram.network.cameras import Camera, Weights
 from photogram.network.moving_photos import LineSensor, Shutter
 from photogram.network.wider_models import focal_length_message, with_one_focal_length
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -35,8 +35,7 @@ OTHER_LENS = 5.0
 """Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
 _SD = ("sd_radial", "sd_tangential")
 _DISTANCES = ("c", "f", "fx", "fy")
-SMALLEST_DISTANCE = 0.1
-"""Smallest principal distance, as a part of the width of the image."""
+SMALLEST_DISTANCE = 0.1  # Smallest principal distance, as a part of the width of the image
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,9 @@ def read_cameras(tables: Tables) -> Cameras:
     """Read the table of cameras."""
     table = tables.read("cameras")
     if table is None:
-        raise InputError("has no table of cameras (cameras.csv)", file=tables.settings.path)
+        raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
     if not table.count:
-        raise table.head.error("the table names no cameras")
+        raise table.head.error(phrase("error.empty-file", content="cameras"))
     found, weights = Cameras(lines=line_sensors(tables, table)), table.texts("weights")
     certificates = read_certificates(tables)
     found.certificates.update(certificates)
@@ -72,7 +71,7 @@ def read_cameras(tables: Tables) -> Cameras:
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
         if own.each not in _EACH:
-            raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
+            raise table.cell_error(row, "for_each", "error.choice", names=list(_EACH), value=own.each)
         size = _size(table, row, own)
         parts = 1000.0 if tables.settings.image == "um" else 1.0
         if size is not None and found.lines[row] is None:
@@ -80,24 +79,19 @@ def read_cameras(tables: Tables) -> Cameras:
             in_mm += [own.name] * converted
         certificate = _of_camera(tables, table, row, own, certificates)
         if certificate is None:
-            make = partial(_camera, tables, table, row, own, size, parts)
+            camera = made(table, row, _camera, tables, table, row, own, size, parts)
         else:
-            make = partial(certified, tables, own.name, own.model, certificate)
-        found.cameras.append(made(table, row, make))
+            camera = made(table, row, certified, tables, own.name, own.model, certificate)
+        found.cameras.append(camera)
         found.sizes.append(size)
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
         found.weights_given.append(bool(weights[row]))
     covariances = read_covariances(tables)
     if both := [name for name in in_mm if covariances.names("camera", name)]:
-        raise table.head.error(
-            f"the camera {both[0]} has lengths in mm and a row of covariances, which must be in px; give both"
-            " in px"
-        )
+        raise table.head.error(phrase("plain.mm-covariances", camera=both[0]))
     if in_mm:
-        tables.tell(
-            f"lengths of the cameras {listed(in_mm, 3)} are in mm: pixel_mm converts them", table.path
-        )
+        tables.remark("plain.lengths-in-mm", table.path, names=in_mm)
     return replace(
         found,
         cameras=with_knots(tables, covariances.cameras(found.cameras)),
@@ -119,17 +113,10 @@ def _from_mm(
     in_mm = image == "px" and all(each >= SMALLEST_DISTANCE * width for each in of_mm)
     if in_mm and not {"cx", "cy"} & own.values.keys():
         return pixel, True
-    if in_mm:
-        remedy = f"if it is in mm, give {value / pixel:.10g} px, for cx and cy are in px"
-    elif image == "px":
-        remedy = "give it in px, or in mm with a column pixel_mm, the side of a pixel in mm"
-    else:
-        remedy = f"correct it, the width or pixel_mm ({pixel:g} mm)"
-    raise table.error(
-        row,
-        f"column {small[0]}: the principal distance {value:g} {image} must be at least {least:g} {image}, a"
-        f" tenth of the image width of {width} px; {remedy}",
-    )
+    remedy = "in-mm" if in_mm else "in-px" if image == "px" else "in-other"
+    fields = {"value": value, "unit": image, "least": least, "width": width}
+    remedies = {"remedy": phrase(f"plain.{remedy}", pixels=value / pixel, pixel=pixel)}
+    raise table.cell_error(row, small[0], "plain.principal-distance", **fields, **remedies)
 
 
 def _of_camera(
@@ -142,13 +129,12 @@ def _of_camera(
     if own.values or own.deviations or own.calibration:
         c = abs(own.values.get("c", certificate.c))
         if abs(c - certificate.c) > OTHER_LENS:
-            message = f"the camera {own.name} has c {c:g} mm, and its certificate {certificate.c:g} mm"
-            raise ContradictionError.of(table.error(row, f"{message}: it is of another lens"))
-        message = f"camera {own.name}: it is as the table has it; of its certificate marks alone are taken"
-        tables.tell(message, table.path)
+            message = phrase("plain.other-lens", camera=own.name, c=c, certificate=certificate.c)
+            raise ContradictionError.of(table.error(row, message))
+        tables.remark("plain.marks-only", table.path, camera=own.name)
         return None
     if read_covariances(tables).names("camera", own.name):
-        raise table.error(row, f"the camera {own.name} has a certificate, and a covariance in covariances")
+        raise table.error(row, phrase("plain.certificate-covariance", camera=own.name))
     return certificate
 
 
@@ -172,12 +158,9 @@ class _Row:
         model = "brown" if self.model == LINE else self.model
         own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
         if both := own.intersection(OF_LINES):
-            raise table.error(row, f"column {min(both)}: is of the model {model} and of a line of sensors")
+            raise table.cell_error(row, min(both), "plain.line-parameter", model=model)
         if unknown := [name for name in OF_LINES if self.deviations.get(name)]:
-            raise table.error(
-                row,
-                f"column sd_{unknown[0]}: lines of sensors are known; sd_xp, sd_yp of the lens are unknown",
-            )
+            raise table.cell_error(row, f"sd_{unknown[0]}", "plain.line-sd")
         values = {name: value for name, value in self.values.items() if name not in OF_LINES}
         return replace(self, model=model, values=values)
 
@@ -213,7 +196,7 @@ def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
         return None
     for name, value in (("width", own.width), ("height", own.height)):
         if not (0 < value < 2**31 and value == int(value)):
-            raise table.error(row, f"column {name}: {value:g} is no number of pixels")
+            raise table.cell_error(row, name, "error.whole-range", low=1, high=2**31 - 1, value=value)
     return int(own.width), int(own.height)
 
 
@@ -223,12 +206,11 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
 
     beside = given.model or given.values or given.deviations
     if beside or read_covariances(tables).names("camera", given.name):
-        raise table.error(row, f"the camera {given.name} has a calibration, which says model and parameters")
+        raise table.error(row, phrase("plain.calibrated-camera", camera=given.name))
     found = camera_from(table.path.parent / given.calibration, given.name)
     if (found.unit == "px") != (tables.settings.image == "px"):
-        raise table.error(
-            row, f"the calibration of the camera {given.name} is in {found.unit}, and [units] image is not"
-        )
+        fields = {"camera": given.name, "unit": found.unit}
+        raise table.error(row, phrase("plain.calibration-unit", **fields))
     return found
 
 
@@ -240,19 +222,19 @@ def _camera(
     known = given.values
     model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
     if model not in _MODELS:
-        raise table.error(row, f"column model: there is no {quoted(model)}, but {', '.join(_MODELS)}")
+        raise table.unknown_error(row, "model", "camera model", model, _MODELS)
     powers = dict(_MODELS[model][1])
     own = {name.lower(): name for name in powers}
     image = tables.settings.image
     if size is None and "w" in own:
-        raise table.error(row, f"columns width and height are needed by the model {model}")
+        raise table.error(row, phrase("error.requires", name=f"the model {model}", other="width and height"))
     parameters = _spread(own, known)
     if "c" in parameters:
         # In files a principal distance is positive for the positive plane; models have it negative there.
         parameters["c"] = -parameters["c"]
     deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
-        raise table.error(row, f"the model {model} has no {strange[0]}, but {', '.join(powers)}")
+        raise table.error(row, unknown_name(f"parameter of the model {model}", strange[0], powers))
     values = {own[k]: v / parts ** powers[own[k]] for k, v in parameters.items() if k in own}
     if size is not None and image == "px":
         if "w" in own:
@@ -262,8 +244,8 @@ def _camera(
     elif "cx" in own and image != "px":
         values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
     if given.weights not in get_args(Weights):
-        choices = ", ".join(get_args(Weights))
-        raise table.error(row, f"column weights: {quoted(given.weights)} is none of {choices}")
+        names = list(get_args(Weights))
+        raise table.cell_error(row, "weights", "error.choice", names=names, value=given.weights)
     constants = [*powers][len(powers) - _MODELS[model][2] :]
     camera = Camera(
         model,
@@ -280,7 +262,8 @@ def _camera(
     if not given.deviations.get("f") or "fx" not in own:
         return camera
     single = with_one_focal_length(camera, size if image == "px" else None)
-    tables.tell(f"camera {given.name}: {focal_length_message(camera, single)}", table.path)
+    message = focal_length_message(camera, single)
+    tables.remark("plain.focal-length", table.path, names=[given.name], message=message)
     return single
 
 
@@ -347,12 +330,13 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     where = zip(table.texts("camera"), table.numbers("i").tolist(), table.numbers("j").tolist(), strict=True)
     for row, (name, i, j) in enumerate(where):
         if name not in splined:
-            raise table.error(row, f"column camera: there is no splined camera {quoted(name)}")
+            raise table.unknown_error(row, "camera", "splined camera", name, splined)
         rows, columns, _ = values[name].shape
         if not (i in range(columns) and j in range(rows)):
-            raise table.error(row, f"{name} has {columns} x {rows} knots, from 0: none is {i:g}, {j:g}")
+            fields = {"camera": name, "columns": columns, "rows": rows}
+            raise table.error(row, phrase("plain.knot", **fields))
         if (name, i, j) in seen:
-            raise table.error(row, f"the knot {i:g}, {j:g} of {name} is there twice")
+            raise table.error(row, phrase("error.repeated", kind="knot", name=f"{i:g}, {j:g}"))
         seen.add((name, i, j))
         values[name][int(j), int(i)] = [given["dx"][row], given["dy"][row]]
         sd[name][int(j), int(i)] = [given[each][row] for each in _SD]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import ContradictionError, InputError
+from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.covariances import Covariances
@@ -18,18 +18,17 @@ from photogram.formats.plain.tables import Tables
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import day_of
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed, quoted
 from photogram.network.cameras import Camera
 from photogram.network.films import Mark
 from photogram.network.observations import KnownTogether, Observation
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
-SD_MARK = 0.002
-"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
+SD_MARK = 0.002  # mm, of places in a certificate that does not say it: they are printed to 0.001
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
@@ -45,11 +44,8 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
             continue
         path = table.path.parent / texts[row]
         if found.setdefault(camera, path) != path:
-            raise table.error(
-                row,
-                f"column certificate: the camera {camera} has another certificate, {found[camera].name}:"
-                f" {_ITSELF}",
-            )
+            fields = {"camera": camera, "certificate": found[camera].name}
+            raise table.cell_error(row, "certificate", "plain.other-certificate", **fields)
     certificates = {camera: _read(path, camera) for camera, path in found.items()}
     rest = [name for name in dict.fromkeys(cameras.values()) if name not in found]
     several = _of_settings(tables, rest)
@@ -79,7 +75,7 @@ def _flown(
         try:
             day = day_of(texts[row]) if texts[row] else tables.settings.flown
         except ValueError:
-            raise table.error(row, f"column flown: {quoted(texts[row])} is no day, as 1983-07-02") from None
+            raise table.cell_error(row, "flown", "error.day", value=texts[row]) from None
         found.setdefault(camera, {}).setdefault(day, row)
     return found
 
@@ -95,15 +91,13 @@ def _valid(
         except ContradictionError:
             raise
         except InputError as error:
-            raise (
-                error if error.file else table.error(row, f"the camera {camera} {error.message}")
-            ) from None
+            if error.file:
+                raise
+            message = phrase("error.at", what=f"camera {camera}", message=message_of(error))
+            raise table.error(row, message) from None
         if found is not None and own is not found:
-            raise table.error(
-                row,
-                f"the camera {camera} was flown before as its certificate of {found.day} has it, and"
-                f" then, {day}, as that of {own.day}: {_ITSELF}",
-            )
+            fields = {"camera": camera, "first": str(found.day), "second": str(own.day), "day": str(day)}
+            raise table.error(row, phrase("plain.two-certificates", **fields))
         found = own
     assert found is not None
     return found
@@ -125,18 +119,13 @@ def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certi
             continue
         own = _read(path, "")
         if own.name not in cameras and len(cameras) != 1:
-            raise InputError(
-                f"[film] certificate is of the camera {own.name}, and those of films are"
-                f" {listed(list(cameras)) or 'none'}: give the column certificate of photos",
-                file=tables.settings.path,
-            )
+            message = phrase("plain.certificate-camera", camera=own.name, names=list(cameras))
+            raise InputError(message, file=tables.settings.path)
         found.setdefault(own.name if own.name in cameras else cameras[0], []).append(own)
     for camera, several in found.items():
         if len(names := {own.name for own in several}) > 1:
-            raise InputError(
-                f"[film] certificate: those of the camera {camera} are of {listed(sorted(names))}",
-                file=tables.settings.path,
-            )
+            message = phrase("plain.certificates-of", camera=camera, names=sorted(names))
+            raise InputError(message, file=tables.settings.path)
     return found
 
 
@@ -144,25 +133,24 @@ def _tell(
     tables: Tables, camera: str, own: Certificate, several: Sequence[Certificate], flown: Sequence[date]
 ) -> None:
     """Say what the certificate of a camera leaves to be known, and how near it is to the flight."""
-    said = list(own.told())
+    remarks: list[str | Phrase] = list(own.told())
     if not flown or len(several) > 1 or own.verdict.exit_code():
-        day = "without a date" if own.day is None else f"of {own.day}"
-        chosen = f", of {len(several)} that are given" if len(several) > 1 else ""
-        said.insert(0, f"its certificate is {day}{chosen}: {own.verdict.headline}")
-    for each in sorted({*flown[:1], *flown[-1:]}):
-        said += [age_remark(own, each), changed_remark(own, several, each)]
-    tables.messages.extend(Message(f"camera {camera}: {each}", own.file) for each in said if each)
+        dated = phrase("plain.undated") if own.day is None else str(own.day)
+        fields = {"n": len(several), "day": dated, "verdict": str(own.verdict.headline)}
+        remarks.insert(0, phrase("plain.certificate", **fields))
+    for day in sorted({*flown[:1], *flown[-1:]}):
+        remarks += [age_remark(own, day), changed_remark(own, several, day)]
+    for message in filter(None, remarks):
+        tables.remark("error.at", own.file, what=f"camera {camera}", message=message)
 
 
 def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera:
     """Return the camera of a certificate."""
     if (chosen := model or _MODELS[0]) not in _MODELS:
-        raise InputError(
-            f"the camera {name} has the model {chosen}: a certificate is of {', '.join(_MODELS)}",
-            file=own.file,
-        )
+        fields = {"camera": name, "model": chosen, "models": list(_MODELS)}
+        raise InputError(phrase("plain.certificate-model", **fields), file=own.file)
     if tables.settings.image != "mm":
-        raise InputError(f"the camera {name} has a certificate: [units] image must be mm", file=own.file)
+        raise InputError(phrase("plain.certificate-unit", camera=name), file=own.file)
     return own.camera(chosen).replace(name=name)  # type: ignore[arg-type]
 
 
@@ -171,14 +159,10 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
     try:
         found, free = with_datum(xy, covariance)
     except InputError as error:
-        raise InputError(f"camera {camera}: {error.message}", file=file) from None
+        message = phrase("error.at", what=f"camera {camera}", message=message_of(error))
+        raise InputError(message, file=file) from None
     if free:
-        tables.tell(
-            f"camera {camera}: its marks are known by distances, whose covariance leaves {free} movements"
-            " open: the frame is that of the marks themselves; films take shift and rotation, and the"
-            " principal point is known as it is said",
-            file,
-        )
+        tables.remark("plain.distances-only", file, camera=camera, n=free)
     return found
 
 
@@ -222,10 +206,8 @@ class Fiducials:
         """Take the marks of certificates."""
         for camera, own in certificates.items():
             if camera in self.places:
-                raise InputError(
-                    f"the camera {camera} has marks here, and others in its certificate",
-                    file=self.tables.settings.tables["fiducials"],
-                )
+                file = self.tables.settings.tables["fiducials"]
+                raise InputError(phrase("plain.marks-twice", camera=camera), file=file)
             marks = own.fiducials()
             self.places[camera] = dict(zip(marks.names, marks.xy, strict=True))
             if (marks.covariance - np.diag(np.diag(marks.covariance))).any():
@@ -248,7 +230,7 @@ def read_fiducials(
         if not use[row] or camera not in cameras:
             continue
         if name in found.places.setdefault(camera, {}):
-            raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
+            raise table.error(row, phrase("error.repeated", kind=f"fiducial of {camera}", name=name))
         found.places[camera][name] = xy[row]
         found.sd.setdefault(camera, {})[name] = sd[row]
     found.take(certificates)

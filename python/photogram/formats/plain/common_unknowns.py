@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.unknowns import Unknown
@@ -17,12 +16,12 @@ _Made = TypeVar("_Made")
 _Kind = TypeVar("_Kind", bound=Unknown)
 
 
-def made(table: ColumnTable, row: int, make: Callable[[], _Made]) -> _Made:
-    """Make something of a row; what it refuses is an error of the row."""
+def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
+    """Make something of a row; its errors name the row."""
     try:
-        return make()
+        return make(*values, **more)
     except InputError as error:
-        raise (error if error.file else table.error(row, error.message)) from None
+        raise (error if error.file else table.error(row, message_of(error))) from None
 
 
 def called(cell: str, title: str) -> str:
@@ -55,7 +54,7 @@ class Shared:
         **more: Any,
     ) -> _Kind:
         """Return what a row names, the same object for all rows that do."""
-        new = made(table, row, partial(kind, name, *given, **more))
+        new = made(table, row, kind, name, *given, **more)
         own = self._known.setdefault((kind, name), new)
         same = own is new or (
             own.row()[1:] == new.row()[1:]
@@ -63,6 +62,6 @@ class Shared:
             and all(np.array_equal(getattr(own, each), value) for each, value in more.items())
         )
         if not same:
-            raise table.error(row, f"column {column}: {name} has other values in a row before")
+            raise table.cell_error(row, column, "plain.other-values", name=name)
         assert isinstance(own, kind)
         return own

@@ -14,13 +14,14 @@ from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.tables import DEGREE, Tables
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import listed, quoted
+from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior
 from photogram.network.trajectories import GyroBias, RotationCoefficient
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift, Unknown
+from photogram.words import phrase
 
 CAMERA = "camera"
 OF_FILMS = ("scanner", "fiducials", "film")
@@ -61,7 +62,7 @@ class Covariances:
         known = {each.name for each in cameras}
         for name, matrix in own.items():
             if name not in known:
-                raise self.table.error(matrix.rows[0], f"column name: there is no camera {quoted(name)}")
+                raise self.table.unknown_error(matrix.rows[0], "name", "camera", name, known)
         return [self._camera(each, own[each.name]) if each.name in own else each for each in cameras]
 
     def _camera(self, camera: Camera, matrix: _Matrix) -> Camera:
@@ -71,7 +72,9 @@ class Covariances:
         for row, ((first, second), value) in zip(matrix.rows, matrix.values.items(), strict=True):
             for word in (first, second):
                 if word not in by_word:
-                    raise table.error(row, f"the camera {camera.name} has no parameter {quoted(word)}")
+                    raise table.error(
+                        row, unknown_name(f"parameter of the camera {camera.name}", word, by_word)
+                    )
             spelled.values[by_word[first], by_word[second]] = value
         names = [name for name in camera.names if any(name in pair for pair in spelled.values)]
         scale = 1e-3 if self.tables.settings.image == "um" else 1.0
@@ -87,7 +90,7 @@ class Covariances:
         return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
 
     def names(self, kind: str, name: str) -> set[str]:
-        """Return the words for components that are there of a thing; none where it is not there."""
+        """Return the words for components that are there of a thing."""
         own = self.matrices.get((kind, name), _Matrix())
         return {word for pair in own.values for word in pair}
 
@@ -103,14 +106,14 @@ class Covariances:
             return None
         words = self.names(kind, name)
         if strange := sorted(words - set(components)):
-            raise self.table.error(
-                own.rows[0], f"{kind} {name} has no {strange[0]}, but {listed(list(components), 8)}"
-            )
+            message = unknown_name(f"component of {kind} {name}", strange[0], components)
+            raise self.table.error(own.rows[0], message)
         if missing := [word for word in components if (word, word) not in own.values]:
-            raise self.table.error(own.rows[0], f"{kind} {name}: the covariance of {missing[0]} is missing")
+            message = phrase("plain.no-covariance", kind=kind, name=name, component=missing[0])
+            raise self.table.error(own.rows[0], message)
         found = own.over(components, dict.fromkeys(components, 1.0))
         if not is_covariance(found, singular=singular):
-            raise self.table.error(own.rows[0], f"the covariances of {kind} {name} are no covariance matrix")
+            raise self.table.error(own.rows[0], phrase("error.covariance-singular"))
         return found
 
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
@@ -122,24 +125,15 @@ class Covariances:
                 continue
             table = self.table
             if (kind, name) not in known:
-                there = listed(sorted(f"{own} {title}" for own, title in known), 8) or "none"
-                raise table.error(matrix.rows[0], f"there is no {kind} {quoted(name)}; there are {there}")
+                raise table.error(matrix.rows[0], unknown_name(kind, name, [title for _, title in known]))
             unknown = known[kind, name]
             for row, pair in zip(matrix.rows, matrix.values, strict=True):
                 for word in pair:
                     if word not in unknown.components:
-                        raise table.error(
-                            row, f"a {kind} has {', '.join(unknown.components)}, not {quoted(word)}"
-                        )
+                        raise table.error(row, unknown_name(f"component of {kind}", word, unknown.components))
             units = _units(unknown, self.tables.radians, np.diag(self.tables.flip).tolist())
             covariance = matrix.over(unknown.components, units)
-            found.append(
-                made(
-                    table,
-                    matrix.rows[0],
-                    lambda unknown=unknown, covariance=covariance: Prior(unknown, covariance=covariance),  # type: ignore[misc]
-                )
-            )
+            found.append(made(table, matrix.rows[0], Prior, unknown, covariance=covariance))
         return found
 
 
@@ -154,7 +148,7 @@ def read_covariances(tables: Tables) -> Covariances:
         first, second = (word.lower() if kind == CAMERA else word.lower().replace("_", " ") for word in pair)
         matrix = matrices.setdefault((kind, name), _Matrix())
         if (first, second) in matrix.values or (second, first) in matrix.values:
-            raise table.error(row, f"the covariance of {first} and {second} is there twice")
+            raise table.error(row, phrase("plain.covariance-twice", first=first, second=second))
         matrix.rows.append(row)
         matrix.values[first, second] = float(values[row])
     return Covariances(tables, table, matrices)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -21,11 +20,10 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter
 from photogram.network.trajectories import Readout
+from photogram.words import phrase
 
-LINE = "line"
-"""The model of a line of sensors behind the lens `brown`."""
-OF_LINES = ("x0", "y0", "s0")
-"""Columns of a line of sensors that some models have as parameters."""
+LINE = "line"  # The model of a line of sensors behind the lens `brown`
+OF_LINES = ("x0", "y0", "s0")  # Columns of a line of sensors that some models have as parameters
 Exposure = Shutter | LineSensor | None
 
 
@@ -41,13 +39,13 @@ def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
         pitch = np.nan_to_num(pitches[row])
         if np.isnan(pitches[row]).all():
             if model.lower() == LINE:
-                raise table.error(row, "column pitch_x: is empty, and the camera is a line of sensors")
+                raise table.cell_error(row, "pitch_x", "error.empty")
             found.append(None)
             continue
         if not pitch.any():
-            raise table.error(row, "columns pitch_x, pitch_y: a line of sensors has a pitch that is not zero")
+            raise table.cell_error(row, "pitch_x, pitch_y", "plain.pitch")
         if math.isnan(middles[row]):
-            raise table.error(row, "column s0: is empty, and there is no width to take half of")
+            raise table.cell_error(row, "s0", "plain.s0")
         x0, y0 = places[row].tolist()
         found.append(LineSensor((float(pitch[0]), float(pitch[1])), float(middles[row]), x0, y0))
     return found
@@ -66,20 +64,14 @@ def shutters(
     ):
         if math.isnan(values[row]):
             if word or name or deviations[row]:
-                raise table.error(row, "column readout: is empty, and there is more of a rolling shutter")
+                raise table.cell_error(row, "readout", "error.empty")
             found.append(None)
             continue
         if np.isnan(edges[row]).any():
-            raise table.error(
-                row,
-                "nothing says where the picture ends that is read out: width and height, of pictures in"
-                " millimetres pixel_mm, too, or readout_begin and readout_end",
-            )
+            raise table.error(row, phrase("plain.picture-edges"))
         given = name or cameras[row].name, float(values[row]), float(deviations[row])
         readout = tables.shared.one(table, row, "shutter", Readout, *given)
-        first, last = edges[row].tolist()
-        shutter = partial(Shutter, readout, (first, last), directions[row])
-        found.append(made(table, row, shutter))
+        found.append(made(table, row, Shutter, readout, tuple(edges[row].tolist()), directions[row]))
     return found
 
 
@@ -104,7 +96,7 @@ def _edges(
             found[row] = picture_edges(camera, direction, extents[row])
             continue
         there = np.column_stack([given[row], given[row]])
-        placed = made(table, row, partial(from_tables, settings, camera, sizes[row], there))
+        placed = made(table, row, from_tables, settings, camera, sizes[row], there)
         found[row] = placed[:, _counted(direction)]
     return found
 
@@ -139,10 +131,7 @@ def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) ->
         timed = of_photos.get(photo)
         own = None if timed is None else timed.shutter if timed.line_sensor is None else timed.line_sensor
         if found.setdefault(row, own) != own:
-            raise InputError(
-                f"the photos of the camera {cameras[row].title} have several shutters or lines of sensors, or"
-                " some have none: in tables these are the camera's; give each a camera of its own"
-            )
+            raise InputError(phrase("plain.several-exposures", camera=cameras[row].title))
     return [found.get(row) for row in range(len(cameras))]
 
 
@@ -158,10 +147,7 @@ def exposure_columns(
     own = [each if isinstance(each, Shutter) else None for each in exposures]
     for camera, line in zip(cameras, lines, strict=True):
         if line is not None and not line.is_straight:
-            what = "is bent" if line.lens is None else f"is behind a lens {line.lens.model}"
-            raise InputError(
-                f"the line of sensors of the camera {camera.title} {what}, which tables of cameras cannot say"
-            )
+            raise InputError(phrase("plain.bent-line", camera=camera.title))
     found = _line_columns(lines) if any(lines) else {}
     return found | _shutter_columns(cameras, own, sizes, pixel_mm, image_y) if any(own) else found
 

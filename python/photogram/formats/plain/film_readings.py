@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import ContradictionError, InputError
+from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
 from photogram.film.marks import which_mark
 from photogram.formats.plain.cameras import Cameras
@@ -17,14 +17,11 @@ from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import quoted
+from photogram.words import phrase
 
-BETTER = 4.0
-"""Times by which images must be farther from their places in every other way to lie."""
-NEAR = 0.1
-"""How far they may be in the best, in parts of the format: poses and points are start values."""
-TIES = 4
-"""Points that two photos have in common at least."""
+BETTER = 4.0  # Times by which images must be farther from their places in every other way to lie
+NEAR = 0.1  # How far they may be in the best, in parts of the format: poses and points are start values
+TIES = 4  # Points that two photos have in common at least
 
 
 @dataclass(frozen=True)
@@ -203,7 +200,7 @@ class MarkReadings:
         xy = table.given(names)
         own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
         sd = self.tables.deviations(table, "fiducial_images", own)
-        table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")
+        table.check_given(sd, own, "fiducial_images")
         known = {name: row for row, name in enumerate([*photos.names, *photos.unused])}
         listed_photos = list(known)
         of = indices_of(table, "photo", known, "photo").tolist()
@@ -214,12 +211,15 @@ class MarkReadings:
             if not use[row] or name in photos.unused:
                 continue
             if name not in by_name:
-                raise table.error(row, f"the photo {name} has no film (column film of photos)")
+                raise table.error(row, phrase("plain.photo-without-film", photo=name))
             photo = by_name[name]
             if marks[row] and marks[row] not in self.places.get(photo.camera, {}):
-                raise table.error(row, f"the camera {photo.camera} has no fiducial {quoted(marks[row])}")
+                fiducials = self.places.get(photo.camera, {})
+                raise table.unknown_error(
+                    row, "fiducial", f"fiducial of {photo.camera}", marks[row], fiducials
+                )
             if marks[row] and marks[row] in photo.marks:
-                raise table.error(row, f"the fiducial {marks[row]} of the photo {name} was read twice")
+                raise table.error(row, phrase("error.repeated", kind=f"fiducial of {name}", name=marks[row]))
             photo.marks.append(marks[row])
             photo.readings.append(xy[row])
             photo.sd.append(sd[row])
@@ -230,9 +230,7 @@ class MarkReadings:
         waiting = [photo for photo in self.photos if not all(photo.marks)]
         for photo in waiting:
             if any(photo.marks):
-                raise table.head.error(
-                    f"some fiducials of the photo {photo.name} have names: give all or none"
-                )
+                raise table.head.error(phrase("plain.some-fiducials", photo=photo.name))
         while waiting:
             errors = [(photo, self._named(table, photo)) for photo in waiting]
             left = [photo for photo, error in errors if error is not None]
@@ -246,20 +244,18 @@ class MarkReadings:
         try:
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
         except InputError as error:
-            raise table.head.error(f"photo {photo.name}: {error.message}") from None
+            message = phrase("error.at", what=f"photo {photo.name}", message=message_of(error))
+            raise table.head.error(message) from None
         given = self.given_side(photo)
         ways = [each for each in found.alike if given in (None, each.mirrored)]
         if len(ways) != 1:
             lying = [Lying(np.array([*places.values()])[way.marks], way.mirrored) for way in ways]
             chosen = self._by_images(photo, lying)
             if chosen is None:
-                return table.head.error(
-                    f"photo {photo.name}: {found}, nor from points that it shows; give the names of its"
-                    " fiducials"
-                )
+                return table.head.error(phrase("plain.film-pose", photo=photo.name, reason=str(found)))
             ways = [ways[chosen]]
         photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
-        self.tables.tell(f"photo {photo.name}: its film lies {ways[0]}", table.path)
+        self.tables.remark("plain.film-lies", table.path, photo=photo.name, way=str(ways[0]))
         return None
 
     def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
@@ -290,9 +286,7 @@ class MarkReadings:
         """Return whether a photo is said to be mirrored."""
         word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
         if word and word not in TRUE | FALSE:
-            raise self.seen.photos.table.error(
-                photo.row, f"column mirrored: {quoted(word)} is neither true nor false"
-            )
+            raise self.seen.photos.table.cell_error(photo.row, "mirrored", "error.flag", value=word)
         return None if not word else word in TRUE
 
     def side(self, photo: ScannedPhoto) -> bool:
@@ -302,15 +296,12 @@ class MarkReadings:
         true = photo.true if len(q) else q
         found = is_mirrored(q, true)
         if given is not None and found is not None and found != given:
-            error = self.seen.photos.table.error(
-                photo.row, f"photo {photo.name}: {mirror_message(given, side_residuals(q, true))}"
-            )
-            raise ContradictionError.of(error)
+            sides = mirror_message(given, side_residuals(q, true))
+            message = phrase("error.at", what=f"photo {photo.name}", message=sides)
+            raise ContradictionError.of(self.seen.photos.table.error(photo.row, message))
         if found is None and given is None and len(q) > 1:
             chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
             found = None if chosen is None else bool(chosen)
         if given is None and found is None:
-            self.tables.tell(
-                f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored"
-            )
+            self.tables.remark("plain.side-unknown", photo=photo.name)
         return bool(found if given is None else given)

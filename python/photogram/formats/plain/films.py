@@ -27,7 +27,7 @@ from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
 from photogram.formats.plain.tables import Tables
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, quoted
+from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.films import (
     Film,
@@ -41,9 +41,9 @@ from photogram.network.films import (
     Scanner,
 )
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
+from photogram.words import phrase
 
-LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}
-"""Marks that determine a film."""
+LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}  # Marks that determine a film
 _START = ("start_t1", "start_t2", "start_theta")
 
 
@@ -66,17 +66,12 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
     scanned = np.array([bool(name) for name in films], dtype=bool)
     for table in ("fiducial_images", "fiducials", "films", "scanners"):
         if table in tables.settings.tables and not scanned.any():
-            raise InputError(
-                f"there is a table {table}, and no photo names its film (column film of photos)",
-                file=tables.settings.tables[table],
-            )
+            path = tables.settings.tables[table]
+            raise InputError(phrase("plain.no-film", table=table), file=path)
     found = Scanned(scanned)
     if scanned.any():
         if tables.settings.image == "um":
-            raise InputError(
-                "[units] image is um: cameras of films are in mm, and readings in the unit of their scanner",
-                file=tables.settings.path,
-            )
+            raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
         before = tables.settings.interior == "before"
         _Reader(tables, seen, covariances, films, before=before).read(found)
         if before:
@@ -126,7 +121,7 @@ class _Reader:
         elif not name and not machines:
             own = self.comparator
         elif name not in machines:
-            raise self.table.error(row, f"column scanner: there is no scanner {quoted(name)}")
+            raise self.table.unknown_error(row, "scanner", "scanner", name, machines)
         else:
             own = machines[name]
         return self._held.setdefault(id(own), own.held()) if self.before else own
@@ -155,7 +150,10 @@ class _Reader:
                 Fiducial(photo.name, marks[photo.camera][name], film, reading, sd=sd)
                 for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
             )
-            self._remark(photo)
+            model = self.kinds[photo.film].model
+            if len(photo.marks) < LEAST[model]:
+                fields = {"photo": photo.name, "n": len(photo.marks), "least": LEAST[model], "model": model}
+                self.tables.remark("plain.few-fiducials", **fields)
         if not self.before:
             read = {(photo.camera, name) for photo in self.photos for name in photo.marks}
             found.observations.extend(self.fiducials.known(marks, read, self.covariances))
@@ -173,19 +171,9 @@ class _Reader:
                     images = photo.true_places(self.seen.readings(photo.name))
                     places.append(way.back(photo.true, images))
                     sd.append(photo.machine.readings.pitch * self.seen.deviations(photo.name))
-            said = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
-            if said:
-                self.tables.tell(said, own.file)
-
-    def _remark(self, photo: ScannedPhoto) -> None:
-        """Say it where a film stands on what is known of it beforehand."""
-        model = self.kinds[photo.film].model
-        if len(photo.marks) < LEAST[model]:
-            self.tables.tell(
-                f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
-                f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
-                + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
-            )
+            message = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
+            if message:
+                self.tables.messages.append(Message(message, own.file))
 
     def _starts(self) -> list[tuple[bool, Floats]]:
         """Return the side of each photo, and where t1, t2 and theta start."""
@@ -222,16 +210,10 @@ class _Reader:
             start = found[other][1]
             same = self.photos[other].film == photo.film and self.photos[other].machine is photo.machine
             if start is not None and same and found[other][0] == mirrored:
-                self.tables.tell(
-                    f"photo {photo.name}: fewer than two fiducials; its film starts where that of"
-                    f" {self.photos[other].name} lies"
-                )
+                self.tables.remark("plain.film-start", photo=photo.name, other=self.photos[other].name)
                 return start
-        raise self.table.error(
-            photo.row,
-            f"photo {photo.name} has fewer than two fiducials, and no photo of its film and scanner has more:"
-            f" give {', '.join(_START)}",
-        )
+        message = phrase("plain.no-film-start", photo=photo.name, columns=list(_START))
+        raise self.table.error(photo.row, message)
 
     def _film(self, photo: ScannedPhoto, mirrored: bool, start: Floats) -> Film:
         kind, machine = self.kinds[photo.film], photo.machine
@@ -278,17 +260,16 @@ class _Reader:
         return made(
             self.table,
             photo.row,
-            lambda: interior_orientation(
-                self.marks.places_of(photo),
-                np.array(photo.readings).reshape(-1, 2),
-                model,
-                sd=np.array(photo.sd),
-                counted=photo.machine.readings,
-                scanner=photo.machine.scanner,
-                curves=photo.machine.curves,
-                mirrored=mirrored,
-                reseau=None if kind.reseau is None else kind.reseau(photo.name),
-            ),
+            interior_orientation,
+            self.marks.places_of(photo),
+            np.array(photo.readings).reshape(-1, 2),
+            model,
+            sd=np.array(photo.sd),
+            counted=photo.machine.readings,
+            scanner=photo.machine.scanner,
+            curves=photo.machine.curves,
+            mirrored=mirrored,
+            reseau=None if kind.reseau is None else kind.reseau(photo.name),
         )
 
     def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
@@ -325,12 +306,7 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
         camera = found[row]
         if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
             found[row] = camera = _positive(camera)
-            messages.append(
-                Message(
-                    f"camera {camera.name}: its principal distance is negative; it is taken as that of the"
-                    " positive, in whose frame marks are"
-                )
-            )
+            messages.append(Message(phrase("plain.negative-distance", camera=camera.name)))
         if camera.direction == "backward" and not cameras.weights_given[row]:
             found[row] = camera.replace(weights="measured")
     return replace(cameras, cameras=found)

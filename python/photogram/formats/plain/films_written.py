@@ -17,6 +17,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.films import Film, Mark, Reseau, Scan
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.network.unknowns import Unknown
+from photogram.words import phrase
 
 INSIDE = "films inside"
 """In the details of a project that takes films as errorless: all that was read of them."""
@@ -60,9 +61,7 @@ class WrittenFilms:
 
     def _read(self, project: Project) -> tuple[Sequence[Any], Sequence[Observation]]:
         if INSIDE not in project.details:
-            raise InputError(
-                "films are held where they lie, and nothing says by which marks: such are not written"
-            )
+            raise InputError(phrase("plain.fixed-films"))
         found: tuple[Sequence[Any], Sequence[Observation]] = project.details[INSIDE]
         return found
 
@@ -70,10 +69,6 @@ class WrittenFilms:
     def pixels(self) -> bool:
         """Whether readings are columns and rows."""
         return any(each.readings.pitch != 1.0 for each in self.films.values())
-
-    def settings(self) -> list[str]:
-        """Return the lines of the section of films; none where it says what goes without saying."""
-        return ["", "[film]", 'interior = "before"'] if self.before else []
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Return the four tables; none without films."""
@@ -143,10 +138,7 @@ class WrittenFilms:
             own = self._film_row(photo)
             row = rows.setdefault(name, own)
             if any(None not in (row.get(key), value) and row.get(key) != value for key, value in own.items()):
-                raise InputError(
-                    f"the film {name}: what is known of that of {photo} differs from others of it, and the"
-                    " table of films has a row for all"
-                )
+                raise InputError(phrase("plain.film-differs", film=name, photo=photo))
             row |= {key: value for key, value in own.items() if row.get(key) is None}
         columns = dict.fromkeys(key for row in rows.values() for key in row)
         return {"film": list(rows), **{key: [row.get(key) for row in rows.values()] for key in columns}}
@@ -173,14 +165,14 @@ class WrittenFilms:
         known = self.known.get(photo)
         if known is not None and known.covariance is not None:
             if tuple(known.known) != FILM:
-                raise InputError(f"{known.name}: covariances are those of {', '.join(FILM)} alone")
+                raise InputError(phrase("plain.film-covariance", name=known.name, names=list(FILM)))
             return [0.0 if own else None for own in held]
         sd = dict(zip(FILM[3:], np.where(held, 0.0, np.inf).tolist(), strict=True))
         if known is None:
             return list(sd.values())
         values = np.asarray(known.values, dtype=float)
         if not set(known.known) <= set(sd) or (values != 0).any():
-            raise InputError(f"{known.name}: tables have what is known of m, b1, b2 as 0 with deviations")
+            raise InputError(phrase("plain.film-priors", name=known.name))
         own = np.sqrt(np.diag(known.precision)).tolist()
         return list((sd | dict(zip(known.known, own, strict=True))).values())
 
@@ -196,7 +188,7 @@ class WrittenFilms:
             first = found.setdefault(film.scanner.name, own)
             same = first.scanner is own.scanner and first.readings == own.readings
             if not same or [*map(id, first.curves)] != [*map(id, own.curves)]:
-                raise InputError(f"two scanners are called {own.scanner.name}, or one counts in two ways")
+                raise InputError(phrase("plain.same-scanners", name=own.scanner.name))
         return found
 
     def _scanner_table(self) -> dict[str, Any]:
@@ -223,7 +215,7 @@ class WrittenFilms:
         for each in self.readings:
             camera = self.camera_of[each.photo]
             if cameras.setdefault(id(each.mark), camera) != camera:
-                raise InputError(f"the mark {each.mark.name} is of two cameras: tables have marks by camera")
+                raise InputError(phrase("plain.mark-of-cameras", name=each.mark.name))
         found: dict[str, _Marks] = {}
         for known in self.together:
             marks = [each for each in known.joined if isinstance(each, Mark)]
@@ -231,7 +223,7 @@ class WrittenFilms:
                 continue
             own = {cameras[id(mark)] for mark in marks if id(mark) in cameras}
             if len(own) != 1 or len(marks) < len(known.joined):
-                raise InputError(f"{known.name}: tables have what is known of the marks of one camera")
+                raise InputError(phrase("plain.known-marks", name=known.name))
             _take(found.setdefault(own.pop(), _Marks()), known, marks)
         for each in self.readings:
             if not any(each.mark is mark for own in found.values() for mark in own.marks.values()):
@@ -257,7 +249,7 @@ class WrittenFilms:
         found = np.array([each.observed[:2] for each in self.readings]).reshape(-1, 2)
         precision = np.array([each.precision for each in self.readings]).reshape(-1, 2, 2)
         if precision[:, 0, 1].any():
-            raise InputError("readings of marks are written without correlations, and some have such")
+            raise InputError(phrase("plain.correlated-readings"))
         sd = np.sqrt(np.diagonal(precision, axis1=1, axis2=2))
         return {
             "photo": [each.photo for each in self.readings],
@@ -304,10 +296,10 @@ def _pattern_cells(film: Film) -> dict[str, Any]:
         return {"pattern": LOCAL, **cells, "sd_smooth": pattern.smooth}
     sd = [each.deviations for each in pattern.weights]
     if any(each.position.any() for each in pattern.weights):
-        raise InputError(f"the pattern {pattern.kind} has weights that are not 0, as those of tables are")
+        raise InputError(phrase("plain.pattern-weights", pattern=pattern.kind))
     if pattern.kind == "grid":
         if any((each != sd[0]).any() for each in sd):
-            raise InputError("nodes of a grid with deviations of their own: the table has one for all")
+            raise InputError(phrase("plain.grid-deviations"))
         sd = sd[:1]
     cells = dict(zip(columns, np.asarray(pattern.numbers, dtype=float).tolist(), strict=True))
     weights = {f"sd_w{k}": value for k, value in enumerate(np.concatenate(sd).tolist(), 1)}
@@ -318,7 +310,7 @@ def _take(own: _Marks, known: KnownTogether, marks: Sequence[Mark]) -> None:
     """Take marks that are known together, or one by itself."""
     full = len(marks) > 1 or known.precision[0, 1] != 0
     if own.covariance is not None or (full and own.marks):
-        raise InputError(f"{known.name}: a camera has one certificate, of all its marks")
+        raise InputError(phrase("plain.one-certificate", name=known.name))
     own.marks |= {mark.name: mark for mark in marks}
     if full:
         own.covariance = known.precision
@@ -330,7 +322,7 @@ def _put(own: _Marks, camera: str, mark: Mark) -> None:
     """Take a mark of which nothing is observed but what it says itself."""
     sd = mark.deviations
     if own.covariance is not None or not (np.isfinite(sd).all() and (sd > 0).all()):
-        raise InputError(f"the mark {mark.name} of the camera {camera} has no certificate, as tables have it")
+        raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=camera))
     own.marks[mark.name], own.sd[mark.name] = mark, sd
 
 

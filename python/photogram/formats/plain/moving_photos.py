@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,13 +19,13 @@ from photogram.formats.plain.tables import Tables, columns_of, indices_of, named
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
-from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Lines, Timed
 from photogram.network.trajectories import Clock, Readout, Trajectory
 from photogram.network.unknowns import Sensor
+from photogram.words import phrase
 
 _MOTION = (*VELOCITY, *RATE)
 _SD = deviation_columns(_MOTION)
@@ -68,29 +67,24 @@ def read_timed(
         _check(table, row, given)
         sd = photos.attitude_sd[place]
         if "trajectory" not in given and np.isfinite(sd).any() and sd.any():
-            raise table.error(
-                row,
-                "the photo moves by itself: weigh its attitude by sd_rotation_x .., or in a table attitudes",
-            )
-        found.append(made(table, row, partial(Timed, name, **given)))
+            raise table.error(row, phrase("plain.moving-attitude"))
+        found.append(made(table, row, Timed, name, **given))
     return found
 
 
 def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
-    """Refuse what does not belong together."""
+    """Reject what does not belong together."""
     flown = "trajectory" in given
     if flown and "velocity" in given:
-        raise table.error(row, "vx .., rate_x .. are of photos without a trajectory")
+        raise table.error(row, phrase("plain.motion-columns"))
     if "lines" in given and "line_sensor" not in given:
-        raise table.error(row, "the table line_times has the photo, but its camera is no line of sensors")
+        raise table.error(row, phrase("plain.line-times-of-frame"))
     if "line_sensor" in given and "lines" not in given:
-        raise table.error(
-            row, "its camera is a line of sensors, but the table line_times has no row of the photo"
-        )
+        raise table.error(row, phrase("plain.no-line-times"))
     if "lines" in given and not flown and "time" not in given:
-        raise table.error(row, "a line scanner needs a trajectory, or a time that its own motion counts from")
+        raise table.error(row, phrase("plain.line-scanner-time"))
     if "rate" in given and "lines" not in given:
-        raise table.error(row, "line_rate is of line scanners, which the table line_times has")
+        raise table.error(row, phrase("plain.line-rate"))
 
 
 def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
@@ -113,9 +107,9 @@ def _on_rig(
     if not name and not own:
         return None, None
     if not name and len(rigs) != 1:
-        raise table.error(row, f"column rig: is empty, and there are {len(rigs)} rigs")
+        raise table.cell_error(row, "rig", "error.empty")
     if name and name not in rigs:
-        raise table.error(row, f"column rig: there is no rig {quoted(name)}")
+        raise table.unknown_error(row, "rig", "rig", name, rigs)
     rig = rigs[name] if name else next(iter(rigs.values()))
     sensor = sensor_of(table, row, rig, own, camera)
     return rig.sensors.get(sensor), rig.clocks.get(sensor)
@@ -134,8 +128,9 @@ def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
             continue
         back = np.diff(values[rows, 0]) <= 0
         if back.any():
-            raise table.error(int(rows[1 + int(np.argmax(back))]), "column line: does not increase")
-        found[name] = made(table, int(rows[0]), partial(Lines, values[rows]))
+            row = int(rows[1 + int(np.argmax(back))])
+            raise table.cell_error(row, "line", "plain.increase")
+        found[name] = made(table, int(rows[0]), Lines, values[rows])
     return found
 
 
@@ -191,7 +186,7 @@ def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
 
 
 def line_times_table(block: Block) -> dict[str, Any]:
-    """Return the table of times of lines; none where there are no line scanners."""
+    """Return the table of times of lines."""
     own = [each for each in block.timed if each.lines is not None]
     if not own:
         return {}

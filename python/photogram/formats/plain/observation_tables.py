@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,9 +40,9 @@ from photogram.network.observations import (
 )
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
+from photogram.words import phrase
 
-_THROUGH = "through"
-"""The field that is a place, in the frame of the project."""
+_THROUGH = "through"  # The field that is a place, in the frame of the project
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def read_kinds(
             given[kind.unknown] = _named(table, kind.common, known[kind.common.table])
         of = _of_photos(tables, table, kind, subjects, given) if kind.of_photos else [{}] * table.count
         found += [
-            made(table, row, partial(kind.made, **own, **{name: each[row] for name, each in given.items()}))
+            made(table, row, kind.made, **own, **{name: each[row] for name, each in given.items()})
             for row, own in enumerate(of)
             if own is not None
         ]
@@ -170,7 +169,7 @@ def _given(
             table.check_given(values, columns)
         given[name] = list(values) if len(columns) > 1 else values[:, 0].tolist()
     sd = np.where(missing, 1.0, tables.deviations(table, kind.table, kind.sd_columns))
-    table.check_given(sd, kind.sd_columns, f"is empty: give it, or {kind.table} under [sd]")
+    table.check_given(sd, kind.sd_columns, kind.table)
     if kind.sd:
         given["covariance"] = list(covariances_of(sd, table, kind.sd))
     else:
@@ -183,7 +182,7 @@ def _named(table: ColumnTable, common: _Common, known: dict[str, Unknown]) -> li
     found: list[Unknown | None] = []
     for row, name in enumerate(table.texts(common.column)):
         if name and name not in known:
-            known[name] = made(table, row, partial(common.made, name))
+            known[name] = made(table, row, common.made, name)
         found.append(known[name] if name else None)
     return found
 
@@ -205,13 +204,13 @@ def _commons(tables: Tables, transform: Transform, common: _Common) -> dict[str,
     found: dict[str, Unknown] = {}
     for row, title in enumerate(table.texts(common.column)):
         if title in found:
-            raise table.error(row, f"the {common.made.KIND} {title} is there twice")
+            raise table.error(row, phrase("error.repeated", kind=common.made.KIND, name=title))
         own: dict[str, Any] = {
             name: values[row] if values.shape[1] > 1 else float(values[row, 0])
             for name, values in given.items()
             if not np.isnan(values[row]).all()
         }
-        found[title] = made(table, row, partial(common.made, title, **own))
+        found[title] = made(table, row, common.made, title, **own)
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from photogram.formats.plain.transform import Transform
 from photogram.io.column_table import ColumnTable
 from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation
+from photogram.words import phrase
 
 _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
@@ -60,21 +59,19 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     weighted = np.isfinite(sd) & np.isnan(centres)
     if weighted.any():
         row, axis = np.argwhere(weighted)[0].tolist()
-        raise table.error(row, f"column sd_{AXES[axis]}: there is a standard deviation, but no {AXES[axis]}")
+        raise table.cell_error(row, f"sd_{AXES[axis]}", "plain.sd-alone", value=AXES[axis])
     if "photos" in tables.settings.crs and np.isfinite(sd).any():
-        raise table.head.error(
-            "photos with a crs of their own have no standard deviations: give a table gnss"
-        )
+        raise table.head.error(phrase("plain.sd-with-crs"))
     centres, _ = transform.positions("photos", centres, None, table)
     matrices = tables.matrices(table)
     attitude_sd, observed = _attitude_weights(tables, table, matrices)
     turned = {each.photos[0] for each in observed}
     for row in np.flatnonzero(flown).tolist():
         if np.isfinite([*sd[row], *attitude_sd[row]]).any() or texts[row] in turned:
-            raise table.error(row, "the photo is on a trajectory, whose pose it has: it has no sd of its own")
+            raise table.error(row, phrase("plain.sd-on-trajectory"))
     kept = np.flatnonzero(use)
     if len(kept) < table.count:
-        tables.tell(f"{table.count - len(kept)} photos are not used", table.path)
+        tables.remark("plain.unused-photos", table.path, n=table.count - len(kept))
     which, groups = _camera_of(table, cameras), table.texts("group")
     unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
     return Photos(
@@ -98,16 +95,14 @@ def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
     places = {each.name: row for row, each in enumerate(cameras.cameras)}
     if "camera" not in table:
         if len(places) > 1:
-            raise table.head.error(f"the column camera is missing, and there are {len(places)} cameras")
+            raise table.head.error(phrase("plain.which-camera", count=len(places)))
         return [0] * table.count
     found = []
     for row, name in enumerate(table.texts("camera")):
         if not name and len(places) == 1:
             found.append(0)
         elif name not in places:
-            raise table.error(
-                row, f"column camera: there is no camera {quoted(name)}, but {listed(list(places))}"
-            )
+            raise table.unknown_error(row, "camera", "camera", name, places)
         else:
             found.append(places[name])
     return found
@@ -127,10 +122,10 @@ def _attitude_weights(
     sd = table.vectors(columns, math.inf, infinite=True, read=tables.angle)
     if (sd < 0).any():
         row = int(np.argwhere(sd < 0)[0][0])
-        raise table.error(row, "a standard deviation of an angle is negative")
+        raise table.error(row, phrase("plain.negative-angle-sd"))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
-        raise table.error(int(np.flatnonzero(unknown)[0]), "angles have standard deviations, but no values")
+        raise table.error(int(np.flatnonzero(unknown)[0]), phrase("plain.no-angles"))
     plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
     if plain and columns is own:
         return sd, []
@@ -141,13 +136,10 @@ def _attitude_weights(
         if not sd[row].any():
             fixed[row] = 0.0
         elif columns is steps and np.isfinite(sd[row]).all():
-            observed.append(made(table, row, partial(Attitude, names[row], matrices[row], sd=sd[row])))
+            observed.append(made(table, row, Attitude, names[row], matrices[row], sd=sd[row]))
         else:
-            raise table.error(
-                row,
-                f"attitudes as {settings.attitude} are weighted by {', '.join(steps)}, rotations about the"
-                " axes of the photo, or in a table attitudes",
-            )
+            fields = {"attitude": settings.attitude, "columns": list(steps)}
+            raise table.error(row, phrase("plain.attitude-sd", **fields))
     return fixed, observed
 
 
@@ -172,7 +164,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     table = tables.read("images")
     assert table is not None
     if "camera" in table and "photos" in tables.settings.tables:
-        tables.tell("cameras are those of the table photos; the column camera is not read", table.path)
+        tables.remark("plain.camera-column", table.path)
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
     table.require(xs, ys)
     places = {name: row for row, name in enumerate(photos.names)}
@@ -186,7 +178,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
         return Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
     left = int(np.count_nonzero(~keep))
     if left:
-        tables.tell(f"{left} images are not used", table.path)
+        tables.remark("plain.unused-images", table.path, n=left)
     whole = Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
     return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))))
 
@@ -210,16 +202,14 @@ def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: in
         second = int(again[0])
         alike = (photos == photos[second]) & (points == points[second])
         first = int(np.flatnonzero(alike)[0])
-        raise table.error(
-            second, f"the point has an image on this photo already, in record {table.records[first]}"
-        )
+        raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
 
 
 def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     pairs = (_OF_IMAGES[1:3], _OF_IMAGES[3:])
     own = [name for pair in pairs if pair[0] in table or pair[1] in table for name in pair]
     if "correlation" in table and table.numbers("correlation", 0.0).any():
-        raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
+        raise table.head.error(phrase("plain.correlation"))
     if _sd_is_given(tables, table):
         found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
     elif "level" in table:
@@ -231,8 +221,7 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     bad = np.argwhere(~((found > 0) & np.isfinite(found)))
     if len(bad):
         row = int(bad[0][0])
-        why = "is empty" if np.isnan(found[row]).any() else f"{found[row].min():g} is not positive and finite"
-        raise table.error(row, f"standard deviation {why}")
+        raise table.error(row, phrase("plain.image-sd", value=found[row].tolist()))
     return found
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import (
@@ -55,10 +55,9 @@ from photogram.network.observations import Control, Observation, of_records
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
-DIFFER = 1e-6
-"""What the positions of a point in two tables may differ by."""
+DIFFER = 1e-6  # What the positions of a point in two tables may differ by
 _USES = ("control", "check", "off")
 
 
@@ -72,7 +71,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
-        raise InputError("has no table of images (images.csv)", file=settings.path)
+        raise InputError(phrase("error.missing", name="images.csv"), file=settings.path)
     tables, seams = with_seams(tables)
     transform = Transform(settings, tables.messages)
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
@@ -107,11 +106,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     common = [*_unknowns(observations, mounts, timed), *(each.bend for each in bends)]
     observations += read_covariances(tables).priors(common)
     if trajectories and transform.frame != settings.frame:
-        raise InputError(
-            "trajectories are in the frame of the project, and nothing says where that is: [frame] has no"
-            f" origin, and tables with a crs go into one that is {transform.frame}",
-            file=settings.path,
-        )
+        message = phrase("plain.trajectory-frame", frame=str(transform.frame))
+        raise InputError(message, file=settings.path)
     assumed = not images.sd_given
     project = assembled(
         path=settings.path,
@@ -184,12 +180,13 @@ def _unused(
 
 
 def _check_features(settings: Settings, names: Sequence[str]) -> None:
-    """Refuse features through points that are not there."""
+    """Reject features through points that are not there."""
     for name, (_, wanted) in settings.features.items():
         try:
             named_points(wanted, names)
         except InputError as error:
-            raise InputError(f"the feature {name}: {error.message}", file=settings.path) from None
+            message = phrase("error.at", what=f"[features] {name}", message=message_of(error))
+            raise InputError(message, file=settings.path) from None
 
 
 def _with_stands(
@@ -252,20 +249,16 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():
         row, k = np.argwhere(stray)[0].tolist()
-        raise table.error(row, f"column {SD_AXES[k]}: there is a standard deviation, but no {AXES[k]}")
+        raise table.cell_error(row, SD_AXES[k], "plain.sd-alone", value=AXES[k])
     check = np.array([each == "check" for each in uses], dtype=bool)[:, np.newaxis]
     sd = tables.deviations(table, "control", SD_AXES)
     if "check" in tables.settings.sd:
         sd = np.where(check, tables.deviations(table, "check", SD_AXES), sd)
     for row, use in enumerate(uses):
         if np.isnan(values[row]).all():
-            raise table.error(row, f"{names[row]} has no coordinates")
+            raise table.error(row, phrase("plain.no-coordinates", point=names[row]))
         if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():
-            raise table.error(
-                row,
-                f"{names[row]} has no standard deviations: --sd control=0.01, columns sd_x .., or control"
-                " under [sd]",
-            )
+            raise table.error(row, phrase("plain.control-sd", point=names[row]))
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)
     values, turned = transform.positions("control", values, covariances, table)
@@ -284,7 +277,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         correlated = (turned[row] - np.diag(np.diag(turned[row]))).any()
         if correlated and np.isfinite(sd[row]).all() and not isotropic:
             if not is_covariance(turned[row]):
-                raise table.error(row, "its covariances cannot be: the matrix is not positive definite")
+                raise table.error(row, phrase("error.covariance"))
             observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
             held[row] = np.inf
     off = {row for row, use in enumerate(uses) if use == "off"}
@@ -346,7 +339,7 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
         held: Bools = np.asarray(np.isfinite(own_sd).any(axis=1))
         if (np.isfinite(own_sd) & np.isnan(given)).any():
             row = int(np.argwhere(np.isfinite(own_sd) & np.isnan(given))[0][0])
-            raise table.error(row, "there is a standard deviation, but no coordinate")
+            raise table.error(row, phrase("plain.sd-alone", value="x, y, z"))
         positions[rows] = np.where(held[:, np.newaxis], given, np.nan)
         sd[rows] = own_sd
     observed: list[Observation] = []
@@ -355,10 +348,8 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
         apart = np.abs(starts[rows] - control.positions)
         if (apart > DIFFER).any():
             row, k = np.argwhere(apart > DIFFER)[0].tolist()
-            raise control.table.error(
-                row,
-                f"{control.names[row]} has another {AXES[k]} in the table points, by {apart[row, k]:.6g}",
-            )
+            fields = {"point": control.names[row], "axis": AXES[k], "difference": float(apart[row, k])}
+            raise control.table.error(row, phrase("plain.other-position", **fields))
         positions[rows], sd[rows], check_sd[rows] = control.positions, control.sd, control.check_sd
         positions[[rows_of_names[each.points[0]] for each in control.observed]] = np.nan
         observed = control.observed

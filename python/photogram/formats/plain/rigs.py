@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,17 +16,15 @@ from photogram.formats.plain.tables import Tables, angles_of, columns_of, indice
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
 from photogram.io.units import degrees_typed
-from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
+from photogram.words import phrase
 
-FRAME = "frame itself"
-"""What the first sensor of a rig is called where sensors have names of their own."""
-ZERO = 1e-6
-"""What the pose of the first sensor of a rig may differ from zero by."""
+FRAME = "frame itself"  # What the first sensor of a rig is called where sensors have names of their own
+ZERO = 1e-6  # What the pose of the first sensor of a rig may differ from zero by
 
 
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
@@ -42,30 +39,27 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     dated = scalars(tables, table, Clock, [own or f"{rig}/{camera}" for rig, camera, own in rows])
     for row, (rig, camera, own) in enumerate(rows):
         if camera and camera not in cameras:
-            raise table.error(row, f"column camera: there is no camera {quoted(camera)}")
+            raise table.unknown_error(row, "camera", "camera", camera, cameras)
         name = own or camera
         if not name:
-            raise table.error(row, "there is neither a camera nor a sensor")
+            raise table.error(row, phrase("plain.no-sensor"))
         if (clock := dated[row]) is not None:
             clocked.setdefault(rig, {})[name] = clock
         matrix = np.eye(3) if np.isnan(matrices[row]).any() else matrices[row]
         value, sd = np.nan_to_num(values[row]), np.concatenate([lengths[row], angles[row]])
         if rig not in found:
             if value.any() or np.abs(matrix - np.eye(3)).max() > ZERO:
-                raise table.error(
-                    row, f"the first camera of the rig {rig} is its reference: its pose is zero"
-                )
+                raise table.error(row, phrase("plain.reference-pose", rig=rig))
             found[rig] = name, {}
             continue
         reference, sensors = found[rig]
         if name == reference or name in sensors:
-            raise table.error(row, f"the rig {rig} has the {'sensor' if own else 'camera'} {name} twice")
+            raise table.error(row, phrase("plain.sensor-twice", rig=rig, name=name))
         title = own or f"{rig}/{camera}"
         # A sensor of which nothing is said starts where the poses of its photos have it.
         nothing = np.isnan(matrices[row]).any() and np.isnan(values[row]).all() and np.isinf(sd).all()
-        sensors[name] = made(
-            table, row, partial(Sensor, title) if nothing else partial(Sensor, title, value, matrix, sd)
-        )
+        values_of_sensor = () if nothing else (value, matrix, sd)
+        sensors[name] = made(table, row, Sensor, title, *values_of_sensor)
     return {
         name: Rig(name, reference, sensors, clocked.get(name, {}))
         for name, (reference, sensors) in found.items()
@@ -83,17 +77,14 @@ def read_frames(
         zip(rows, *(table.texts(column) for column in ("frame", "rig", "sensor")), strict=True)
     ):
         if name not in rigs:
-            raise table.error(row, f"column rig: there is no rig {quoted(name)}")
+            raise table.unknown_error(row, "rig", "rig", name, rigs)
         rig = rigs[name]
         sensor = sensor_of(table, row, rig, own, cameras[photo])
         _, members = found.setdefault(frame, (rig, {}))
         if found[frame][0] is not rig or sensor in members:
-            what = "sensor" if own else "camera"
-            raise table.error(row, f"the frame {frame} has two rigs, or two photos of the {what} {sensor}")
+            raise table.error(row, phrase("plain.frame-twice", frame=frame, sensor=sensor))
         if sensor in rig.clocks:
-            raise table.error(
-                row, f"the rig {rig.name} has a time_offset of {sensor}: its photos are on trajectories"
-            )
+            raise table.error(row, phrase("plain.frame-offset", rig=rig.name, sensor=sensor))
         members[sensor] = photo
     return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
 
@@ -102,8 +93,7 @@ def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> 
     """Return what a rig calls the sensor of a photo: as the row says, else as the camera."""
     sensor = own or camera
     if sensor != rig.reference and sensor not in rig.sensors:
-        what = "sensor" if own else "camera"
-        raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+        raise table.error(row, phrase("plain.no-sensor-of-rig", rig=rig.name, sensor=sensor))
     return sensor
 
 
@@ -130,24 +120,17 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
         zip(*(table.texts(column) for column in ("rig", "from", "to")), strict=True)
     ):
         if name not in rigs:
-            raise table.error(row, f"column rig: there is no rig {quoted(name)}")
+            raise table.unknown_error(row, "rig", "rig", name, rigs)
         rig = rigs[name]
         for column, end in zip(("from", "to"), ends, strict=True):
             if end != rig.reference and end not in rig.sensors:
-                raise table.error(row, f"column {column}: the rig {name} has no camera {quoted(end)}")
+                raise table.cell_error(row, column, "plain.no-sensor-of-rig", rig=name, sensor=end)
         # The reference is the frame: what lies between two cameras has no direction.
         first, second = sorted(ends, key=lambda end: end != rig.reference)
         if first == second:
-            raise table.error(row, f"a base from {first} to itself")
-        found.append(
-            made(
-                table,
-                row,
-                partial(
-                    Base, rig.sensors.get(first), rig.sensors[second], float(lengths[row]), float(sd[row])
-                ),
-            )
-        )
+            raise table.error(row, phrase("plain.same-ends", name=first))
+        sensors = rig.sensors.get(first), rig.sensors[second]
+        found.append(made(table, row, Base, *sensors, float(lengths[row]), float(sd[row])))
     return found
 
 
@@ -229,7 +212,7 @@ class Rigs:
         return None if first is None or first[0] != rig else (rig, first[1], name)
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
-        """Return the tables of rigs, frames and bases; none where there are no rigs."""
+        """Return the tables of rigs, frames and bases."""
         if not self._sensors:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -16,21 +15,18 @@ from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID
 from photogram.formats.plain.tables import Tables
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, nearest, quoted
+from photogram.messages import Message
 from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights
 from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
+from photogram.words import phrase
 
-BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
-"""What is not affine in films, by their model."""
+BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # What is not affine in films, by their model
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-UM = 1e-3
-"""In millimetres."""
-KNOWN = 1e-6
-"""Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
-LOCAL = "local"
-"""The pattern of films each of whose photos has a grid of its own."""
+UM = 1e-3  # In millimetres
+KNOWN = 1e-6  # Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)
+LOCAL = "local"  # The pattern of films each of whose photos has a grid of its own
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class FilmKind:
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
-    """Read the table of scanners; nothing where there is none."""
+    """Read the table of scanners."""
     table = tables.rows("scanners")
     names = table.names_once("scanner")
     counts = table.given(("pitch_mm", "origin_column", "origin_row"))
@@ -86,7 +82,7 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
         pitch, *origin = counts[row].tolist()
         zero = numbers.zero / pitch * [1.0, -1.0 if down[row] else 1.0] + origin
         counted = pitch, tuple(zero.tolist()), bool(down[row]), tuple(numbers.half.tolist())
-        readings = made(table, row, partial(Readings, *counted))
+        readings = made(table, row, Readings, *counted)
         found[name] = _machine(table, row, name, numbers, readings, covariances)
     return found
 
@@ -100,16 +96,16 @@ class _Numbers:
     half: Floats  # (2,) half ranges of the polynomials, mm
     # (2,) where these count from, mm from the origin of readings
     zero: Floats = field(default_factory=lambda: np.zeros(2))
-    covariance: Floats | None = None  # (21, 21); None where there is none
+    covariance: Floats | None = None  # (21, 21); None without
 
 
 def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:
-    """Refuse what a calibration says beside it."""
+    """Reject what a calibration says beside it."""
     for column in (*DEVICE, *CURVES, "hx", "hy", *(f"sd_{each}" for each in (*DEVICE, *CURVES))):
         if not math.isnan(table.numbers(column, infinite=True)[row]):
-            raise table.error(row, f"column {column}: the calibration of the scanner {name} says this")
+            raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
     if covariances.names("scanner", name):
-        raise table.error(row, f"the scanner {name} has a calibration, and a covariance in covariances")
+        raise table.error(row, phrase("plain.scanner-covariance", scanner=name))
 
 
 def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]) -> _Numbers:
@@ -131,9 +127,7 @@ def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]
     part = covariance[np.ix_(known, known)]
     if known.any() and not is_covariance(part):
         covariance = covariance + np.diag(np.where(known, KNOWN**2, 0.0))
-        messages.append(
-            Message("its covariance is singular: what it has as known is given a deviation of 1e-6 mm", path)
-        )
+        messages.append(Message(phrase("plain.singular-scanner", sd=KNOWN), path))
     zero = np.asarray(np.linalg.solve(own.matrix, frame.centre_um), dtype=float) * UM
     return _Numbers(
         values, np.where(known, np.inf, 0.0), np.array(frame.half_range_um) * UM, zero, covariance
@@ -158,7 +152,7 @@ def _machine(
     rows = [at + k for at in joined for k in range(3)]
     sd[rows] = np.inf
     unknowns: dict[int, Unknown] = {
-        at: made(table, row, partial(kind, title, numbers.values[at : at + 3], sd[at : at + 3]))  # type: ignore[call-arg]
+        at: made(table, row, kind, title, numbers.values[at : at + 3], sd[at : at + 3])
         for at, (kind, title) in parts.items()
     }
     if numbers.covariance is None:
@@ -168,7 +162,7 @@ def _machine(
     known = None
     if covariance is not None:
         together = [unknowns[at] for at in joined]
-        known = made(table, row, partial(KnownTogether, "scanner", together, covariance=covariance))
+        known = made(table, row, KnownTogether, "scanner", together, covariance=covariance)
     scanner, *curves = unknowns.values()
     assert isinstance(scanner, Scanner)
     return Machine(scanner, tuple(each for each in curves if isinstance(each, ScannerCurve)), readings, known)
@@ -187,8 +181,7 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
     models = table.texts("model", default)
     for row, name in enumerate(table.names_once("film")):
         if models[row] not in FILM_MODELS:
-            what = f"there is no film {quoted(models[row])}{nearest(models[row], FILM_MODELS)}"
-            raise table.error(row, f"column model: {what}")
+            raise table.unknown_error(row, "model", "film model", models[row], FILM_MODELS)
         bends = _bends(models[row])
         columns = [f"sd_{each}" for each in BENDS.get(models[row], ())]
         own = tuple(
@@ -196,7 +189,7 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
         )
         local = table.texts("pattern")[row] == LOCAL
         found[name] = FilmKind(
-            made(table, row, partial(Roll, name, float(means[row]), float(sd_means[row]))),
+            made(table, row, Roll, name, float(means[row]), float(sd_means[row])),
             models[row],
             (float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
             (own[0], own[1]) if own else bends,
@@ -212,11 +205,10 @@ def _bends(model: str) -> tuple[float, float]:
 
 
 def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
-    """Return the pattern of a film; None where it has none."""
+    """Return the pattern of a film; None without."""
     kind = table.texts("pattern", "none")[row]
     if kind not in PATTERNS:
-        known = (*PATTERNS, LOCAL)
-        raise table.error(row, f"column pattern: there is no {quoted(kind)}{nearest(kind, known)}")
+        raise table.unknown_error(row, "pattern", "pattern", kind, (*PATTERNS, LOCAL))
     if kind == "none":
         return None
     count = {"w1 w2": 2, "ebner": 10}.get(kind, 2)
@@ -226,7 +218,7 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
         own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, nodes + 1)]
     else:
         own = [Weights(film if count == 2 else f"{film} {k}", 0.0, sd[k : k + 2]) for k in range(0, count, 2)]
-    return made(table, row, partial(Pattern, kind, values, own))
+    return made(table, row, Pattern, kind, values, own)
 
 
 def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
@@ -235,7 +227,7 @@ def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
     smooth = float(table.numbers("sd_smooth", np.inf, infinite=True)[row])
 
     def own(photo: str, shifts: Floats | None = None) -> Reseau:
-        free = made(table, row, partial(Reseau, photo, values, sd, smooth))
+        free = made(table, row, Reseau, photo, values, sd, smooth)
         return free if shifts is None else free.with_shifts(shifts)
 
     return own
@@ -248,10 +240,11 @@ def _needed(
     values = table.vectors(columns)[row]
     missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
     if missing:
-        raise table.error(row, f"column {missing[0]}: is empty, and the pattern {kind} needs it")
+        raise table.cell_error(row, missing[0], "plain.pattern", pattern=kind)
     sd = table.vectors(_deviations(count), infinite=True)[row]
     if np.isnan(sd).any():
-        raise table.error(row, f"columns {', '.join(_deviations(count))}: the pattern {kind} needs them (mm)")
+        columns = ", ".join(_deviations(count))
+        raise table.cell_error(row, columns, "plain.pattern", pattern=kind)
     return values, sd
 
 

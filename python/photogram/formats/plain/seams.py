@@ -16,6 +16,7 @@ from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
+from photogram.words import phrase
 
 _LINES = ("column", "row")
 
@@ -29,8 +30,7 @@ class Seam:
     at: float
 
 
-Seams = Mapping[str, Seam]
-"""By the names of photos."""
+Seams = Mapping[str, Seam]  # By the names of photos
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:
@@ -43,12 +43,12 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
     names, films = table.texts("photo"), table.texts("film")
     for row in np.flatnonzero(np.isfinite(places).any(axis=1)).tolist():
         if np.isfinite(places[row]).all():
-            raise table.error(row, "columns seam_column, seam_row: a scan is joined along one of them")
+            raise table.error(row, phrase("error.exclusive", first="seam_column", second="seam_row"))
         if not films[row]:
-            raise table.error(row, f"the photo {names[row]} has a seam, and no film (column film)")
+            raise table.error(row, phrase("plain.seam-without-film", photo=names[row]))
         axis = int(np.isnan(places[row, 0]))
         found[names[row]] = Seam(f"{names[row]} half 2", _LINES[axis], float(places[row, axis]))
-    own = {each.name: getattr(tables, each.name) for each in fields(tables)}
+    own = {each.name: getattr(tables, each.name) for each in fields(tables) if each.init}
     return _Divided(**own, seams=found), found
 
 
@@ -75,7 +75,7 @@ def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
             continue
         place = lines[seam.line][row]
         if np.isnan(place):
-            raise table.error(row, f"the photo {photo} has a seam, and this reading no {seam.line}")
+            raise table.cell_error(row, seam.line, "error.empty")
         texts[row] = seam.half if place >= seam.at else photo
     return table.with_texts("photo", texts)
 

@@ -10,17 +10,17 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any, cast
 
-from photogram.arguments.arrays import shown
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.schema import ANGLES, FILM_MODELS, TABLES
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.toml import Sections, day_of
-from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed, nearest
+from photogram.io.toml import Document, Table, day_of, read_document
+from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.messages import Message, unknown_name
 from photogram.results.features import KINDS, Definition
+from photogram.words import Phrase, phrase
 
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
@@ -119,150 +119,141 @@ class Settings:
 def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     """Read a file of settings, and find the tables that it names or that lie beside it."""
     wishes = wishes or Wishes()
-    file = _File(path, wishes.settings)
-    file.check_keys(_KEYS)
-    version = file.value("project", "format")
-    if isinstance(version, bool) or version != VERSION:
-        message = "[project] format is missing" if version is None else f"has format {shown(version)}"
-        form = f"this is version {VERSION} of the schema, `format = {VERSION}`"
-        file.fail("project", "format", f"{message}: {form}")
+    file = read_document(path, _KEYS, wishes.settings)
+    project, frame, adjust = (file.optional(name) for name in ("project", "frame", "adjust"))
+    if project.value("format", "") is not VERSION:
+        raise project.value_error("format", "plain.version", version=VERSION)
+    length = _word(file, "units", "length")
     # Defaults of the keys are those of the settings.
     words: dict[str, Any] = {
-        key: file.word(section, key)
+        key: _word(file, section, key)
         for section in ("units", "axes")
         for key in _KEYS[section] or ()
-        if file.has(section, key)
+        if key in file.optional(section)
     }
+    axes = tuple(frame.numbers("ellipsoid", 2)) if "ellipsoid" in frame else Frame().ellipsoid
+    if not 0 < axes[1] <= axes[0] < math.inf:
+        raise frame.value_error("ellipsoid", "plain.ellipsoid")
+    datum, loss = (_word(file, "adjust", key) for key in ("datum", "loss"))
+    basis = _word(file, "adjust", "unit_variance")
     return Settings(
         path=path,
-        name=file.text("project", "name"),
-        frame=Frame(file.word("frame", "kind"), file.text("frame", "crs"), file.origin(), file.ellipsoid()),
+        name=project.text("name", ""),
+        frame=Frame(_word(file, "frame", "kind"), frame.text("crs", ""), _origin(frame), (axes[0], axes[1])),
         options=Options(
-            cast("DatumName | None", file.word("adjust", "datum") if file.has("adjust", "datum") else None),
-            cast("Any", {"none": None}.get(loss := file.word("adjust", "loss"), loss)),
-            # `free` is what earlier versions wrote where nobody had asked for anything.
-            cast("Any", {"free": "constrained"}.get(basis := file.word("adjust", "unit_variance"), basis)),
-            file.count("adjust", "iterations") if file.has("adjust", "iterations") else None,
+            cast("DatumName", datum) if "datum" in adjust else None,
+            cast("Any", None if loss == "none" else loss),
+            # Earlier versions wrote `free` for the default.
+            cast("Any", "constrained" if basis == "free" else basis),
+            adjust.count("iterations", low=1) if "iterations" in adjust else None,
         ),
         **words,
-        time_origin=file.time_origin(),
-        time_scale=file.word("time", "scale"),
-        sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)} | dict(wishes.sd),
-        tables=_tables(file),
-        crs={name: file.text(name, "crs") for name in WITH_CRS if file.has(name, "crs")},
-        columns={name: file.columns(name) for name in WITH_CRS if name in file.content}
+        time_origin=_time_origin(file.optional("time")),
+        time_scale=_word(file, "time", "scale"),
+        sd=_deviations(file.optional("sd")) | dict(wishes.sd),
+        tables=_tables(file.optional("tables")),
+        crs={name: file.table(name).text("crs") for name in WITH_CRS if "crs" in file.optional(name)},
+        columns={name: _columns(file.table(name)) for name in WITH_CRS if name in file}
         | ({} if wishes.columns == PLAIN else {"control": wishes.columns}),
-        features={name: file.feature(name) for name in file.content.get("features", {})},
-        photo_files=file.photo_files(),
-        statement=read_asked(file, file.word("units", "length")),
-        film=file.word("film", "model"),
-        interior=file.word("film", "interior"),
-        certificates=file.certificates(),
-        flown=file.flown(),
+        features=_features(file.optional("features")),
+        photo_files=_photo_files(file.optional("photos")),
+        statement=read_asked(file, length),
+        film=_word(file, "film", "model"),
+        interior=_word(file, "film", "interior"),
+        certificates=_certificates(file.optional("film")),
+        flown=_flown(file.optional("film")),
     )
 
 
-class _File(Sections):
-    """A file of settings."""
+def _word(file: Document, section: str, key: str) -> str:
+    """Return one of the words of a key."""
+    words = _CHOICES[section, key]
+    return file.optional(section).choice(key, words, words[0])
 
-    def word(self, section: str, key: str) -> str:
-        """Return one of the words of a key."""
-        words = _CHOICES[section, key]
-        value = self.value(section, key, words[0])
-        if value not in words:
-            self.fail(section, key, f"{key} is one of {', '.join(words)}, not {shown(value)}")
-        return str(value)
 
-    def columns(self, table: str) -> Columns:
-        """Return what is said of the columns of a table."""
-        try:
-            return columns_given(self.text(table, "columns"), self.text(table, "roles"))
-        except InputError as error:
-            key = "columns" if "--columns" in error.message else "roles"
-            self.fail(table, key, error.message.replace("--", ""))
+def _columns(table: Table) -> Columns:
+    """Return the columns and roles of a table of points."""
+    key = "columns"
+    try:
+        columns = columns_given(table.text(key, ""), None)
+        key = "roles"
+        return replace(columns, roles=columns_given(None, table.text(key, "")).roles)
+    except InputError as error:
+        raise (error if error.file else table.error(key, message_of(error))) from None
 
-    def photo_files(self) -> PhotoFiles | None:
-        """Return where photographs lie, and what is said of the positions of their files."""
-        antenna = self.has("photos", "mrk_antenna") and self.flag("photos", "mrk_antenna")
-        directory, crs = self.text("photos", "directory"), self.text("photos", "directory_crs")
-        if not directory:
-            return None
-        if not (self.path.parent / directory).is_dir():
-            self.fail("photos", "directory", f"there is no folder {directory}")
-        return PhotoFiles(self.path.parent / directory, crs or None, antenna)
 
-    def certificates(self) -> tuple[Path, ...]:
-        """Return the files of the certificates of the cameras of films: one text, or a list."""
-        if not self.has("film", "certificate"):
-            return ()
-        one = isinstance(self.value("film", "certificate"), str)
-        words = [self.text("film", "certificate")] if one else self.texts("film", "certificate")
-        paths = tuple(self.path.parent / each for each in dict.fromkeys(words))
-        for path in paths:
-            if not path.is_file():
-                self.fail("film", "certificate", f"there is no file {path.name}")
-        return paths
+def _photo_files(table: Table) -> PhotoFiles | None:
+    """Return the folder of photographs whose files have positions."""
+    antenna = table.switch("mrk_antenna", False)
+    directory, crs = table.text("directory", ""), table.text("directory_crs", "")
+    if not directory:
+        return None
+    if not (table.file.parent / directory).is_dir():
+        raise table.error("directory", phrase("error.absent", kind="folder", name=directory))
+    return PhotoFiles(table.file.parent / directory, crs or None, antenna)
 
-    def flown(self) -> date | None:
-        """Return the day of the flight."""
-        value = self.value("film", "flown")
-        try:
-            return None if value is None else day_of(value)
-        except ValueError:
-            self.fail("film", "flown", f"flown is a day, as 1983-07-02, not {shown(value)}")
 
-    def feature(self, name: str) -> Definition:
-        """Return the kind of a feature, and the points that it goes through."""
-        value = self.value("features", name)
+def _certificates(table: Table) -> tuple[Path, ...]:
+    """Return the files of the certificates of the cameras of films: one text, or a list."""
+    value = table.values.get("certificate", [])
+    names = [value] if isinstance(value, str) else table.texts("certificate") if value else []
+    paths = tuple(table.file.parent / name for name in dict.fromkeys(names))
+    for path in paths:
+        if not path.is_file():
+            raise table.error("certificate", phrase("error.absent", kind="file", name=path.name))
+    return paths
+
+
+def _flown(table: Table) -> date | None:
+    """Return the day of the flight."""
+    try:
+        return day_of(table.values["flown"]) if "flown" in table else None
+    except ValueError:
+        raise table.value_error("flown", "error.day") from None
+
+
+def _features(table: Table) -> dict[str, Definition]:
+    """Return the kind of each feature, and its points."""
+    features: dict[str, Definition] = {}
+    for name, value in table.values.items():
         if not isinstance(value, dict) or len(value) != 1:
-            form = f'the feature {name} is {{ circle = ["point", "point", ...] }}'
-            self.fail("features", name, f"{form}, not {shown(value)}")
-        (kind, points), *_ = value.items()
+            raise table.value_error(name, "plain.feature")
+        (kind,) = value
         if kind not in KINDS:
-            self.fail("features", name, f"the feature {name}: there is no {kind}{nearest(kind, KINDS)}")
-        if not isinstance(points, list) or not all(isinstance(each, str) for each in points):
-            form = f"the feature {name} goes through a list of names"
-            self.fail("features", name, f"{form}, not {shown(points)}")
-        return kind, tuple(points)
+            raise table.error(name, unknown_name("kind of features", kind, KINDS))
+        features[name] = kind, table.table(name).texts(kind)
+    return features
 
-    def origin(self) -> tuple[float, float, float] | None:
-        """Return latitude, longitude, height."""
-        if not self.has("frame", "origin"):
-            return None
-        latitude, longitude, height = self.numbers("frame", "origin", (3,))
-        if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
-            form = "origin is latitude and longitude in degrees, and the ellipsoidal height"
-            self.fail("frame", "origin", form)
-        return latitude, longitude, height
 
-    def time_origin(self) -> float | str:
-        """Return a number of seconds, or a date as text."""
-        value = self.value("time", "origin", 0.0)
-        if self.has("time", "origin") and isinstance(value, int | float):
-            (value,) = self.numbers("time", "origin", (1,))
-        if isinstance(value, float) and math.isfinite(value):
-            return value
-        try:
-            # TOML has dates of its own.
-            return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
-        except (TypeError, ValueError):
-            self.fail("time", "origin", f"origin is a number of seconds, or a date, not {shown(value)}")
+def _origin(table: Table) -> tuple[float, float, float] | None:
+    """Return latitude, longitude, height."""
+    if "origin" not in table:
+        return None
+    latitude, longitude, height = table.numbers("origin", 3)
+    if not (abs(latitude) <= 90 and abs(longitude) <= 360 and math.isfinite(height)):
+        raise table.value_error("origin", "plain.origin")
+    return latitude, longitude, height
 
-    def ellipsoid(self) -> tuple[float, float]:
-        """Return the semi-axes."""
-        if not self.has("frame", "ellipsoid"):
-            return Frame().ellipsoid
-        a, b = self.numbers("frame", "ellipsoid", (2,))
-        if not (0 < b <= a < math.inf):
-            self.fail("frame", "ellipsoid", "ellipsoid is the semi-major and the semi-minor axis")
-        return a, b
 
-    def deviations(self, table: str) -> tuple[float, ...]:
-        """Return standard deviations of a table."""
-        found = self.numbers("sd", table, WITH_SD[table])
-        if not all(each >= 0 for each in found):
-            self.fail("sd", table, f"{list(found)} is no standard deviation")
-        return found
+def _time_origin(table: Table) -> float | str:
+    """Return a number of seconds, or a date as text."""
+    value = table.values.get("origin", 0.0)
+    if isinstance(value, int | float):
+        return table.number("origin", 0.0)
+    try:
+        # TOML has dates of its own.
+        return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
+    except (TypeError, ValueError):
+        raise table.value_error("origin", "plain.time-origin") from None
+
+
+def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
+    """Return the standard deviations of tables."""
+    found = {name: tuple(table.numbers(name, WITH_SD[name])) for name in table.values}
+    for name, values in found.items():
+        if min(values) < 0:
+            raise table.value_error(name, "error.not-negative")
+    return found
 
 
 def unread_tables(settings: Settings) -> list[Message]:
@@ -276,26 +267,27 @@ def unread_tables(settings: Settings) -> list[Message]:
     if not others:
         return []
     close = {path.name: difflib.get_close_matches(path.stem.lower(), TABLES, 1, 0.75) for path in others}
-    meant = [f"{name} (did you mean {each[0]}?)" for name, each in close.items() if each]
-    rest = [name for name, each in close.items() if not each]
-    return [Message(f"tables of other names are not read: {listed([*meant, *rest])}", settings.path)]
+    names = [
+        Phrase("plain.similar", {"name": name, "close": words[0]}) if words else name
+        for name, words in close.items()
+    ]
+    return [Message(phrase("plain.unread-tables", names=names), settings.path)]
 
 
-def _tables(file: _File) -> dict[str, Path]:
-    folder = file.path.parent
+def _tables(table: Table) -> dict[str, Path]:
+    """Return the file of each table."""
+    folder = table.file.parent
     found: dict[str, Path] = {}
     for name in TABLES:
-        if file.has("tables", name):
-            found[name] = folder / file.text("tables", name)
-            if not os.path.isfile(found[name]):  # nor where the name is too long for the system
-                file.fail("tables", name, f"the table {name} is not there: {found[name]}")
+        if name in table:
+            found[name] = folder / table.text(name)
+            if not os.path.isfile(found[name]):  # nor if the name is too long for the system
+                raise table.error(name, phrase("error.absent", kind="file", name=str(found[name])))
             continue
         present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]
         if len(present) > 1:
-            names = " and ".join(path.name for path in present)
-            raise InputError(
-                f"two files for the table {name}: {names}; name one under [tables]", file=file.path
-            )
+            fields = {"table": name, "names": [path.name for path in present]}
+            raise InputError(phrase("plain.two-files", **fields), file=table.file)
         if present:
             found[name] = present[0]
     return found

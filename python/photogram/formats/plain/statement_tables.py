@@ -6,13 +6,14 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.plain.schema import ENDS
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.toml import TomlFile
-from photogram.messages import counted, quoted
+from photogram.messages import counted, unknown_name
 from photogram.results.statement.request import Asked
+from photogram.words import phrase
 
 COVERS = ("open", "vegetated")
 """What check points lie in; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
@@ -25,7 +26,7 @@ def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) ->
         if word == COVERS[0]:
             continue
         if uses[row] == "control":
-            raise table.error(row, f"column cover: {names[row]} is control; only check points have a cover")
+            raise table.cell_error(row, "cover", "plain.cover-of-control", point=names[row])
         if uses[row] == "check":
             found.append(names[row])
     return frozenset(found)
@@ -36,7 +37,7 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
     found, path = dict(tables.settings.statement), tables.settings.path
     for name in found.get("without", ()):
         if name not in points:
-            message = f"without: there is no point {quoted(name)}"
+            message = phrase("error.at", what="without", message=unknown_name("point", name, points))
             raise TomlFile(path).error(name, message, "statement")
     if lengths := _lengths(tables, points):
         found["lengths"] = lengths
@@ -46,7 +47,7 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
         Asked.checked(**found)
     except InputError as error:
         # Each by itself was checked with its line: together they are refused for want of lengths only.
-        raise TomlFile(path).error("standards", error.message, "statement") from None
+        raise TomlFile(path).error("standards", message_of(error), "statement") from None
     return found
 
 
@@ -62,19 +63,19 @@ def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, An
     found = []
     for row, (length, sd, temperature) in enumerate(zip(sizes, deviations, warmth, strict=True)):
         if not length > 0:
-            why = "is empty" if math.isnan(length) else f"{length:g} is no length"
-            raise table.error(row, f"column length: {why}")
+            code = "error.empty" if math.isnan(length) else "error.positive"
+            raise table.cell_error(row, "length", code, value=length)
         if first[row] == second[row]:
-            raise table.error(row, f"a length is between two points, not of {quoted(first[row])} from itself")
+            raise table.error(row, phrase("plain.same-ends", name=first[row]))
         if not sd < math.inf:
-            raise table.error(row, "column sd: is empty or infinite: give it, or lengths under [sd]")
+            raise table.cell_error(row, "sd", "cells.no-sd", table="lengths")
         own = {"line": lines[row], "from": first[row], "to": second[row], "length": length, "sd": sd}
         found.append(own if math.isnan(temperature) else {**own, "temperature": temperature})
     return tuple(found)
 
 
 def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the columns of the table of lengths; none without any."""
+    """Return the columns of the table of lengths."""
     if not lengths:
         return {}
     columns = {name: [each[name] for each in lengths] for name in ("line", *ENDS, "length", "sd")}

@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import counted, quoted
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
 from photogram.network.trajectories import Clock, Readout, Trajectory
+from photogram.words import phrase
 
 _Scalar = TypeVar("_Scalar", Clock, Readout)
 _COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Readout: ("scan", "line_rate")}
@@ -41,22 +41,21 @@ class Subjects:
         words = table.texts("photo"), table.texts("trajectory")
         for row, (photo, name, time) in enumerate(zip(*words, times.tolist(), strict=True)):
             if bool(photo) == bool(name):
-                raise table.error(row, "columns photo, trajectory: one of both says what the row is of")
+                raise table.error(row, phrase("error.exclusive", first="photo", second="trajectory"))
             for word, what, known in ((photo, "photo", self.photos), (name, "trajectory", self.trajectories)):
                 if word and word not in known:
-                    raise table.error(row, f"column {what}: there is no {what} {quoted(word)}")
+                    raise table.unknown_error(row, what, what, word, known)
             if photo:
                 found.append({"photo": photo})
                 continue
             if math.isnan(time):
-                raise table.error(row, "column time: is empty, and the row is of a trajectory")
+                raise table.cell_error(row, "time", "error.empty")
             first, last = spans[name]
             inside = first <= time <= last
             own = {"photo": None, "trajectory": self.trajectories[name], "time": time}
             found.append(own if inside else None)
         if out := sum(each is None for each in found):
-            text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
-            tables.tell(text, table.path)
+            tables.remark("plain.outside-trajectory", table.path, n=out)
         return found
 
 
@@ -65,7 +64,7 @@ def clocked(table: ColumnTable, row: int, of: Mapping[str, Any], clock: Clock | 
     if clock is None:
         return dict(of)
     if "trajectory" not in of:
-        raise table.error(row, "it has a clock, which dates records of trajectories, and is of a photo")
+        raise table.error(row, phrase("plain.clock-of-photo"))
     return {**of, "clock": clock}
 
 
@@ -93,7 +92,7 @@ def subject_columns(
 def scalars(
     tables: Tables, table: ColumnTable, kind: type[_Scalar], titles: Sequence[str], usual: float = 0.0
 ) -> list[_Scalar | None]:
-    """Return the clock of each row, or the factor of its line rate, as a rule 1; None where nothing is said.
+    """Return the clock of each row, or the factor of its line rate, as a rule 1; None without.
 
     One without a name is called by its title.
     """
@@ -108,7 +107,7 @@ def scalars(
 
 
 def scalar_columns(kind: type[Clock | Readout], own: Sequence[Clock | Readout | None]) -> dict[str, Any]:
-    """Return the columns of clocks, or of factors of line rates; none where there are none."""
+    """Return the columns of clocks, or of factors of line rates."""
     if not any(own):
         return {}
     word, number = _COLUMNS[kind]

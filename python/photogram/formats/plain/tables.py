@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.column_words import is_angular
 from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, nameless, settled
+from photogram.formats.images import Y_DOWN, is_rotation
 from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
@@ -24,20 +25,19 @@ from photogram.formats.plain.schema import (
     covariance_columns,
 )
 from photogram.formats.plain.settings import Settings
-from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.places import Place
 from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed, quoted
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
+from photogram.words import phrase
 
 _Named = TypeVar("_Named")
-DEGREE = 180 / np.pi
-"""Of a radian."""
+DEGREE = 180 / np.pi  # Of a radian
 
 
 def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
@@ -54,9 +54,18 @@ class Tables:
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Points that have images, where they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Common unknowns that rows of all tables name
+    _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there."""
+        """Return a table that is there. It is parsed once, except images, which are too large to store."""
+        if name in self._tables:
+            return self._tables[name]
+        table = self._parsed(name)
+        if name != "images":
+            self._tables[name] = table
+        return table
+
+    def _parsed(self, name: str) -> ColumnTable | None:
         if name not in self.settings.tables:
             return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
         schema, path = TABLES[name], self.settings.tables[name]
@@ -90,7 +99,7 @@ class Tables:
             cells["camera"] = [texts[row] for row in rows.tolist()]
             for row, photo in enumerate(photos.rows.tolist()):
                 if texts[row] != cells["camera"][photo]:
-                    raise images.error(row, "column camera: the photo had another camera before")
+                    raise images.error(row, phrase("plain.other-camera"))
         records = [images.records[row] for row in rows.tolist()]
         return ColumnTable(images.path, images.head, tuple(cells), len(rows), cells, records)
 
@@ -102,9 +111,9 @@ class Tables:
         path, columns = self.settings.path, TABLES[name].columns
         return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
 
-    def tell(self, text: str, path: Path | None = None) -> None:
+    def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
         """Add a remark, on a file."""
-        self.messages.append(Message(text, path))
+        self.messages.append(Message.of(code, path, **fields))
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
@@ -117,19 +126,17 @@ class Tables:
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
     def attitudes(self, table: ColumnTable) -> Floats:
-        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none."""
+        """Return (rows, k) numbers of attitudes, angles in radians; NaN without."""
         names = ANGLES[self.settings.attitude]
         others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
-            raise table.head.error(
-                f"columns {listed(others)}, but [axes] attitude is {self.settings.attitude}:"
-                f" {', '.join(names)}"
-            )
+            fields = {"names": others, "attitude": self.settings.attitude, "columns": list(names)}
+            raise table.head.error(phrase("plain.attitude-columns", **fields))
         plain = self.settings.attitude in ("quaternion", "rotation_vector", "matrix")
         return vectors_of(table, names, None if plain else self.angle)
 
     def matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
+        """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
         values = self.attitudes(table)
         found = np.full((len(values), 3, 3), np.nan)
         known = np.flatnonzero(~np.isnan(values).any(axis=1))
@@ -138,12 +145,12 @@ class Tables:
             found[known] = matrices_of(self.settings, values[known])
         return found
 
-    def known_matrices(self, table: ColumnTable, why: str = "there are no angles") -> Floats:
+    def known_matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
         found = self.matrices(table)
         unknown = np.isnan(found).any(axis=(1, 2))
         if unknown.any():
-            raise table.error(int(np.argmax(unknown)), why)
+            raise table.error(int(np.argmax(unknown)), phrase("plain.no-angles"))
         return found
 
     @property
@@ -174,15 +181,15 @@ class Tables:
         return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Refuse quaternions without length and matrices that are no rotations, with their rows."""
+        """Reject quaternions without length and matrices that are no rotations, with their rows."""
         kind = self.settings.attitude
         for row in known.tolist():
             if kind == "quaternion":
                 size = float(np.linalg.norm(values[row]))
                 if not 0.99 < size < 1.01:
-                    raise table.error(row, f"the quaternion has the length {size:.6g}, not 1")
+                    raise table.error(row, phrase("plain.quaternion", length=size))
             elif kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
-                raise table.error(row, "m11 .. m33 are no rotation matrix: not orthonormal, or mirrored")
+                raise table.error(row, phrase("plain.rotation-matrix"))
 
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
@@ -207,7 +214,7 @@ class Tables:
         negative = np.argwhere(found < 0)
         if len(negative):
             row, k = negative[0]
-            raise table.error(int(row), f"column {columns[k]}: {found[row, k]:g} is no standard deviation")
+            raise table.cell_error(int(row), columns[k], "error.not-negative", value=float(found[row, k]))
         return found
 
 
@@ -254,7 +261,7 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
     if (rows < 0).any():
         missing = int(np.flatnonzero(rows < 0)[0])
         row = int(np.flatnonzero(found.rows == missing)[0])
-        raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
+        raise table.unknown_error(row, column, kind, found.names[missing], places)
     return rows[found.rows]
 
 
@@ -263,7 +270,7 @@ def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind:
     names = table.texts(column)
     for row, name in enumerate(names):
         if name and name not in known:
-            raise table.error(row, f"column {column}: there is no {kind} {quoted(name)}")
+            raise table.unknown_error(row, column, kind, name, known)
     return [known.get(name) for name in names]
 
 
@@ -275,7 +282,7 @@ def vectors_of(
     partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
     if partly.any():
         row = int(np.flatnonzero(partly)[0])
-        raise table.error(row, f"some of {', '.join(columns)} are empty: give all or none")
+        raise table.error(row, phrase("plain.all-or-none", columns=list(columns)))
     return values
 
 

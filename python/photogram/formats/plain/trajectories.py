@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import cast, get_args
 
 import numpy as np
@@ -16,7 +15,6 @@ from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCI
 from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
 from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
-from photogram.messages import quoted
 from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import (
     Angles,
@@ -28,13 +26,13 @@ from photogram.network.trajectories import (
     Table,
     Trajectory,
 )
+from photogram.words import phrase
 
 _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
 )
-Groups = Mapping[tuple[str, ...], Indices]
-"""Rows of a table by what they are of."""
+Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by what they are of
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
@@ -43,7 +41,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     if table is None:
         if there := [each for each in _OTHERS if each in tables.settings.tables]:
             path = tables.settings.tables[there[0]]
-            raise InputError("there is no table trajectories, which says what its rows are of", file=path)
+            raise InputError(phrase("error.missing", name="trajectories.csv"), file=path)
         return {}
     names = table.names_once("trajectory")
     places = {name: row for row, name in enumerate(names)}
@@ -60,8 +58,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
         if body is not None:
             # The matrix of a body leads from inertial axes to its own, that of an attitude the other way.
             body = body[0], np.swapaxes(body[1], 1, 2)
-        make = partial(Trajectory, name, own, position, rotation, body, along[row], angles[row])
-        found[name] = made(table, row, make)
+        values = own, position, rotation, body, along[row], angles[row]
+        found[name] = made(table, row, Trajectory, name, *values)
     return found
 
 
@@ -85,7 +83,7 @@ def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple
         back = steps < 0 if multiple else steps <= 0
         if back.any():
             row = int(rows[1 + int(np.argmax(back))])
-            raise table.error(row, f"column {column}: {'decreases' if multiple else 'does not increase'}")
+            raise table.cell_error(row, column, "plain.increase")
     return times
 
 
@@ -114,16 +112,14 @@ def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> l
     for name, row in places.items():
         for what, known in (("positions", positions), ("attitudes", attitudes)):
             if name not in known:
-                raise table.error(row, f"{quoted(name)} has no rows in the table trajectory_{what}")
+                raise table.error(row, phrase("plain.no-rows", name=name, table=f"trajectory_{what}"))
         times, values = positions[name]
         hermite = kinds[0][row] == "hermite"
         if hermite and np.isnan(values).any():
-            raise table.error(
-                row, "column interpolation: hermite needs vx, vy, vz of all its rows in trajectory_positions"
-            )
+            raise table.cell_error(row, "interpolation", "plain.hermite")
         velocities = values[:, 3:] if hermite else None
         given = times, values[:, :3], *attitudes[name], velocities, kinds[0][row], kinds[1][row]
-        found.append(made(table, row, partial(Table, *given)))
+        found.append(made(table, row, Table, *given))
     return found
 
 
@@ -148,7 +144,9 @@ class _Bases:
         self.numbers |= {f"sd_{what}": table.numbers(f"sd_{kind}_{what}") * self.unit for what in _WITH_SD}
         self.numbers["sd"] = table.numbers(f"sd_{kind}", given, infinite=True) * self.unit
         if (negative := self.numbers["sd"] < 0).any():
-            raise table.error(int(np.argmax(negative)), f"column sd_{kind}: is negative")
+            row = int(np.argmax(negative))
+            value = float(self.numbers["sd"][row])
+            raise table.cell_error(row, f"sd_{kind}", "error.not-negative", value=value)
         own = tables.rows("trajectory_knots")
         groups = _rows_of(own, places, bases=True)
         values = _times(own, groups, "knot", multiple=True)
@@ -177,16 +175,17 @@ class _Bases:
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Refuse what is no basis, and what is said of another."""
+        """Reject what is no basis, and what is said of another."""
         kind = self.kind
         if word not in _COLUMNS:
-            raise self.table.error(row, f"column {kind}: {quoted(word)} is none of {', '.join(_COLUMNS)}")
+            raise self.table.cell_error(row, kind, "error.choice", names=list(_COLUMNS), value=word)
         there = [f"{kind}_{each}" for each in _ALL if self._number(row, each) is not None]
         others = [each for each in there if each.removeprefix(f"{kind}_") not in _COLUMNS[word]]
         others += ["trajectory_knots"] if name in self.knots and word != "spline" else []
         others += ["trajectory_coefficients"] if rows is not None and word == "none" else []
         if others:
-            raise self.table.error(row, f"{others[0]} says something of it, but its {kind} is {word}")
+            other = f"{kind} {word}"
+            raise self.table.error(row, phrase("error.not-applicable", name=others[0], other=other))
 
     def _basis(self, row: int, name: str, word: str) -> Basis:
         """Return the basis that a row says."""
@@ -209,7 +208,7 @@ class _Bases:
     def _whole(self, row: int, what: str) -> int | None:
         value = self._number(row, what)
         if value is not None and value != int(value):
-            raise self.table.error(row, f"column {self.kind}_{what}: {value:g} is no whole number")
+            raise self.table.cell_error(row, f"{self.kind}_{what}", "error.whole", value=value)
         return None if value is None else int(value)
 
     def _pair(self, row: int, what: str) -> tuple[float, float] | None:
@@ -218,7 +217,7 @@ class _Bases:
         if value is None or sd is None:
             if value is not None or sd is not None:
                 column = f"{self.kind}_{what}"
-                raise self.table.error(row, f"columns {column} and sd_{column} are given both, or neither")
+                raise self.table.error(row, phrase("error.together", name=column, other=f"sd_{column}"))
             return None
         return value, sd
 
@@ -231,11 +230,12 @@ class _Bases:
         seen: set[int] = set()
         for row, number, value, each in zip(rows.tolist(), numbers.tolist(), given, own, strict=True):
             if number not in range(count):
-                raise table.error(row, f"column k: {number:g} is no number from 0 to {count - 1}")
+                raise table.cell_error(row, "k", "error.whole-range", low=0, high=count - 1, value=number)
             if number in seen:
-                raise table.error(row, f"the coefficient {number:g} is there twice")
+                raise table.error(row, phrase("error.repeated", kind="coefficient", name=f"{number:g}"))
             if (each < 0).any():
-                raise table.error(row, f"column {SD_AXES[int(np.argmax(each < 0))]}: is negative")
+                k = int(np.argmax(each < 0))
+                raise table.cell_error(row, SD_AXES[k], "error.not-negative", value=float(each[k]))
             seen.add(number)
             values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
@@ -258,13 +258,12 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
         for row in rows.tolist():
             given = factors[row][~np.isnan(factors[row])]
             if np.isnan(factors[row][: len(given)]).any():
-                raise table.error(row, f"{', '.join(FACTORS)}: there is one behind an empty cell")
+                raise table.error(row, phrase("plain.factors", columns=list(FACTORS)))
             if first[row] not in range(len(own) - len(given) + 1):
-                raise table.error(row, f"column k: the {of} of {name} has no such coefficients")
+                raise table.cell_error(row, "k", "plain.no-coefficients", kind=of, name=name)
             k = int(first[row])
-            own_sum, precision = turn @ observed[row], turn @ covariances[row] @ turn.T
-            make = partial(
-                Smoothness, own[k : k + len(given)], given, own_sum, covariance=(precision + precision.T) / 2
-            )
-            found[row] = made(table, row, make)
+            precision = turn @ covariances[row] @ turn.T
+            more = {"covariance": (precision + precision.T) / 2}
+            terms = own[k : k + len(given)], given, turn @ observed[row]
+            found[row] = made(table, row, Smoothness, *terms, **more)
     return [found[row] for row in sorted(found)]

@@ -23,9 +23,9 @@ from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
+from photogram.words import phrase
 
-Place = tuple[str, str, int]
-"""Trajectory, position or rotation, and the number of a coefficient."""
+Place = tuple[str, str, int]  # Trajectory, position or rotation, and the number of a coefficient
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
@@ -35,12 +35,12 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
     names = [each.name for each in found]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"two trajectories are called {twice}: tables know them by their names")
+        raise InputError(phrase("error.repeated", kind="trajectory", name=twice))
     return found
 
 
 def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block; none where there are none."""
+    """Return the tables of the trajectories of a block."""
     own = shared_trajectories(block)
     if not own:
         return {}

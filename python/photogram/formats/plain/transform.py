@@ -7,12 +7,13 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.columns import is_geographic
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame
 from photogram.io.column_table import ColumnTable
 from photogram.messages import Message
+from photogram.words import phrase
 
 _HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone before the eastings?"
 
@@ -32,11 +33,7 @@ class Transform:
         crs = self.settings.crs.get(name, "")
         if not crs:
             if self.frame.kind != "geographic" and is_geographic(table):
-                raise table.head.error(
-                    "its columns are latitudes and longitudes: --control-crs EPSG:4979 says that they are of"
-                    " WGS 84 with heights above the ellipsoid, EPSG:4326+geoid=46.5 with heights above sea"
-                    " level where the geoid is 46.5 m above the ellipsoid; in a project [control] crs says it"
-                )
+                raise table.head.error(phrase("plain.degrees"))
             if self.frame.kind == "geographic":
                 return np.column_stack(
                     [np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]]
@@ -45,13 +42,11 @@ class Transform:
         from photogram.formats.crs import to_frame
 
         if self.settings.length != "m":
-            raise InputError("with a crs, the unit of length is the metre", file=self.settings.path)
+            raise InputError(phrase("plain.crs-unit"), file=self.settings.path)
         partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
         if partly.any():
-            raise table.error(
-                int(np.flatnonzero(partly)[0]),
-                f"some coordinates are empty: in {crs} a point needs all three to be transformed",
-            )
+            row = int(np.flatnonzero(partly)[0])
+            raise table.error(row, phrase("plain.partial-position", crs=crs))
         known = ~np.isnan(values).any(axis=1)
         if not known.any():
             return values, own
@@ -59,7 +54,9 @@ class Transform:
             self._settle(crs, values[known])
             found, turned, remarks = to_frame(crs, values[known], own[known], self.frame)
         except InputError as error:
-            raise (error if error.file else table.head.error(f"{error.message}{_HINT}")) from None
+            if error.file:
+                raise
+            raise table.head.error(phrase("plain.crs", message=message_of(error))) from None
         positions, rotated = np.full_like(values, math.nan), own.copy()
         positions[known], rotated[known] = found, turned
         self._messages += [Message(text, table.path) for text in remarks]
@@ -71,6 +68,4 @@ class Transform:
 
         if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):
             self.frame = Frame("topocentric", "EPSG:4979", amid(crs, values))
-            self._messages.append(
-                Message(f"coordinates in {crs} are adjusted in a frame that is {self.frame}")
-            )
+            self._messages.append(Message(phrase("plain.frame", crs=crs, frame=str(self.frame))))

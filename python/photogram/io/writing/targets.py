@@ -12,6 +12,7 @@ from pathlib import Path
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 MOST_LINKS = 40  # Symbolic links that are followed, as by Linux
 _Identity = tuple[int, int]
@@ -49,7 +50,7 @@ def naming(path: Path) -> Iterator[None]:
 def follow(path: Path) -> Target:
     """Find out where an output goes."""
     if "\0" in str(path):
-        raise InputError("a path cannot hold a NUL character", file=path)
+        raise InputError(phrase("file.nul"), file=path)
     with naming(path):
         place = os.fspath(path)
         for _ in range(MOST_LINKS):
@@ -70,7 +71,7 @@ def follow(path: Path) -> Target:
             status = None
     directory, name = os.path.split(place)
     if name in ("", os.curdir, os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
-        raise InputError("is a directory", file=path)
+        raise InputError(phrase("file.directory"), file=path)
     return Target(path, os.path.join(os.path.realpath(directory), name), status)
 
 
@@ -103,14 +104,14 @@ class Guard:
         if not target.regular:
             return target
         if target.status and _identity(target.status) in self._read:
-            raise InputError("would be written over the input", file=path)
+            raise InputError(phrase("file.over-input"), file=path)
         above = set(_above(target.place))
         keys = _keys(target)
         if any(key in self._files for key in keys):
-            raise InputError("another result has this name", file=path)
+            raise InputError(phrase("file.same-output"), file=path)
         under = next((self._files[each] for each in above if each in self._files), None)
         if under or keys[0] in self._above:
-            raise InputError("a directory for other results has this name", file=under or path)
+            raise InputError(phrase("file.output-folder"), file=under or path)
         self._files |= dict.fromkeys(keys, path)
         self._above |= above
         return target

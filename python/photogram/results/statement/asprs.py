@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.statement.request import invalid
 from photogram.statistics.freedom import rmse_interval
 
-ENOUGH = 30
-"""Check points with which a product is tested (7.13); with fewer it is produced to meet a class."""
+ENOUGH = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 POINTS_BY_AREA = (
     (1_000.0, 30),
     (2_000.0, 40),
@@ -74,7 +73,7 @@ def points_asked_for(area: float | None) -> int:
     if area is None:
         return POINTS_BY_AREA[0][1]
     if not area >= 0:
-        raise InputError(f"the area of a project is not negative: {area:g} km2")
+        raise invalid("area", "error.not-negative", area)
     return next(count for most, count in POINTS_BY_AREA if area <= most)
 
 
@@ -86,7 +85,7 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
     """
     if not survey >= 0:
-        raise InputError(f"the survey's root mean square error is not negative: {survey:g}")
+        raise invalid("survey", "error.not-negative", survey)
     rest = (found - survey) * (found + survey)
     return Accuracy(
         count,
@@ -164,7 +163,7 @@ def remarks(
     """
     found = numbers("differences", differences, missing=True)
     if found.ndim != 2 or found.shape[1] != 3:
-        raise InputError(f"differences has the shape {found.shape}, not (n, 3)")
+        raise invalid("differences", "error.shape", shape="(n, 3)", actual=str(found.shape))
     axis = None if class_h is None else _class(class_h) / math.sqrt(2)
     limits = {"e": axis, "n": axis, "h": None if class_v is None else _class(class_v)}
     return tuple(
@@ -187,5 +186,5 @@ def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
 
 def _class(limit: float) -> float:
     if not 0 < limit < math.inf:
-        raise InputError(f"an accuracy class is positive: {limit:g}")
+        raise invalid("class", "error.positive", limit)
     return limit

@@ -24,7 +24,7 @@ from photogram.results.grouping import Grouping, grouped
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
 from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
-from photogram.results.suspects import block_suspects, observations_of_core
+from photogram.results.suspects import BlockSuspects, observations_of_core
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase
@@ -32,10 +32,8 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-LARGEST = 5
-"""Single observations that are listed."""
-EXACT = 5000
-"""Rows up to which degrees of freedom of components are computed though nothing was estimated."""
+LARGEST = 5  # Listed single observations
+EXACT = 5000  # Rows up to which degrees of freedom are computed without estimated components
 
 
 @dataclass(frozen=True)
@@ -233,8 +231,7 @@ class _Freedoms:
         return Freedom(self._basis, used, self._common, names, joint, welch)
 
 
-PHOTOS = 100
-"""Photos that are listed, those that contribute most."""
+PHOTOS = 100  # Listed photos with the largest contributions
 _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}
 
 
@@ -243,7 +240,7 @@ class Rows:
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         self.block = result.block
-        self.suspects, self.sd = block_suspects(result.block, core), core.deviations
+        self.suspects, self.sd = BlockSuspects(result.block, core), core.deviations
         self._starts: Indices = self.suspects.row_starts
         self._sizes: Indices = np.diff(self._starts)
         self._component = core.components
@@ -292,7 +289,6 @@ class Rows:
         yield from self._parameters(squares)
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return weighted parameters of cameras and components of common unknowns."""
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
             for row in self.suspects.rows(group).tolist():

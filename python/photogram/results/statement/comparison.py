@@ -18,7 +18,7 @@ from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import listed
+from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.network.observations import Control
@@ -26,16 +26,15 @@ from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
 from photogram.results.result import NOT_PHOTOGRAPHED
 from photogram.results.statement.request import METRES, Asked
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
 """Components that are tested together."""
-MOST = 5000
-"""Check points with a joint covariance: of more every second, third ..."""
-SAME_PLACE = 0.01
-"""Metres between a check point and the control point that it is."""
+MOST = 5000  # Check points with a joint covariance; of more points every second, third ... is used
+SAME_PLACE = 0.01  # Distance of identical check and control points, metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +118,7 @@ class Compared:
         """Return all but some points; refuse what is no check point."""
         for name in names:
             if name not in self.names:
-                raise InputError(f"{name} is no check point")
+                raise InputError(unknown_name("check point", name, self.names))
         return self.some(~np.isin(np.array(self.names, dtype=object), list(names)))
 
     def in_vegetation(self) -> Compared:
@@ -140,10 +139,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     rows = rows[::step]
     names = tuple(block.point_ids[row] for row in rows.tolist())
     if len(rows) and result.datum.is_chosen:
-        raise InputError(
-            f"check points cannot be compared: the datum of the network is chosen ({result.datum}),"
-            " and theirs is another"
-        )
+        raise InputError(phrase("request.datum", datum=result.datum.phrase))
     _check_apart(block, rows)
     given = block.point_positions[rows]
     turn = turned_to_east(block, given)
@@ -154,7 +150,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         joint = turned_jointly(turn, joint)
     for name in asked.vegetated:
         if name not in block.point_ids:
-            raise InputError(f"there is no point {name!r} in vegetation")
+            raise InputError(unknown_name("check point", name, names))
     return Compared(
         names=names,
         vegetated=np.array([name in asked.vegetated for name in names], dtype=bool),
@@ -237,16 +233,13 @@ def _survey(
     halved = known[:, :2].all(axis=1) & (np.isfinite(own[:, 0]) != np.isfinite(own[:, 1]))
     if halved.any():
         name = names[int(np.argmax(halved))]
-        raise InputError(f"check point {name} has a standard deviation along one axis in plan only")
+        raise InputError(phrase("request.single-axis", point=name))
     if asked is not None:
         own = np.where(np.isnan(own), asked, own)
     lacking = (known & np.isnan(own)).any(axis=1)
     if lacking.any():
         without = [name for name, lacks in zip(names, lacking.tolist(), strict=True) if lacks]
-        raise InputError(
-            f"the survey of check points has no standard deviations: {listed(without)}; give them in control"
-            " (sd_x ..), or --sd check=0.01,0.01,0.015; --sd check=0 says that it has no error"
-        )
+        raise InputError(phrase("request.survey", points=without))
     return np.where(known, own, np.nan)
 
 
@@ -291,7 +284,7 @@ def _check_apart(block: Block, rows: Indices) -> None:
         near = np.linalg.norm(held - place, axis=1) < apart  # what is not given is near nothing
         if near.any():
             raise InputError(
-                f"check point {block.point_ids[row]} is control: it lies where {others[near.argmax()]} does"
+                phrase("request.same-place", point=block.point_ids[row], control=others[near.argmax()])
             )
 
 

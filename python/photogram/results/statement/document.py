@@ -161,7 +161,6 @@ _PREDICTION = {
     "factor": "factor_of_sd",
     "factor_interval": "factor_interval_95",
 }
-"""What is called otherwise in the document."""
 
 
 def _prediction(found: Prediction | None) -> dict[str, Any] | None:
@@ -205,7 +204,6 @@ def budget_member(found: Budget) -> dict[str, Any]:
 
 
 def _factors(found: Budget) -> dict[str, float]:
-    """Return k of the coverage from untruncated degrees of freedom of components."""
     name = f"k{100 * found.coverage:g}_components"
     own = (("joint", found.freedom.joint), ("welch_satterthwaite", found.freedom.welch_satterthwaite))
     return {

@@ -33,15 +33,11 @@ from photogram.show.style import BLUE, SOFT, VERMILION
 if TYPE_CHECKING:
     from photogram import Result
 
-WIDTH = 6.3
-"""Inches of a picture."""
-REACH = 0.08
-"""Of the extent, what the largest difference is drawn as."""
-NINETY_FIVE = 2.4477
-"""Half-axes of the ellipse of 95 percent, in standard deviations."""
+WIDTH = 6.3  # Inches
+REACH = 0.08  # Length of the largest arrow as a part of the extent
+NINETY_FIVE = 2.4477  # Half-axes of the ellipse of 95 percent, in standard deviations
 NAMED = 60
-CELLS = 120
-"""Of the longer side of the map of overlap."""
+CELLS = 120  # Along the longer side of the map of overlap
 
 
 def differences(found: Compared, control: Floats, texts: Texts) -> Plot | None:
@@ -66,7 +62,6 @@ def _in_plan(limits: Floats, texts: Texts) -> Panel:
 
 
 def _points(panel: Panel, found: Compared, extent: float, texts: Texts) -> Panel:
-    """Return a panel with check points, their differences and ellipses, and the scales of these."""
     plan, d = found.places[:, :2], found.differences
     heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
     most = max(float(np.abs(heights).max()), 1e-12)

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from photogram import Result
 
 MAX_FIXED_VALUES = 20  # Of a sentence
-Said = list[tuple[str, str]]
-"""Keys of the table of words, and texts."""
+Said = list[tuple[str, str]]  # Codes and texts
 
 
 @dataclass(frozen=True)
@@ -110,11 +109,8 @@ def assumptions(found: Grounds, assumed: Sequence[Phrase | str]) -> Said:
         if "asprs-2023" in asked.standards:
             said.append(texts.said("assume.slopes"))
     if layout is not None:
-        fields = {
-            "quadrants": " / ".join(texts.percent(each) for each in layout.quadrants),
-            "spacing": texts.percent(layout.least_spacing),
-            "diagonal": texts.length(layout.diagonal, 3),
-        }
+        quadrants, diagonal = map(texts.percent, layout.quadrants), texts.length(layout.diagonal, 3)
+        fields = {"quadrants": " / ".join(quadrants), "spacing": layout.least_spacing, "diagonal": diagonal}
         said.append(texts.said("assume.layout", n=layout.count, **fields))
     if lengths is not None and lengths.expansion is not None:
         said.append(texts.said("lengths.reference", expansion=texts.significant(lengths.expansion, 3)))
@@ -150,7 +146,7 @@ def _adjustment(found: Grounds) -> Said:
     refraction = (block.refraction or Refraction()).phrase(block.linear_unit)
     frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
     return [
-        texts.said("assume.removed", n=out, all=total + out, percent=texts.percent(out / (total + out)))
+        texts.said("assume.removed", n=out, all=total + out, percent=out / (total + out))
         if out
         else texts.said("assume.none_removed"),
         texts.said("assume.held", held=held) if held else texts.said("assume.none_held"),
@@ -164,7 +160,7 @@ def _survey(found: Grounds) -> Said:
     if not sd[np.isfinite(sd)].any():
         said = [texts.said("assume.survey_exact")]
     else:
-        east, north, height = (texts.length(root_mean(column**2)) for column in sd.T)
+        east, north, height = (root_mean(column**2) for column in sd.T)
         said = [texts.said("assume.survey", east=east, north=north, height=height)]
     if any(asked.survey_common_sd):
         size = " / ".join(texts.length(each) for each in asked.survey_common_sd)

@@ -22,10 +22,8 @@ from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import effective_freedom, rmse_interval
 
 LEVEL = 0.05
-LEAST = 6
-"""Points with heights that a surface takes."""
-FLAT = 1e-6
-"""Of the extent of points, how far they reach across where they lie on a line."""
+LEAST = 6  # Minimum number of heights for a surface
+FLAT = 1e-6  # Width of points on a line as a part of their extent
 
 
 @dataclass(frozen=True)
@@ -185,7 +183,6 @@ def prediction(found: Compared, part: str) -> Prediction | None:
 
 
 def _inverse(covariance: Floats) -> Floats:
-    """Return C^+."""
     scale = scale_of(covariance)
     scaled = covariance / np.outer(scale, scale)
     if root_of(scaled) is not None:
@@ -282,6 +279,5 @@ def _each(matrices: Floats, vectors: Floats) -> Floats:
 
 
 def _above(values: Floats, freedom: Floats) -> Floats:
-    """Return probabilities of more, chi-square."""
     both = zip(values.tolist(), freedom.tolist(), strict=True)
     return np.array([_photocore.chi_square(v, f, upper=True) if f else math.nan for v, f in both])

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
+from photogram.messages import unknown_name
 
-ABSOLUTE = "absolute (external) positional accuracy"
-"""Of check points."""
-RELATIVE = "relative (internal) positional accuracy"
-"""Of lengths, and of differences between points."""
+ABSOLUTE = "absolute (external) positional accuracy"  # Of check points
+RELATIVE = "relative (internal) positional accuracy"  # Of lengths, and of differences between points
 MEASURES = {
     "bias": (128, "bias of positions"),
     "le90": (35, "linear map accuracy at 90 % significance level"),
@@ -25,7 +25,6 @@ MEASURES = {
     "rmse_plan": (47, "root mean square error of planimetry"),
     "ellipse": (50, "uncertainty ellipse"),
 }
-"""Number and name of each."""
 
 
 def measures(
@@ -43,11 +42,10 @@ def measures(
     azimuth of an ellipse); None is left out. `unit`, `date` and `scope` are those of the figures, of their
     evaluation, and what they hold for; `evaluation` is how they were found.
     """
-    if element not in (ABSOLUTE, RELATIVE):
-        raise InputError(f"element is {ABSOLUTE!r} or {RELATIVE!r}, not {element!r}")
+    one_of("element", element, (ABSOLUTE, RELATIVE))
     unknown = next((key for key in values if key not in MEASURES), None)
     if unknown is not None:
-        raise InputError(f"{unknown!r} is no measure of ISO 19157; there are {', '.join(MEASURES)}")
+        raise InputError(unknown_name("measure of ISO 19157", unknown, MEASURES))
     return [
         {
             "element": element,

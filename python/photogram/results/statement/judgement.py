@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,14 +16,14 @@ from photogram.results.statement.grounds import Grounds, Said, assumptions
 from photogram.results.statement.honest import LEVEL, Bias, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
-from photogram.results.statement.standards import Asprs, Lengths, Standards
+from photogram.results.statement.standards import Asprs, Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.statistics.distributions import critical_normal
+from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
-NOT_USABLE = 4
-"""Exit code of a statement that must not be handed over as it is."""
+NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0
 """Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
 NAMED = 10
@@ -52,47 +52,94 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class _Against:
-    """What speaks against handing a statement over, `high` and `low` differences at check points among it."""
+class _Evidence:
+    """The evidence of the rules of a statement."""
 
-    spoilt: bool
-    missed: bool
-    high: bool
-    warning: bool
+    found: Grounds
+    strict: bool
+    control: Sequence[LeftOut]  # control points that disagree with the rest of the block
+    high: bool  # whether differences at check points are larger, or smaller, than predicted
     low: bool
-    control: Sequence[LeftOut]
-    lengths: bool
+    lengths: bool  # whether calibrated lengths disagree with their standard deviations
 
     @property
-    def always(self) -> bool:
-        """Whether it must not be handed over as it is."""
-        return self.spoilt or self.missed or self.high
+    def missed(self) -> bool:
+        """Whether the required accuracy is missed."""
+        lengths = self.found.standards.lengths
+        return "missed" in self.classes or (lengths is not None and lengths.test.met is False)
 
     @property
-    def strictly(self) -> bool:
-        """Whether `strict` says so, too."""
-        return self.warning or self.low or bool(self.control) or self.lengths
+    def met(self) -> bool:
+        """Whether the required accuracy of lengths is met."""
+        lengths = self.found.standards.lengths
+        return lengths is not None and bool(lengths.test.met)
+
+    @property
+    def classes(self) -> list[str]:
+        """The verdicts on accuracy classes."""
+        asprs = self.found.standards.asprs
+        return [] if asprs is None else list(asprs.verdicts.values())
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a rule of `strict` fits."""
+        return self.found.result.verdict.warning or self.low or bool(self.control) or self.lengths
+
+
+def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
+    """Return a rule of a statement with the headline of a name."""
+
+    def message(e: _Evidence) -> Phrase | None:
+        if not holds(e):
+            return None
+        fields = {
+            "verdict": e.found.texts.text(e.found.result.verdict.message),
+            "points": e.found.texts.listed([each.point for each in e.control], NAMED),
+            "n": 0 if e.found.of_all is None else e.found.of_all.n,
+        }
+        return Phrase(f"headline.{name}", fields)
+
+    return Rule(name, message, exit_code, (), grave=lambda e: e.strict or name != "low")
+
+
+RULES = (
+    _rule("verdict", lambda e: not e.found.result.verdict.usable, NOT_USABLE),
+    _rule("missed", lambda e: e.missed, NOT_USABLE),
+    _rule("high", lambda e: e.high, NOT_USABLE),
+    _rule("warning", lambda e: e.strict and e.found.result.verdict.warning, NOT_USABLE),
+    _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
+    _rule("lengths", lambda e: e.strict and e.lengths, NOT_USABLE),
+    _rule("low", lambda e: e.low, NOT_USABLE),
+    _rule("none", lambda e: e.found.of_all is None and (not e.met or "not tested" in e.classes)),
+    _rule("found", lambda e: "not decided" in e.classes or "not tested" in e.classes),
+    _rule("produced", lambda e: "produced to meet" in e.classes),
+    _rule("met", lambda e: bool(e.classes) or e.met),
+    _rule("found", lambda _: True),
+)
+"""The rules of a statement; the first that fits gives the headline and the exit code."""
 
 
 def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
     """Return what the statement says of all that was found."""
-    texts, of_all, standards = found.texts, found.of_all, found.standards
-    against = _against(found)
-    bad = against.always or (strict and against.strictly)
-    doubtful = against.strictly or _doubtful(of_all)
+    texts, lengths = found.texts, found.standards.lengths
+    whole = None if lengths is None else lengths.test.together
+    high, low = _rejected(found.of_all)
+    evidence = _Evidence(
+        found,
+        strict,
+        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
+        high=high,
+        low=low,
+        lengths=whole is not None and (whole.rejected_high or whole.rejected_low),
+    )
+    _, headline, exit_code = fitting_rules(RULES, evidence)[0]
     remarks = _remarks(found)
-    remarks += [
-        texts("control.wrong", point=each.point, p=texts.probability(each.p))
-        for each in against.control[:NAMED]
-    ]
-    named = texts.listed([each.point for each in against.control], NAMED)
-    n, verdict = 0 if of_all is None else of_all.n, texts.text(found.result.verdict.message)
+    remarks += [texts("control.wrong", point=each.point, p=each.p) for each in evidence.control[:NAMED]]
+    doubtful = evidence.doubtful or _doubtful(found.of_all)
     return Judged(
-        exit=NOT_USABLE if bad else 0,
-        tone="bad" if bad else "look" if remarks or doubtful else "good",
-        headline=texts(
-            _headline(against, of_all, standards, strict=strict), verdict=verdict, points=named, n=n
-        ),
+        exit=exit_code,
+        tone="bad" if exit_code else "look" if remarks or doubtful else "good",
+        headline=texts(headline.code, **headline.fields),
         sentences=[
             *_asprs(found),
             *(_nssda(found) if "nssda" in found.asked.standards else []),
@@ -102,21 +149,6 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
         ],
         assumptions=assumptions(found, assumed),
         remarks=remarks,
-    )
-
-
-def _against(found: Grounds) -> _Against:
-    high, low = _rejected(found.of_all)
-    verdict, standards = found.result.verdict, found.standards
-    lengths = None if standards.lengths is None else standards.lengths.test.together
-    return _Against(
-        spoilt=not verdict.usable,
-        missed=_missed(standards),
-        high=high,
-        warning=verdict.warning,
-        low=low,
-        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
-        lengths=lengths is not None and (lengths.rejected_high or lengths.rejected_low),
     )
 
 
@@ -145,32 +177,6 @@ def _doubtful(of_all: Figures | None) -> bool:
     )
 
 
-def _missed(standards: Standards) -> bool:
-    classes = () if standards.asprs is None else standards.asprs.verdicts.values()
-    return "missed" in classes or (standards.lengths is not None and standards.lengths.test.met is False)
-
-
-def _headline(against: _Against, of_all: Figures | None, standards: Standards, *, strict: bool) -> str:
-    verdicts = [] if standards.asprs is None else list(standards.asprs.verdicts.values())
-    met = standards.lengths is not None and standards.lengths.test.met
-    for holds, name in (
-        (against.spoilt, "verdict"),
-        (against.missed, "missed"),
-        (against.high, "high"),
-        (strict and against.warning, "warning"),
-        (strict and against.control, "control"),
-        (strict and against.lengths, "lengths"),
-        (against.low, "low"),
-        (of_all is None and (not met or "not tested" in verdicts), "none"),
-        ("not decided" in verdicts or "not tested" in verdicts, "found"),
-        ("produced to meet" in verdicts, "produced"),
-        (bool(verdicts) or bool(met), "met"),
-    ):
-        if holds:
-            return f"headline.{name}"
-    return "headline.found"
-
-
 def _asprs(of: Grounds) -> Said:
     texts, found = of.texts, of.standards.asprs
     if found is None:
@@ -178,20 +184,20 @@ def _asprs(of: Grounds) -> Said:
     said: Said = []
     for name in ("h", "v", "3d"):
         figure, size = found.figures[name], of.asked.classes.get(name)
-        own = {f"rmse_{name}": texts.length(figure.rmse)} if figure is not None else {}
+        own = {f"rmse_{name}": figure.rmse} if figure is not None else {}
         if size is None:
             if figure is not None and name != "3d":
                 said.append(texts.said(f"asprs.found.{name}", n=figure.count, **own))
         elif figure is not None:
             key = f"asprs.{_CASES[found.verdicts[name]]}.{name}"
-            said.append(texts.said(key, n=figure.count, **{"class": texts.size(size)}, **own))
+            said.append(texts.said(key, n=figure.count, **{"class": size}, **own))
         elif name != "3d":
-            left = {f"loo_{name}": texts.length(found.left_out[name])}
-            said.append(texts.said(f"asprs.none.{name}", **{"class": texts.size(size)}, **left))
+            left = {f"loo_{name}": found.left_out[name]}
+            said.append(texts.said(f"asprs.none.{name}", **{"class": size}, **left))
     vegetated = found.figures["vva"]
     if vegetated is not None:
         key = f"asprs.{wording(vegetated.count)}.vva"
-        said.append(texts.said(key, n=vegetated.count, rmse_v=texts.length(vegetated.rmse)))
+        said.append(texts.said(key, n=vegetated.count, rmse_v=vegetated.rmse))
     return said
 
 
@@ -201,14 +207,11 @@ def _nssda(of: Grounds) -> Said:
         return []
     said: Said = []
     if found.accuracy_r is not None:
-        accuracy = texts.length(found.accuracy_r)
-        said.append(texts.said(f"nssda.{found.wording}.h", accuracy_r=accuracy, n=found.count))
+        said.append(texts.said(f"nssda.{found.wording}.h", accuracy_r=found.accuracy_r, n=found.count))
     elif found.ce95 is not None and found.ratio is not None:
-        ratio = texts.number(found.ratio, 2)
-        said.append(texts.said("nssda.ce95", ratio=ratio, ce95=texts.length(found.ce95)))
+        said.append(texts.said("nssda.ce95", ratio=found.ratio, ce95=found.ce95))
     if found.accuracy_z is not None:
-        accuracy = texts.length(found.accuracy_z)
-        said.append(texts.said(f"nssda.{found.wording}.v", accuracy_z=accuracy, n=found.count))
+        said.append(texts.said(f"nssda.{found.wording}.v", accuracy_z=found.accuracy_z, n=found.count))
     return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
 
 
@@ -217,12 +220,7 @@ def _lengths(of: Grounds) -> Said:
     if found is None:
         return []
     test = found.test
-    own: dict[str, str | int] = {
-        "n": len(test.errors),
-        "lines": test.lines,
-        "largest": texts.length(test.largest),
-        "rms": texts.length(test.rms),
-    }
+    own = {"n": len(test.errors), "lines": test.lines, "largest": test.largest, "rms": test.rms}
     if found.limit is None or test.within is None:
         said = [texts.said("lengths.found", **own)]
     else:
@@ -235,7 +233,7 @@ def _lengths(of: Grounds) -> Said:
     if test.together is not None:
         whole = test.together
         key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
-        said.append(texts.said(key, **_factor(texts, whole.factor, whole.interval)))
+        said.append(texts.said(key, **_factor(whole.factor, whole.interval)))
     return said
 
 
@@ -248,23 +246,18 @@ def _honest(found: Grounds) -> Said:
     high, low = _rejected(of_all)
     if whole is not None:
         key = f"honest.{'high' if high else 'low' if low else 'yes'}"
-        said.append(texts.said(key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval)))
+        said.append(texts.said(key, n=whole.points, **_factor(whole.factor, whole.factor_interval)))
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
-            fields = _factor(texts, own.factor, own.factor_interval)
+            fields = _factor(own.factor, own.factor_interval)
             said.append(texts.said("honest.part", component=texts(f"component.{part}"), **fields))
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
         if shift.rejected:
-            fields = {
-                "component": texts(f"component.{part}"),
-                "mean": texts.length(shift.mean),
-                "expanded": texts.length(shift.expanded),
-                "k": texts.number(shift.expanded / shift.sd_of_mean, 2),
-                "p": texts.percent(found.asked.coverage),
-            }
-            said.append(texts.said("bias.found", **fields))
+            sizes = {"mean": shift.mean, "expanded": shift.expanded, "k": shift.expanded / shift.sd_of_mean}
+            component, p = texts(f"component.{part}"), texts.percent(found.asked.coverage)
+            said.append(texts.said("bias.found", component=component, **sizes, p=p))
     if shifts and not any(shift.rejected for _, shift in shifts):
         said.append(texts.said("bias.none"))
     return [*said, *_surface(texts, of_all.surface), *_points(found, of_all.points)]
@@ -273,31 +266,24 @@ def _honest(found: Grounds) -> Said:
 def _surface(texts: Texts, found: Surface | None) -> Said:
     if found is None:
         return [texts.said("surface.few")]
-    p = texts.probability(found.p)
     if not found.rejected:
-        return [texts.said("surface.none", p=p)]
-    said = [texts.said("surface.found", p=p)]
+        return [texts.said("surface.none", p=found.p)]
+    said = [texts.said("surface.found", p=found.p)]
     largest = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
     for name, field, k in (("shift", "shift", 0), ("tilt", "rise", largest), ("dome", "bend", 3)):
         if abs(found.t[k]) > critical_normal(LEVEL):
-            size, sd = texts.length(float(found.estimate[k])), texts.length(float(found.sd[k]))
-            said.append(texts.said(f"surface.{name}", **{field: size, "sd": sd}))
+            said.append(texts.said(f"surface.{name}", **{field: found.estimate[k], "sd": found.sd[k]}))
     return said
 
 
-def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[str, str]:
-    return {
-        "factor": texts.number(factor, 2),
-        "low": texts.number(interval[0], 2),
-        "high": texts.number(interval[1], 2),
-    }
+def _factor(factor: float, interval: tuple[float, float]) -> dict[str, float]:
+    return {"factor": factor, "low": interval[0], "high": interval[1]}
 
 
 def _points(found: Grounds, tests: PointTests) -> Said:
-    """Return which single points disagree, and which were set beside."""
     texts, names, without = found.texts, found.compared.names, found.asked.without
     said = [
-        texts.said("point.wrong", point=names[row], p=texts.probability(float(tests.least[row])))
+        texts.said("point.wrong", point=names[row], p=tests.least[row])
         for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
     ]
     if without:
@@ -324,7 +310,7 @@ def _remarks(found: Grounds) -> list[str]:
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
     if shift is not None and heights is not None and _two_heights(found.compared, shift, heights):
-        said.append(texts("bias.heights", mean=texts.length(shift.mean), sd=texts.length(heights.sd)))
+        said.append(texts("bias.heights", mean=shift.mean, sd=heights.sd))
     return said
 
 
@@ -335,7 +321,7 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
     if not math.isfinite(test.longest):
         said.append(texts("lengths.diagonal"))
     elif not test.long_enough:
-        said.append(texts("lengths.short", share=texts.percent(test.longest)))
+        said.append(texts("lengths.short", share=test.longest))
     if not test.along_diagonal:
         said.append(texts("lengths.direction", angle=texts.number(math.degrees(test.off_diagonal), 0)))
     if found.expansion is None:
@@ -352,20 +338,15 @@ def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
     for name, good in own.survey.items():
         figure = own.figures[name]
         if not good and figure is not None:
-            size = {"class": texts.size(asked.classes[name])}
-            said.append(texts("asprs.survey", survey=texts.length(figure.survey), **size))
+            said.append(texts("asprs.survey", survey=figure.survey, **{"class": asked.classes[name]}))
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
             # Half a class holds; where heights are no product, the whole horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
-            said.append(texts(f"asprs.control.{name}", sd=texts.length(rmse), limit=texts.size(limit)))
+            said.append(texts(f"asprs.control.{name}", sd=rmse, limit=texts.size(limit)))
     for each in own.remarks[:NAMED]:
-        fields = {
-            "component": texts(f"component.{each.component}"),
-            "value": texts.length(each.value),
-            "limit": texts.length(each.limit),
-        }
+        fields = {"component": texts(f"component.{each.component}"), "value": each.value, "limit": each.limit}
         if each.point is None:
             said.append(texts("asprs.mean", **fields))
         else:
@@ -374,13 +355,13 @@ def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
 
 
 def _layout(texts: Texts, found: Layout) -> list[str]:
-    told: list[tuple[bool, str, dict[str, str | int]]] = [
+    remarks: list[tuple[bool, str, dict[str, float]]] = [
         (not found.even, "quadrants", {}),
-        (not found.apart, "spacing", {"spacing": texts.percent(found.least_spacing)}),
-        (found.far > 0, "far", {"percent": texts.percent(found.far)}),
+        (not found.apart, "spacing", {"spacing": found.least_spacing}),
+        (found.far > 0, "far", {"percent": found.far}),
         (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
     ]
-    return [texts(f"layout.{name}", **fields) for holds, name, fields in told if holds]
+    return [texts(f"layout.{name}", **fields) for holds, name, fields in remarks if holds]
 
 
 def _two_heights(found: Compared, shift: Bias, own: Sized) -> bool:

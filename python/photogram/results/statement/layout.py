@@ -14,15 +14,13 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
+from photogram.results.statement.request import invalid
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
-FAR = 1 / 3
-"""Of the diagonal: farther from a check point the block is not checked."""
-CELLS = 200
-"""Of the box on each side, at whose middles the area that is far from check points is counted."""
+FAR = 1 / 3  # Distance from check points as a part of the diagonal
+CELLS = 200  # Grid for the area far from check points, along each side
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
     low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
     diagonal = math.hypot(*(high - low))
     if not diagonal > 0:
-        raise InputError("extent: all positions lie at one place in plan")
+        raise invalid("extent", "request.identical-positions")
     above = own[:, :2] > (low + high) / 2
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
     return Layout(
@@ -87,17 +85,16 @@ def _plan(name: str, given: ArrayLike, least: int) -> Floats:
     """Return (n, 2 or more) positions that are finite in plan."""
     found = numbers(name, given, missing=True)
     if found.ndim != 2 or found.shape[1] not in (2, 3):
-        raise InputError(f"{name} has the shape {found.shape}, not (n, 3)")
+        raise invalid(name, "error.shape", shape="(n, 3)", actual=str(found.shape))
     if len(found) < least:
-        raise InputError(f"{name} has no position")
+        raise invalid(name, "error.empty")
     bad = ~np.isfinite(found[:, :2]).all(axis=1)
     if bad.any():
-        raise InputError(f"{name}[{np.argmax(bad)}] is not finite in plan")
+        raise invalid(f"{name}[{np.argmax(bad)}]", "error.finite", found[bad][0, :2].tolist())
     return found
 
 
 def _least_spacing(plan: Floats) -> float:
-    """Return the least distance between two of some points; NaN for one point."""
     if len(plan) < 2:
         return math.nan
     reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))
@@ -119,7 +116,6 @@ def _far(plan: Floats, block: Floats, limit: float) -> float:
 
 
 def _heights(own: Floats, block: Floats) -> float:
-    """Return the range of some heights over that of a block, as far as they are known."""
     whole, known = block[np.isfinite(block)], own[np.isfinite(own)]
     extent = np.ptp(whole) if whole.size else 0.0
     return float(np.ptp(known) / extent) if known.size and extent > 0 else math.nan

@@ -17,15 +17,15 @@ from photogram.arguments.arrays import frozen, indices, is_covariance, names, nu
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.statement.request import invalid
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
+from photogram.words import phrase
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
-ALONG = math.radians(15.0)
-"""Between a line and a diagonal of the volume along which it runs, at the most."""
-REFERENCE = 20.0
-"""Degrees Celsius: the temperature of which calibrated lengths are."""
+ALONG = math.radians(15.0)  # Largest angle between a line and a diagonal of the volume
+REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,11 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
     """
     own = numbers("positions", positions)
     if own.ndim != 2 or own.shape[1] != 3:
-        raise InputError(f"positions has the shape {own.shape}, not (p, 3)")
+        raise invalid("positions", "error.shape", shape="(p, 3)", actual=str(own.shape))
     joint = shaped("covariance", covariance, (own.size, own.size))
     ends = numbers("pairs", pairs)
     if ends.ndim != 2 or ends.shape[1] != 2:
-        raise InputError(f"pairs has the shape {ends.shape}, not (m, 2)")
+        raise invalid("pairs", "error.shape", shape="(m, 2)", actual=str(ends.shape))
     count = len(ends)
     first, second = (
         indices(f"pairs[:, {end}]", np.asarray(pairs)[:, end], count, len(own)) for end in (0, 1)
@@ -116,7 +116,7 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
     steps = own[second] - own[first]
     found = np.linalg.norm(steps, axis=1)
     if not (found > 0).all():
-        raise InputError(f"pairs[{np.argmin(found > 0)}]: its two points lie at one place")
+        raise invalid(f"pairs[{np.argmin(found > 0)}]", "request.identical-positions")
     along = steps / found[:, np.newaxis]
     gradient = np.zeros((count, len(own), 3))
     rows = np.arange(count)
@@ -134,10 +134,10 @@ def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
     """
     own, box = numbers("steps", steps), shaped("extent", extent, (3,))
     if own.ndim != 2 or own.shape[1] != 3 or not len(own):
-        raise InputError(f"steps has the shape {own.shape}, not (m, 3) with one step at least")
+        raise invalid("steps", "error.shape", shape="(m, 3)", actual=str(own.shape))
     sizes = np.linalg.norm(own, axis=1) * float(np.linalg.norm(box))
     if not (sizes > 0).all():
-        raise InputError("steps and extent have lengths that are not zero")
+        raise invalid("steps", "request.identical-positions")
     # Of the four diagonals the one whose components have the signs of the step is the nearest.
     nearest = float((np.abs(own) @ np.abs(box) / sizes).max())
     return math.acos(min(nearest, 1.0))
@@ -152,7 +152,7 @@ def at_reference(lengths: ArrayLike, temperatures: ArrayLike, expansion: float) 
     own = numbers("lengths", lengths)
     grown = 1 + expansion * (shaped("temperatures", temperatures, own.shape) - REFERENCE)
     if not (np.isfinite(grown) & (grown > 0)).all():
-        raise InputError(f"expansion and temperatures make no length: {expansion:g} per kelvin")
+        raise invalid("expansion", "request.expansion", expansion)
     return own / grown
 
 
@@ -179,18 +179,18 @@ def length_test(
     """
     own = numbers("measured", measured)
     if own.ndim != 1 or not own.size:
-        raise InputError(f"measured has the shape {own.shape}, not (m,) with one length at least")
+        raise invalid("measured", "error.shape", shape="(m,)", actual=str(own.shape))
     given = shaped("calibrated", calibrated, own.shape)
     joint, deviations = shaped("covariance", covariance, 2 * own.shape), shaped("sd", sd, own.shape)
     for name, values in (("measured", own), ("calibrated", given), ("sd", deviations)):
         bad = ~(np.isfinite(values) & (values >= 0))
         if bad.any():
-            raise InputError(f"{name}[{np.argmax(bad)}] is not a length: {values[bad][0]:g}")
+            raise invalid(f"{name}[{np.argmax(bad)}]", "error.not-negative", float(values[bad][0]))
     if not is_covariance(joint, singular=True):
-        raise InputError("covariance is not symmetric and positive semidefinite")
+        raise InputError(phrase("error.covariance-singular"))
     on = names("lines", lines)
     if len(on) != own.size:
-        raise InputError(f"lines has {len(on)} names, not {own.size}")
+        raise invalid("lines", "error.count", count=own.size, actual=len(on))
     errors = own - given
     found = agreement(
         errors[:, np.newaxis], joint, deviations[:, np.newaxis, np.newaxis] ** 2, second=freedom

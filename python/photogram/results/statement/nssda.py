@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.results.statement.request import invalid
 from photogram.statistics.error_radii import circular_error
 
-ENOUGH = 20
-"""Check points that are asked for."""
+ENOUGH = 20  # Required check points
 VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
 """Factors of RMSE_z, of the radial RMSE, and of the mean of the RMSE of both axes."""
-LEAST_RATIO = 0.6
-"""Of the smaller RMSE of an axis to the larger: below it no factor holds."""
+LEAST_RATIO = 0.6  # Ratio of the RMSE of the axes below which the factors are not valid
 
 
 @dataclass(frozen=True)
@@ -55,13 +53,13 @@ def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
     None where there are none.
     """
     if rmse_z is not None and not rmse_z >= 0:
-        raise InputError(f"a root mean square error is not negative: {rmse_z:g}")
+        raise invalid("rmse_z", "error.not-negative", rmse_z)
     vertical = None if rmse_z is None else VERTICAL * rmse_z
     if moments is None:
         return Nssda(count, None, None, None, None, vertical)
     matrix = numbers("moments", moments)
     if matrix.shape != (2, 2):
-        raise InputError(f"moments has the shape {matrix.shape}, not (2, 2)")
+        raise invalid("moments", "error.shape", shape="(2, 2)", actual=str(matrix.shape))
     ce95 = float(circular_error(matrix[np.newaxis], 0.95)[0])
     small, large = sorted(math.sqrt(each) for each in np.diag(matrix).tolist())
     ratio = small / large if large > 0 else 1.0

@@ -7,29 +7,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import value_field
 from photogram.arguments.types import Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
 from photogram.results.cameras import units
-from photogram.results.result import adjusted
-from photogram.results.selection import Item
-from photogram.words import Phrase
+from photogram.results.selection import Item, adjusted
+from photogram.results.statement.request import invalid
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
-PRINCIPAL = ("f", "fx", "c")
-"""Parameters that are principal distances."""
-MANY = 10_000
-"""Names among which no near one is sought: it takes long."""
-TOGETHER = 256
-"""Points whose distances to all others are computed at a time."""
+PRINCIPAL = ("f", "fx", "c")  # Names of principal distances
+MAX_SEARCHED_NAMES = 10_000  # Larger lists of names are not searched for the nearest name
+TOGETHER = 256  # Points of one block of distances
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,25 +50,23 @@ def wanted(result: Result, asked: Any) -> Wanted:
         return _linear(result, asked)
     words = asked.split() if isinstance(asked, str) else []
     if len(words) < 3:
-        raise InputError(
-            f"{shown(asked)} is no quantity: 'point C08 z', 'distance C01 C30', 'camera drone f'"
-        )
+        raise InputError(phrase("request.quantity", value=value_field(asked)))
     kind = words[0]
     if kind == "distance":
         return _distance(result, asked, _two(result.block, words[1:]))
     kinds = adjusted(result).things
     if kind not in kinds or kind == "step":
-        raise InputError(f"there are no quantities of the kind {kind!r}{nearest(kind, kinds)}")
+        raise InputError(unknown_name("kind of quantity", kind, kinds))
     name, component = " ".join(words[1:-1]), words[-1]
     things = kinds[kind]
     if name not in things.ids:
-        raise InputError(f"there is no {kind} {name!r}{hint(name, things.ids)}")
+        raise InputError(unknown(kind, name, things.ids))
     names = things.components[list(things.ids).index(name)]
     lower = [each.lower() for each in names]
     own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
     if own is None:
         if component.lower() not in lower:
-            raise InputError(f"{kind} {name} has no {component!r}: it has {', '.join(names)}")
+            raise InputError(unknown_name(f"component of {kind} {name}", component, names))
         own = names.index(component) if component in names else lower.index(component.lower())
     _check(result, kind, [name])
     subject = Phrase(f"quantity.{kind}", {"of": component_of(name, Phrase(f"axis.{component}"))})
@@ -129,19 +124,19 @@ def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
         if known.issuperset(names):
             return names
     lacking = next((word for word in words if word not in known), words[0])
-    raise InputError(f"there is no point {lacking!r}{hint(lacking, block.point_ids)}")
+    raise InputError(unknown("point", lacking, block.point_ids))
 
 
-def hint(name: str, names: Sequence[str]) -> str:
-    """Return the nearest of many names as a question; nothing where none is near."""
-    there = nearest(name, names) if len(names) < MANY else ""
-    return there if "mean" in there else ""
+def unknown(kind: str, name: str, names: Sequence[str]) -> Phrase:
+    """Return the message that there is no thing with a name; of many things without the nearest name."""
+    searched = len(names) < MAX_SEARCHED_NAMES
+    return unknown_name(kind, name, names) if searched else phrase("error.absent", kind=kind, name=name)
 
 
 def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
     _check(result, "point", ends)
     if ends[0] == ends[1]:
-        raise InputError(f"{name!r}: a distance is between two points")
+        raise InputError(phrase("request.distance", point=ends[0]))
     spheroid = result.block.spheroid
 
     def between(x: Any, y: Any) -> Any:
@@ -163,22 +158,19 @@ def _geocentric(x: Any, a: float, b: float) -> Any:
 
 
 def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
-    """Return a linear function by its gradient."""
     items, parts = [], []
     for item, gradient in gradients.items():
         values = np.asarray(gradient, dtype=float)
         if not (isinstance(item, tuple) and len(item) == 2) or not np.isfinite(values).all():
-            raise InputError(
-                f"{item!r} with {gradient!r} is no part of a gradient: ('point', 'C08'): [0, 0, 1]"
-            )
+            raise InputError(phrase("request.gradient", value=value_field((item, gradient))))
         _check(result, str(item[0]), [str(item[1])])
         width = len(adjusted(result).selected(item).values)
         if values.shape != (width,):
-            raise InputError(f"the gradient of {item[0]} {item[1]} has {values.size} numbers, not {width}")
+            raise invalid(f"gradient of {item[0]} {item[1]}", "error.count", count=width, actual=values.size)
         items.append(item)
         parts.append(values)
     if not items:
-        raise InputError("a gradient of nothing is no quantity")
+        raise InputError(phrase("request.gradient", value=value_field(gradients)))
     parts_of = [Phrase(f"quantity.{kind}", {"of": own}) for kind, own in items]
     subject = Phrase("quantity.linear", {"quantities": parts_of})
     return Wanted(
@@ -192,7 +184,7 @@ def _check(result: Result, kind: str, names: Sequence[str]) -> None:
     ids = result.block.point_ids
     for name in names:
         if name in ids and not result.used_points[ids.index(name)]:
-            raise InputError(f"the point {name} took no part in the adjustment")
+            raise InputError(phrase("adjusted.unused-point", point=name))
 
 
 def _unit(result: Result, kind: str, name: str, component: int) -> str:

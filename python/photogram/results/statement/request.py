@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import names, number, numbers, shown, truth_value
+from photogram.arguments.arrays import names, number, numbers, one_of, truth_value, value_field
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.results.components import VarianceComponents
+from photogram.words import phrase
 
-__all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "length_of", "lengths_in"]
+__all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "invalid", "length_of", "lengths_in"]
 
 STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
-INDEPENDENT = ("yes", "same-base", "no")
-"""What may be declared of the survey of check points."""
+INDEPENDENT = ("yes", "same-base", "no")  # Of the survey of check points from the block
 METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
-METRES["us-ft"] = 1200 / 3937
-"""Metres of the units of length."""
+METRES["us-ft"] = 1200 / 3937  # Metres of the units of length
 _UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
@@ -96,50 +95,58 @@ class Asked:
     date: str = ""
 
     @classmethod
-    def checked(cls, **given: Any) -> Asked:
-        """Return what is asked, checked.
+    def checked(cls, **options: Any) -> Asked:
+        """Return the options, checked.
 
         Raises
         ------
         InputError
-            What there is not, or cannot be.
+            An unknown option, or a value that is not allowed.
         """
         known = [each.name for each in fields(cls)]
-        for name in given:
+        for name in options:
             if name not in known:
-                raise InputError(f"a statement has no {name}{nearest(name, known)}")
-        own = {name: value for name, value in given.items() if value is not None}
-        asked = cls(**{name: _CHECKS.get(name, _text)(name, value) for name, value in own.items()})
+                raise InputError(unknown_name("option of a statement", name, known))
+        values = {name: value for name, value in options.items() if value is not None}
+        asked = cls(**{name: _CHECKS.get(name, _text)(name, value) for name, value in values.items()})
         asked._check()
         return asked
 
     def _check(self) -> None:
-        for each in self.standards:
-            if each not in STANDARDS:
-                raise InputError(f"there is no standard {each!r}{nearest(each, STANDARDS)}")
+        for standard in self.standards:
+            if standard not in STANDARDS:
+                raise InputError(unknown_name("standard", standard, STANDARDS))
         for name, size in self.classes.items():
-            if name not in ("h", "v", "3d"):
-                raise InputError(f"a class is horizontal (h), vertical (v) or 3d, not {name!r}")
-            if not 0 < size < math.inf:
-                raise InputError(f"the class {name} is a length, not {size}")
-        if self.independent is not None and self.independent not in INDEPENDENT:
-            raise InputError(f"independent is one of {', '.join(INDEPENDENT)}, not {self.independent!r}")
+            one_of("a class", name, ("h", "v", "3d"))
+            _positive(f"class {name}", size)
+        if self.independent is not None:
+            one_of("independent", self.independent, INDEPENDENT)
         if not 0 < self.coverage < 1:
-            raise InputError(f"coverage is a probability between 0 and 1, not {self.coverage}")
+            raise invalid("coverage", "error.range", self.coverage, low=0, high=1)
         if self.expansion is not None and not math.isfinite(self.expansion):
-            raise InputError(f"the thermal expansion is a number, not {self.expansion}")
+            raise invalid("expansion", "error.finite", self.expansion)
         if "vdi-2634" in self.standards and not self.lengths:
-            raise InputError("vdi-2634 is about calibrated lengths: a table of lengths lacks")
-        if self.area is not None and not 0 < self.area < math.inf:
-            raise InputError(f"the area is a positive number, not {self.area}")
+            raise InputError(phrase("error.requires", name="vdi-2634", other=phrase("request.lengths")))
+        if self.area is not None:
+            _positive("area", self.area)
         for point, reason in self.without.items():
             if not reason.strip():
-                raise InputError(f'{point} is left out for a reason: --without {point}="target moved"')
+                raise InputError(phrase("request.reason", point=point))
+
+
+def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
+    """Return the error that a value is not allowed."""
+    return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
+
+
+def _positive(name: str, value: float) -> None:
+    if not 0 < value < math.inf:
+        raise invalid(name, "error.positive", value)
 
 
 def _text(name: str, value: object) -> str:
     if not isinstance(value, str) or "\0" in value or (not value.isascii() and _UNPAIRED.search(value)):
-        raise InputError(f"{name} is no text: {shown(value)}")
+        raise invalid(name, "error.text", value)
     return value
 
 
@@ -149,77 +156,75 @@ def _several(name: str, value: Any) -> tuple[str, ...]:
 
 def _mapping(name: str, value: object) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{name} is no mapping: {shown(value)}")
+        raise invalid(name, "error.table", value)
     return value
 
 
-def _sizes(name: str, value: object) -> dict[str, float]:
-    return {_text(name, own): number(f"{name} {own}", each) for own, each in _mapping(name, value).items()}
+def _by_name(check: Callable[[str, Any], Any]) -> Callable[[str, Any], dict[str, Any]]:
+    """Return the check of a mapping whose values have a check."""
+    return lambda name, value: {
+        _text(name, key): check(f"{name} {key}", own) for key, own in _mapping(name, value).items()
+    }
 
 
-def _sentences(name: str, value: object) -> dict[str, str]:
-    return {_text(name, own): _text(f"{name} {own}", each) for own, each in _mapping(name, value).items()}
+def _sequence(name: str, value: Any) -> Sequence[Any]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise invalid(name, "error.list", value)
+    return value
 
 
-def _three(name: str, given: Any) -> tuple[float, ...]:
+def _three(name: str, value: Any) -> tuple[float, ...]:
     """Return one number, or three, for east, north and up."""
-    values = tuple(np.atleast_1d(numbers(name, given)).ravel().tolist())
+    values = tuple(np.atleast_1d(numbers(name, value)).ravel().tolist())
     values = values * 3 if len(values) == 1 else values
     if len(values) != 3 or not all(each >= 0 and math.isfinite(each * each) for each in values):
-        raise InputError(f"{name} is one standard deviation, or three (east, north, up), not {shown(given)}")
+        raise invalid(name, "request.deviations", value)
     return values
 
 
-def _limit(name: str, given: Any) -> tuple[float, float, float]:
-    values = np.atleast_1d(numbers(name, given)).ravel().tolist()
+def _limit(name: str, value: Any) -> tuple[float, float, float]:
+    values = np.atleast_1d(numbers(name, value)).ravel().tolist()
     if len(values) != 3 or not all(each >= 0 for each in values) or not math.isfinite(values[0] + values[1]):
-        raise InputError(f"the limit of lengths is A, K and B of A + K L <= B, not {shown(given)}")
+        raise invalid(name, "request.limit", value)
     return values[0], values[1], values[2]
 
 
-def _lengths(name: str, given: Any) -> tuple[Mapping[str, Any], ...]:
-    if isinstance(given, str) or not isinstance(given, Sequence):
-        raise InputError(f"{name} is no list of lengths: {shown(given)}")
-    return tuple(
-        _length(f"{name}[{row}]", _mapping(f"{name}[{row}]", each)) for row, each in enumerate(given)
-    )
+def _lengths(name: str, value: Any) -> tuple[Mapping[str, Any], ...]:
+    return tuple(_length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value)))
 
 
-def _length(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    lacking = [key for key in ("line", "from", "to", "length", "sd") if key not in given]
-    if lacking:
-        raise InputError(f"{name} has no {lacking[0]}")
-    line, first, last = names(name, [given[key] for key in ("line", "from", "to")])
-    values = {key: number(f"{name} {key}", given[key]) for key in ("length", "sd")}
-    if given.get("temperature") is not None:
-        values["temperature"] = number(f"{name} temperature", given["temperature"])
-    return {"line": line, "from": first, "to": last, **values}
+def _length(name: str, value: Any) -> dict[str, Any]:
+    row = _mapping(name, value)
+    for key in ("line", "from", "to", "length", "sd"):
+        if key not in row:
+            raise invalid(name, "error.missing", name=key)
+    line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
+    figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
+    if row.get("temperature") is not None:
+        figures["temperature"] = number(f"{name} temperature", row["temperature"])
+    return {"line": line, "from": first, "to": last, **figures}
 
 
-def _quantities(name: str, given: Any) -> tuple[Any, ...]:
-    if isinstance(given, str | Mapping):
-        return (given,)
-    if not isinstance(given, Sequence):
-        raise InputError(f"{name} is no list of quantities: {shown(given)}")
-    return tuple(given)
+def _quantities(name: str, value: Any) -> tuple[Any, ...]:
+    return (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
 
 
-def _components(name: str, given: object) -> object:
-    if not isinstance(given, VarianceComponents):
-        raise InputError(f"{name} are no variance components: {shown(given)}")
-    return given
+def _components(name: str, value: object) -> object:
+    if not isinstance(value, VarianceComponents):
+        raise invalid(name, "error.kind", value, kind="VarianceComponents")
+    return value
 
 
 _CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
     "standards": _several,
-    "classes": _sizes,
+    "classes": _by_name(number),
     "area": number,
     "sd": _three,
-    "without": _sentences,
+    "without": _by_name(_text),
     "vegetated": lambda name, value: frozenset(_several(name, value)),
     "survey_common_sd": _three,
     "survey_common_in_control": truth_value,
-    "text": _sentences,
+    "text": _by_name(_text),
     "budgets": _quantities,
     "coverage": number,
     "components": _components,
@@ -227,7 +232,6 @@ _CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
     "limit": _limit,
     "expansion": number,
 }
-"""What checks and converts options; the others are text."""
 
 
 def lengths_in(unit: str) -> float:
@@ -238,10 +242,9 @@ def lengths_in(unit: str) -> float:
     InputError
         A unit that nobody knows.
     """
-    try:
-        return METRES[unit]
-    except KeyError:
-        raise InputError(f"there is no unit of length {unit!r}{nearest(unit, METRES)}") from None
+    if unit not in METRES:
+        raise InputError(unknown_name("unit of length", unit, METRES))
+    return METRES[unit]
 
 
 def length_of(given: str, unit: str, *, area: bool = False) -> float:
@@ -253,12 +256,11 @@ def length_of(given: str, unit: str, *, area: bool = False) -> float:
         No length, or one without its unit.
     """
     found = _LENGTH.fullmatch(given)
-    what = "an area with its unit: 12.5km2" if area else "a length with its unit: 5cm"
-    if found is None or not found[2] or bool(found[3]) != area:
-        raise InputError(f"{given!r} is not {what}")
     try:
+        if found is None or not found[2] or bool(found[3]) != area:
+            raise ValueError
         value = float(found[1])
     except ValueError:
-        raise InputError(f"{given!r} is not {what}") from None
+        raise InputError(phrase("request.area" if area else "request.length", value=given)) from None
     factor = lengths_in(found[2]) / lengths_in(unit)
     return value * (factor**2 if area else factor)

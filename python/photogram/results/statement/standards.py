@@ -28,9 +28,10 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.nssda import Nssda, nssda
-from photogram.results.statement.quantities import hint
+from photogram.results.statement.quantities import unknown
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -219,9 +220,9 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     places = {name: row for row, name in enumerate(block.point_ids)}
     for name in names:
         if name not in places:
-            raise InputError(f"a length ends in {name!r}, which is no point{hint(name, block.point_ids)}")
+            raise InputError(unknown("point", name, block.point_ids))
         if not result.used_points[places[name]]:
-            raise InputError(f"a length ends in {name}, which took no part in the adjustment")
+            raise InputError(phrase("adjusted.unused-point", point=name))
     rows = np.array([places[name] for name in names], dtype=np.int64)
     positions, joint = result.point_positions[rows], result.covariance(("point", names))
     if block.geographic:

@@ -13,7 +13,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import Compared, compared, control_places
@@ -33,7 +33,7 @@ from photogram.show.page import Document
 from photogram.show.quantity import records
 from photogram.show.run import InputFile
 from photogram.show.summary import Brief, Rows
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 __all__ = ["Statement", "statement"]
 
@@ -133,7 +133,7 @@ class Statement(Grounds, Brief):
             if each.quantity == name:
                 return budget_member(each)
         names = [each.quantity for each in self.taken_apart]
-        raise InputError(f"the statement has no budget {name!r}{nearest(name, names)}")
+        raise InputError(unknown_name("budget", name, names))
 
     def brief(self) -> tuple[str, Rows]:
         """Return the statement in a few lines."""
@@ -166,7 +166,7 @@ class Statement(Grounds, Brief):
         try:
             from photogram.show.pdf import page_pdf
         except ModuleNotFoundError:
-            raise InputError("a PDF requires typst: pip install 'photogram[pdf]'") from None
+            raise InputError(phrase("error.package", what="PDF", package="typst", extra="pdf")) from None
         return _written(page_pdf(self.document(), author=self.asked.firm), path)
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
@@ -226,16 +226,12 @@ def statement(
     """
     options = Asked.checked(**asked)
     if not result.converged:
-        raise AdjustmentError(
-            f"there is no statement of an adjustment that has not converged: {result.status}"
-        )
+        raise AdjustmentError(phrase("request.not-converged", status=result.status))
     if (
         not result.WHOLE
         or not np.isfinite(result.point_cofactors[np.flatnonzero(result.used_points)[:1]]).all()
     ):
-        raise AdjustmentError(
-            "there is no statement without covariances: adjust with covariance=True, not in parts"
-        )
+        raise AdjustmentError(phrase("request.covariances"))
     texts = Texts(options.language, options.text, result.block.linear_unit)
     covariances = result.covariances()
     found = compared(result, options, covariances)

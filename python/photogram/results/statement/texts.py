@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from string import Formatter
 from typing import Any
 
+from photogram.arguments.arrays import one_of, value_field
 from photogram.errors import InputError
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
-from photogram.words import Phrase, Words, table_of
+from photogram.words import Phrase, Words, phrase, table_of
 
 LANGUAGES = ("en", "de")
-NOTHING = "–"
-"""What stands for a number that there is not."""
+NOTHING = "–"  # Missing number
 
 
 def fields_of(sentence: str) -> set[str]:
@@ -23,26 +23,14 @@ def fields_of(sentence: str) -> set[str]:
     try:
         parts = list(Formatter().parse(sentence))
     except ValueError as error:
-        raise InputError(f"{sentence!r}: {error}") from None
+        raise InputError(phrase("request.braces", sentence=sentence, reason=str(error))) from None
     return {name for _, name, _, _ in parts if name is not None}
 
 
 class Texts(Words):
     """Sentences in a language, with numbers as the language writes them.
 
-    Parameters
-    ----------
-    language
-        `en`, `de`.
-    own
-        Sentences by key that stand for those of the language.
-    unit
-        The linear unit of the block.
-
-    Raises
-    ------
-    InputError
-        A language or a key that there is not, fields that a sentence does not have.
+    `own` are sentences by code that replace those of the language, `unit` is the linear unit of the block.
     """
 
     def __init__(
@@ -51,24 +39,35 @@ class Texts(Words):
         own: Mapping[str, str] | None = None,
         unit: str = "m",
     ) -> None:
-        if language not in LANGUAGES:
-            raise InputError(f"there is no language {language!r}: {', '.join(LANGUAGES)}")
+        one_of("language", language, LANGUAGES)
         self.language, self.unit = language, unit
         english = table_of("en")
         for key, sentence in (own or {}).items():
             if key not in english:
-                raise InputError(f"there is no sentence {key!r}{nearest(key, english)}")
+                raise InputError(unknown_name("code", key, english))
             if not isinstance(sentence, str):
-                raise InputError(f"{key} is no sentence: {sentence!r}")
-            if strange := fields_of(sentence) - fields_of(english[key]):
-                raise InputError(f"{key} has no field {sorted(strange)[0]!r}")
+                raise InputError(
+                    phrase("error.at", what=key, message=phrase("error.text", value=value_field(sentence)))
+                )
+            known = fields_of(english[key])
+            if strange := fields_of(sentence) - known:
+                raise InputError(
+                    phrase("request.field", code=key, field=sorted(strange)[0], names=sorted(known))
+                )
             if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
-                raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
+                raise InputError(phrase("request.form", code=key))
         super().__init__(language, own)
         own = table_of(language)
         families = {key.partition(".")[0] for key in own}  # The others are of no statement
         self.missing = sorted(key for key in set(english) - set(own) if key.partition(".")[0] in families)
         """Keys that are said in English for want of a sentence in the language."""
+
+    def __call__(self, code: str, **fields: Any) -> str:
+        """Return the sentence of a code; numbers have the forms of :data:`FORMS`."""
+        for name, value in fields.items():
+            if isinstance(value, float) and name in FORMS:
+                fields[name] = FORMS[name](self, value)
+        return super().__call__(code, **fields)
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
         """Return a key with its sentence."""
@@ -155,3 +154,16 @@ class Texts(Words):
         kind, *things, component = parts
         one = ", ".join(self.word("one", part) for part in kind.split(", "))
         return " ".join([one, *things, self.word("axis", component)])
+
+
+FORMS: dict[str, Callable[[Texts, float], str]] = {
+    **dict.fromkeys(("rmse", "rmse_h", "rmse_v", "rmse_3d", "loo_h", "loo_v"), Texts.length),
+    **dict.fromkeys(("accuracy_r", "accuracy_z", "ce95", "largest", "rms", "mean", "expanded"), Texts.length),
+    **dict.fromkeys(("sd", "shift", "rise", "bend", "survey", "value", "east", "north"), Texts.length),
+    **dict.fromkeys(("height", "limit"), Texts.length),
+    **dict.fromkeys(("share", "percent", "spacing"), Texts.percent),
+    **dict.fromkeys(("factor", "low", "high", "k", "ratio"), lambda texts, value: texts.number(value, 2)),
+    "p": Texts.probability,
+    "class": Texts.size,
+}
+"""Forms of numbers in sentences by the names of fields."""

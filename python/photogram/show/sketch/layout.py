@@ -12,9 +12,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.declared import Panel, Sketch
-from photogram.show.sketch.letters import widest, width, wrapped
+from photogram.show.sketch.letters import Box, widest, width, wrapped
 from photogram.show.sketch.marks import Labelled, Level, Line, Markers, Polygons
-from photogram.show.sketch.names import Box
 from photogram.show.sketch.ticks import Ticks, ticks
 
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
@@ -27,27 +26,18 @@ MIN_SIDE = 40.0  # Of a box
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A panel and where it goes.
-
-    Attributes
-    ----------
-    box
-        Left, upper, right and lower side of what is between the axes.
-    across, up
-        What is written along them; `numbered`: whether across, too.
-    title, notes
-        Their lines.
-    beside
-        Room of the numbers at the left, of all panels of its column: their names are aligned.
-    """
+    """A panel and where it goes."""
 
     panel: Panel
-    box: Box
+    box: Box  # Left, upper, right and lower side of the area between the axes
+    # Ticks of the axes; `numbered`: whether the axis across has its numbers
     across: Ticks
     up: Ticks
     numbered: bool
+    # Lines of title and notes
     title: list[str]
     notes: list[str]
+    # Width of the numbers at the left of all panels of its column
     beside: float = 0.0
 
     def at(self, places: Floats) -> Floats:

@@ -1,9 +1,13 @@
-"""How wide words are: pictures are laid out before anything draws them."""
+"""Widths of words, and free places for names: pictures are laid out before they are drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
+from photogram.arguments.types import Floats
+
+Box: TypeAlias = tuple[float, float, float, float]  # Left, low, right and high side
 # Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. Of the letters that
 # pages have it is the widest, so that what fits with it fits with the others.
 _ASCII = (
@@ -42,3 +46,32 @@ def wrapped(text: str, size: float, room: float) -> list[str]:
                 own.append(word)
         lines += own
     return lines
+
+
+def free_side(
+    size: tuple[float, float],
+    place: tuple[float, float],
+    gap: float,
+    taken: Sequence[Box],
+    places: Floats,
+    room: Box,
+) -> Box | None:
+    """Return the box of a name at one of eight sides of its place; None if no side is free.
+
+    It has a distance `gap` from the place, is within `room`, and covers neither `taken` boxes nor `places`.
+    """
+    (width, height), (x, y) = size, place
+    across = (x + gap, x - width / 2, x - gap - width)
+    up = (y + gap, y - height / 2, y - gap - height)
+    for i, j in ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2)):
+        box = left, low, right, high = across[i], up[j], across[i] + width, up[j] + height
+        inside = room[0] <= left and right <= room[2] and room[1] <= low and high <= room[3]
+        hit = ((places > [left, low]) & (places < [right, high])).all(axis=1).any()
+        if inside and not hit and not any(overlap(box, other) for other in taken):
+            return box
+    return None
+
+
+def overlap(one: Box, other: Box) -> bool:
+    """Return whether two boxes have something in common."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]

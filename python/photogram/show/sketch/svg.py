@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.show.sketch.colours import hexadecimal, stops
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import (
     BAR_LINE,
@@ -36,9 +35,8 @@ from photogram.show.sketch.layout import (
     right_end,
     right_side,
 )
-from photogram.show.sketch.letters import widest, width
-from photogram.show.sketch.marks import Labelled, Shades
-from photogram.show.sketch.names import Box
+from photogram.show.sketch.letters import Box, widest, width
+from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, stops
 from photogram.show.sketch.svg_contours import levels_written
 from photogram.show.sketch.svg_marks import Attributes, element, names, number, path, sample, svg, text
 from photogram.show.sketch.ticks import Ticks, ticks
@@ -49,16 +47,9 @@ LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
 
 
 def svg_of(sketch: Sketch, name: str, title: str) -> str:
-    """Return a picture as an SVG element; nothing where no panel has anything.
+    """Return a picture as an SVG element; empty without panels.
 
-    Parameters
-    ----------
-    sketch
-        The picture.
-    name
-        Begins the identifiers of its parts: unique on a page.
-    title
-        Says to those who do not see it what it is.
+    Identifiers of its parts begin with `name`; `title` describes it for readers who cannot see it.
     """
     panels = laid_out(sketch)
     if not panels:
@@ -93,7 +84,6 @@ def _panel(placed: Placed, name: str) -> str:
 
 
 def _axes(placed: Placed) -> str:
-    """Return the lines of the axes with their numbers and names."""
     panel, (left, top, right, low) = placed.panel, placed.box
     over = placed.at(
         np.column_stack([placed.across.values, np.full(len(placed.across.values), panel.limits[0, 1])])
@@ -138,7 +128,6 @@ def _across(given: Ticks, places: Sequence[float], low: float, *, turned: bool) 
 
 
 def _above(placed: Placed) -> str:
-    """Return the title and the scales under it."""
     panel, (left, top, right, _) = placed.panel, placed.box
     y = top - above(panel, placed.title)
     found = []
@@ -160,7 +149,6 @@ def _notes(placed: Placed) -> str:
 
 
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    """Return the legend, and what of the panel it takes."""
     marks = labelled(placed.panel)
     if not placed.panel.legend or not marks:
         return "", []

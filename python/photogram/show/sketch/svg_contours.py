@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.layout import NUMBER, Placed
-from photogram.show.sketch.letters import width
-from photogram.show.sketch.marks import Contours, Shades
-from photogram.show.sketch.names import Box, overlap
+from photogram.show.sketch.letters import Box, overlap, width
+from photogram.show.sketch.marks import Contours, Shades, hexadecimal, rgb
 from photogram.show.sketch.svg_marks import HALO, element, joined, path, svg, text
 
 MIN_LABELLED_LENGTH = 30.0  # Points of a line on which its level is written

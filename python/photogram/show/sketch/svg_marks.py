@@ -13,9 +13,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
-from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.layout import NAME, Placed
-from photogram.show.sketch.letters import width
+from photogram.show.sketch.letters import Box, free_side, width
 from photogram.show.sketch.marks import (
     Arrows,
     Ellipses,
@@ -29,8 +28,9 @@ from photogram.show.sketch.marks import (
     Polygons,
     Shades,
     Texts,
+    hexadecimal,
+    rgb,
 )
-from photogram.show.sketch.names import Box, free_side
 
 COLOURS_OF_MAP = 48
 MAX_EXACT_PLACES = 300  # Lines of more places have coordinates in tenths of a point, others in hundredths

@@ -28,18 +28,9 @@ class Ticks:
 
 
 def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
-    """Return the ticks of an axis.
+    """Return the ticks of an axis with (2,) limits; `length` of the axis and `size` of letters are points.
 
-    Parameters
-    ----------
-    limits
-        (2,) its values at the ends.
-    length, size
-        Of the axis and of letters, points.
-    across
-        Whether texts stand side by side.
-    log
-        Whether equal ratios are equally long: then they are 1, 2, 5 times powers of ten.
+    Numbers `across` are side by side. Logarithmic axes have 1, 2, 5 times powers of ten.
     """
     low, high = sorted(limits.tolist())
     if log and (ratios := _ratios(low, high, length, size, across=across)):

@@ -23,10 +23,8 @@ from photogram.statistics.distributions import LEVEL, critical_chi_square, criti
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
 
-ON_POINT = 2
-"""Groups that go from one point in a round, at the most, where R of all rows is too large."""
-AHEAD = 10
-"""Groups that are taken out regardless, at the most, to see whether they hide each other."""
+ON_POINT = 2  # Largest number of removals on one point in a round without R of all rows
+AHEAD = 10  # Largest number of trial removals that search for masked errors
 
 
 @dataclass(frozen=True)
@@ -53,16 +51,6 @@ class Level:
         return min(self.family * steps / max(self.tests, 1), 0.5)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A group that goes in a round."""
-
-    group: int  # Its number among all
-    first_statistic: float  # T at the start of the round
-    chosen: Chosen  # What its test says; rows and rivals by their numbers among all
-    limit: float  # The level that it was compared with
-
-
 @dataclass(frozen=True, eq=False)
 class Choosing:
     """What a round chooses from, and how."""
@@ -81,7 +69,7 @@ class Choosing:
         """The groups."""
         return self.trial.suspects
 
-    def choose(self) -> list[Choice]:
+    def choose(self) -> list[Chosen]:
         """Choose what goes in a round, in the order in which it goes."""
         if not self.trial.whole:
             return self._bounded()
@@ -93,7 +81,7 @@ class Choosing:
         )
         return self._sequences(conditional, np.array([groups]))[0]
 
-    def on_gone_points(self, points: Sequence[int]) -> tuple[list[Choice], set[int]]:
+    def on_gone_points(self, points: Sequence[int]) -> tuple[list[Chosen], set[int]]:
         """Choose on points that are out with all that was observed of them.
 
         Each is tested against the photos as the others determine them. Returns what goes, and the points that
@@ -115,12 +103,12 @@ class Choosing:
 
     def _sequences(
         self, conditional: Conditional, groups: Indices, most: float = math.inf
-    ) -> list[list[Choice]]:
+    ) -> list[list[Chosen]]:
         """Take groups out of each block while the next is significant, or hides one that is.
 
         `groups`: (n, K) the numbers of the groups of each block.
         """
-        found: list[list[Choice]] = [[] for _ in groups]
+        found: list[list[Chosen]] = [[] for _ in groups]
         sure = np.zeros(len(groups), dtype=np.int64)
         left = self.allowed[groups]
         going = np.arange(len(groups))
@@ -149,11 +137,11 @@ class Choosing:
             step += 1
             sure[going[significant]] = step
             for block, own in zip(going.tolist(), chosen, strict=True):
-                group = int(groups[block, own.group])
-                found[block].append(Choice(group, float(self.tests.statistic[group]), own, limit))
+                first = float(self.tests.statistic[groups[block, own.group]])
+                found[block].append(replace(own, first_statistic=first, limit=limit))
         return [own[: sure[block]] for block, own in enumerate(found)]
 
-    def _bounded(self) -> list[Choice]:
+    def _bounded(self) -> list[Chosen]:
         limit = self.level.limit(self.out)
         beyond = _beyond(self.tests, self.unit, self.scales, limit)
         candidates = np.flatnonzero(self.allowed & beyond)
@@ -162,17 +150,17 @@ class Choosing:
             candidates = np.argsort(-np.nan_to_num(ratio, nan=-math.inf), kind="stable")[:AHEAD]
             candidates = candidates[self.allowed[candidates]]
         found = self._on_points(candidates)
-        found.sort(key=lambda choice: (choice.chosen.log_probability, -choice.chosen.statistic, choice.group))
+        found.sort(key=lambda choice: (choice.log_probability, -choice.statistic, choice.group))
         load = _Load(self.suspects, self.tests)
         kept = []
         for choice in found:
-            critical = _critical(self.unit, choice.chosen.dimension, limit) * self.scales[choice.group]
+            critical = _critical(self.unit, choice.dimension, limit) * self.scales[choice.group]
             if load.leaves(choice, critical):
                 load.add(choice)
                 kept.append(choice)
         return kept
 
-    def _on_points(self, candidates: Indices) -> list[Choice]:
+    def _on_points(self, candidates: Indices) -> list[Chosen]:
         """Choose on the point of each candidate; of a candidate without a point, itself."""
         first: dict[int, int] = {}
         for group in candidates.tolist():
@@ -186,7 +174,7 @@ class Choosing:
         blocks: Sequence[tuple[list[int], Floats, Floats]],
         units: Sequence[UnitWeight],
         most: float = math.inf,
-    ) -> list[Choice]:
+    ) -> list[Chosen]:
         """Choose in blocks of groups whose R is known, those with groups of the same sizes together."""
         all_sizes = np.diff(self.suspects.row_starts)
         alike: dict[tuple[int, ...], list[int]] = {}
@@ -246,13 +234,11 @@ def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
     return unit.weighted_sum_of_squares * ratio / (1 + ratio)
 
 
-def _among_all(choice: Choice, places: Indices, offsets: Indices) -> Choice:
+def _among_all(choice: Chosen, places: Indices, offsets: Indices) -> Chosen:
     """Count rows and rivals among all."""
-    own = choice.chosen
-    rivals = tuple((int(places[place]), t, m, odds) for place, t, m, odds in own.rivals)
-    rows = own.rows + offsets[own.group]
-    moved = replace(own, group=choice.group, rows=rows, rivals=rivals)
-    return replace(choice, chosen=moved)
+    rivals = tuple((int(places[place]), t, m, odds) for place, t, m, odds in choice.rivals)
+    rows = choice.rows + offsets[choice.group]
+    return replace(choice, group=int(places[choice.group]), rows=rows, rivals=rivals)
 
 
 class _Load:
@@ -271,15 +257,15 @@ class _Load:
         photo = int(self.suspects.photos[group])
         return [photo] if photo >= 0 else self.suspects.loads(group).tolist()
 
-    def leaves(self, choice: Choice, critical: float) -> bool:
+    def leaves(self, choice: Chosen, critical: float) -> bool:
         """Whether a group is significant whatever the chosen do to it."""
         group = choice.group
         load = max((self.of_photo.get(each, 0.0) for each in self._photos(group)), default=0.0)
-        left = math.sqrt(max(choice.chosen.statistic, 0.0)) - math.sqrt(self._shared(group)) * load
+        left = math.sqrt(max(choice.statistic, 0.0)) - math.sqrt(self._shared(group)) * load
         return left > math.sqrt(critical) or (load == 0.0)
 
-    def add(self, choice: Choice) -> None:
+    def add(self, choice: Chosen) -> None:
         """Count a group that was chosen."""
-        size = math.sqrt(self._shared(choice.group) * max(choice.chosen.statistic, 0.0))
+        size = math.sqrt(self._shared(choice.group) * max(choice.statistic, 0.0))
         for each in self._photos(choice.group):
             self.of_photo[each] = self.of_photo.get(each, 0.0) + size

@@ -77,6 +77,8 @@ class Chosen:
     cofactors: Floats
     # Places of groups that were significant before and are not after, with T, m' and odds
     rivals: tuple[tuple[int, float, int, float], ...]
+    first_statistic: float = math.nan  # T at the start of the round
+    limit: float = math.nan  # the level that it was compared with
 
 
 class Conditional:
@@ -210,7 +212,5 @@ class Conditional:
         self.v[flat, places[there]] = 0.0
 
 
-BENT = 2e-5
-"""What the curvature of the equations may make of the difference of two T, in T^(3/2)."""
-RIVAL = 20.0
-"""Odds from which on another group is no rival."""
+BENT = 2e-5  # Largest effect of curvature on the difference of two T, in T^(3/2)
+RIVAL = 20.0  # Smallest odds against a rival

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 __all__ = ["Removal", "Rival", "Round"]
 
@@ -43,14 +43,14 @@ class Removal:
     error_sd: tuple[float, ...]
     redundancy: float  # The smallest redundancy of a direction that shows
     rivals: tuple[Rival, ...] = ()  # groups that may contain the error instead
-    consequences: tuple[str, ...] = ()  # further removals and their reasons
+    consequences: tuple[Phrase | str, ...] = ()  # further removals and their reasons
     # prediction, prediction_log_probability, prediction_error: T of it, its log-probability, and observed
-    # minus predicted, against the network without it; None where its point or photo is out with it
+    # minus predicted, against the network without it; None if its point or photo is out with it
     prediction: float | None = None
     prediction_log_probability: float | None = None
     prediction_error: tuple[float, ...] = ()
     returned: int | None = None  # round of the return; None while it is excluded
-    kept: str = ""  # why it was not removed although its test rejects
+    kept: Phrase | str = ""  # why it was not removed although its test rejects
 
     @property
     def name(self) -> str:
@@ -72,14 +72,13 @@ class Removal:
         return tuple(rival for rival in self.rivals if rival.odds < NEAR)
 
     @property
-    def sentence(self) -> str:
-        """What was found, with what it cannot be told apart from."""
-        others = [f"{rival.name} (odds {rival.odds:.2g} : 1)" for rival in self.in_dispute]
-        return " or ".join([self.name, *others])
+    def sentence(self) -> Phrase:
+        """The removed group with its rivals."""
+        rivals = [phrase("snooping.rival", name=rival.name, odds=rival.odds) for rival in self.in_dispute]
+        return phrase("snooping.rivals", groups=[self.subject, *rivals])
 
 
-NEAR = 3.0
-"""Odds below which both are named."""
+NEAR = 3.0  # Odds of rivals that the log names
 
 
 @dataclass(frozen=True)
@@ -94,4 +93,3 @@ class Round:
     limit: float  # Probability below which a group is taken out
     removed: Sequence[int]  # numbers in the log
     returned: Sequence[int]
-    remarks: Sequence[str] = ()

@@ -17,6 +17,7 @@ from photogram.statistics.snooping.taking_out import (
     with_prediction,
 )
 from photogram.statistics.snooping.whole_photos import take_bad_photos_out, take_photos_out
+from photogram.words import Phrase, phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Outcome:
     # given ones stand
     factors: dict[str, float]
     final: Tests  # at the end
-    remarks: list[str]
+    remarks: list[Phrase]
 
 
 def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None = None) -> Outcome:
@@ -47,7 +48,7 @@ def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None]
         How.
     afresh
         Starts the trial anew from a consensus of its observations, for where its adjustment runs off; returns
-        what the consensus does without, None where there is none.
+        what the consensus does without, None if there is none.
     """
     work = begun(trial, settings, afresh)
     take_bad_photos_out(work)
@@ -60,7 +61,7 @@ def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None]
         if not removed and not returned:
             break
     else:
-        work.remarks.append(f"snooping has not ended after {work.settings.max_rounds} rounds")
+        work.remarks.append(phrase("snooping.not-ended", n=work.settings.max_rounds))
     out = [place for place, each in enumerate(work.log) if each.is_out]
     for place in out:
         work.log[place] = with_prediction(work, place)
@@ -81,13 +82,12 @@ def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
     standing = work.standing
     count = sum(each.is_out for each in work.log)
     choices = work.choosing(work.allowed(), count, ahead=True).choose()
-    remarks: list[str] = []
     # In a large network what went before returns in the adjustment that takes others out.
     returned = [] if work.trial.whole else agreeing(work)
-    removed = work.apply(work.entries(choices, number), remarks, returned)
+    removed = work.apply(work.entries(choices, number), returned)
     note_return(work, returned, number)
     if work.trial.whole:
         returned = take_back(work, number)
     removed += take_photos_out(work, number)
-    work.note_round(number, standing, removed, returned, out=count, remarks=remarks)
+    work.note_round(number, standing, removed, returned, out=count)
     return removed, returned

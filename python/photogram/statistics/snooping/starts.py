@@ -17,22 +17,19 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.messages import counted
 from photogram.statistics.reliability import TESTABLE
-from photogram.statistics.snooping.choosing import Choice
+from photogram.statistics.snooping.conditioning import Chosen
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests, Trial
 from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability, take_back
 from photogram.statistics.snooping.whole_photos import log_photo, take_photo
+from photogram.words import Phrase, phrase
 
-MEDIAN = 0.6744897501960817
-"""Of the absolute value of a standard normal variable."""
-MEDIAN_OF_TWO = 1.1774100225154747
-"""Of the length of a vector of two of them."""
+MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
+MEDIAN_OF_TWO = 1.1774100225154747  # Median of the length of a vector of two of them
 OPTIMISTIC = 2.0
 """Standard deviations that are too small by more than this are told from gross errors by the median."""
-ENOUGH = 20
-"""Test values that a median needs."""
+ENOUGH = 20  # Smallest number of test values for a median
 
 
 def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
@@ -54,11 +51,8 @@ def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
         factor = max(robust_factor(sizes) if len(sizes) >= ENOUGH else overall, 1.0)
         factors[name] = factor
         squares[own] = factor**2
-    named = ", ".join(f"{name} {factor:.3g}" for name, factor in factors.items())
-    work.remarks.append(
-        "standard deviations are too small by about the robust factor"
-        f" {overall:.3g} (median of the test values): tested with them times {named}"
-    )
+    named = [phrase("snooping.factor", kind=name, factor=factor) for name, factor in factors.items()]
+    work.remarks.append(phrase("snooping.factors", overall=overall, factors=named))
     return factors, squares
 
 
@@ -81,8 +75,7 @@ FAR = 5.0
 CANDIDATE = 4.4
 """Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
 weight."""
-SCALES = 5
-"""Robust adjustments at the most until their scale stands."""
+SCALES = 5  # Largest number of robust adjustments
 
 
 def needs_robust_start(work: TakingOut) -> bool:
@@ -121,29 +114,28 @@ def start_robustly(work: TakingOut) -> None:
         candidates,
         work.tests,
         work.standing,
-        "many observations disagree: a robust adjustment (Huber, then Cauchy)",
+        phrase("snooping.robust"),
     )
 
 
-def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: Standing, what: str) -> None:
+def start_without(
+    work: TakingOut, candidates: Indices, first: Tests, standing: Standing, start: Phrase
+) -> None:
     """Put the points of some groups aside, and let tests against all others decide about them."""
-    suspects, start = work.suspects, work.out
+    suspects, out = work.suspects, work.out
     points = np.unique(suspects.points[candidates])
     points = points[points >= 0]
     choices, judged = _on_points_aside(work, points.tolist(), candidates, first)
     others = candidates[~np.isin(suspects.points[candidates], sorted(judged))]
     entries = [work.as_it_was(group, first) for group in others.tolist()]
     entries += work.entries(choices, 0)
-    work.out = start
-    removed = work.apply(entries, [])
+    work.out = out
+    removed = work.apply(entries)
     if not removed:
         work.adjust(work.out)
     if not work.factors:
         work.factors, work.scales = scales(work)
-    work.remarks.append(
-        f"{what} put {len(points)} points aside; tests against the photos of the others decided which of"
-        " their rays stay out"
-    )
+    work.remarks.append(phrase("snooping.aside", start=start, n=len(points)))
     returned = take_back(work, 0)
     work.note_round(0, standing, removed, returned)
 
@@ -151,7 +143,7 @@ def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: 
 def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
     """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
 
-    None where no robust adjustment converges.
+    None if no robust adjustment converges.
 
     The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
     residuals of the robust adjustment, until it stands.
@@ -177,7 +169,7 @@ def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
 
 def _on_points_aside(
     work: TakingOut, points: list[int], candidates: Indices, first: Tests
-) -> tuple[list[Choice], set[int]]:
+) -> tuple[list[Chosen], set[int]]:
     """Adjust without some points and all candidates; choose on these points; tell which were judged."""
     out = work.out.copy()
     out.points |= set(points)
@@ -243,7 +235,7 @@ def _without(trial: Trial, aside: Aside) -> Out:
 def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     """Test what a consensus does without against the rest; what agrees takes part.
 
-    `before`: how everything together stood; None where it could not be adjusted.
+    `before`: how everything together stood; None if it could not be adjusted.
     """
     first, tests, start = work.standing, work.tests, work.out
     out, consequences = Out(np.zeros_like(start.rows)), {}
@@ -263,21 +255,17 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     choices, _ = choosing.on_gone_points(points)
     work.out = whole
     entries = predicted + work.entries(choices, 0)
-    removed = work.apply(entries, []) if entries else []
+    removed = work.apply(entries) if entries else []
     if not removed:
         work.adjust(whole)
     if _runs_off(work):
         removed += _still_out(work, points, images, tests)
-    for photo, said in aside.photos.items():
-        removed.append(log_photo(work, photo, 0, before, (said, *consequences[photo])))
-    parts = [counted(len(images), "image")] if len(images) else []
-    parts += [str(work.suspects.photo_name(photo)) for photo in aside.photos]
-    why = "runs off" if before is not None else "leads nowhere (before: without what follows)"
-    said = f"; {agreeing} of the images agree with it" if agreeing else ""
-    work.remarks.append(
-        f"the adjustment of everything {why}: it was started anew from {aside.found_by}, without"
-        f" {' and '.join(parts)}; tests against the rest decided about them{said}"
-    )
+    for photo, reason in aside.photos.items():
+        removed.append(log_photo(work, photo, 0, before, (reason, *consequences[photo])))
+    parts = [phrase("snooping.images", n=len(images))] if len(images) else []
+    parts += [work.suspects.photo_name(photo) for photo in aside.photos]
+    fields = {"start": aside.found_by, "parts": parts, "n": agreeing}
+    work.remarks.append(Phrase(f"snooping.{'bent' if before is not None else 'undetermined'}", fields))
     work.note_round(0, first, removed, [])
 
 
@@ -290,11 +278,11 @@ def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests
     back = [group for group in images.tolist() if not work.out.rows[suspects.rows(group)].any()]
     one_of_each = {int(suspects.points[group]): group for group in reversed(back)}
     entries = [
-        work.as_it_was(group, tests).with_(consequences=("its rays do not meet",))
+        work.as_it_was(group, tests).with_(consequences=(phrase("snooping.rays-part"),))
         for point, group in sorted(one_of_each.items())
         if point in points
     ]
-    return work.apply(entries, []) if entries else []
+    return work.apply(entries) if entries else []
 
 
 def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Protocol
 
@@ -14,30 +15,52 @@ from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
 
-@dataclass(frozen=True, eq=False)
-class Suspects:
+class Suspects(ABC):
     """G groups of observations with M rows in all, one group after the other."""
 
-    row_starts: Indices  # (G + 1,) where the rows of each group start
-    kinds: Indices  # (G,) which of `kind_names` each is of
-    kind_names: Sequence[str]  # `image`, `control`, ...
-    # (G,) number of the image, point, observation, ... of a group
-    subjects: Indices
-    # points, photos: (G,) the point and the photo that a group is of; -1 where there is none. Groups of one
-    # point cannot be judged one without the other
-    points: Indices
-    photos: Indices
-    # Further photos that a group concerns: those that observe its point
-    loads: Callable[[int], Indices]
-    removable: Bools  # (G,) whether snooping may take it out
-    # Rows that may go alone, of a group by its number: plan, height, or all of a control point. None where
-    # the group goes as a whole
-    parts: Callable[[int], Sequence[Sequence[int]] | None]
-    # Name of a group, component and unit of a row
-    name: Callable[[int], Phrase]
-    row_name: Callable[[int], str]
-    unit: Callable[[int], str]
-    photo_name: Callable[[int], Phrase]
+    def __init__(
+        self,
+        row_starts: Indices,
+        kinds: Indices,
+        kind_names: Sequence[str],
+        subjects: Indices,
+        points: Indices,
+        photos: Indices,
+        removable: Bools,
+    ) -> None:
+        self.row_starts = row_starts  # (G + 1,) first row of each group
+        self.kinds, self.kind_names = (
+            kinds,
+            kind_names,
+        )  # (G,) types by their numbers: `image`, `control`, ...
+        self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
+        # (G,) point and photo of a group, or -1; tests of groups of one point depend on each other
+        self.points, self.photos = points, photos
+        self.removable = removable  # (G,) whether snooping may remove it
+
+    @abstractmethod
+    def loads(self, group: int) -> Indices:
+        """Return the photos that a group concerns: those that observe its point."""
+
+    @abstractmethod
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return the rows that may go alone, of a group by its number; None if it goes as a whole."""
+
+    @abstractmethod
+    def name(self, group: int) -> Phrase:
+        """Return the name of a group."""
+
+    @abstractmethod
+    def row_name(self, row: int) -> str:
+        """Return the component of a row."""
+
+    @abstractmethod
+    def unit(self, row: int) -> str:
+        """Return the unit of a row."""
+
+    @abstractmethod
+    def photo_name(self, photo: int) -> Phrase:
+        """Return the name of a photo."""
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -138,8 +161,8 @@ class Aside:
 
     # The groups, by their numbers, that do not meet where most of their point and photo do
     images: tuple[int, ...]
-    photos: dict[int, str]  # Photos whose images agree with no pose, and why that is said
-    found_by: str = "a consensus of resections and intersections"  # What the consensus is of
+    photos: dict[int, str | Phrase]  # Photos whose images agree with no pose, with the reason
+    found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
 
 class LostSupportError(Exception):
@@ -157,44 +180,35 @@ class Trial(Protocol):
     @property
     def suspects(self) -> Suspects:
         """The groups."""
-        ...
 
     @property
     def deviations(self) -> Floats:
         """(M,) standard deviations a priori, in the units of the rows."""
-        ...
 
     @property
     def whole(self) -> bool:
         """Whether R of all rows together is small enough to be had."""
-        ...
 
     def adjust(self, out: Out) -> Standing:
         """Adjust without what is out; raises LostSupportError."""
-        ...
 
     def tests(self) -> Tests:
         """Test all groups."""
-        ...
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups; None where it cannot be predicted."""
-        ...
+        """Test what is out of groups; None if it cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
-        ...
 
     def response(self) -> tuple[Floats, Floats]:
         """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
-        ...
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for points that are out, all groups there with residuals and R as if they took part.
 
-        Each point by itself, against what the others determine; empty where that is not known.
+        Each point by itself, against what the others determine; empty if that is not known.
         """
-        ...
 
     def resist(self, scale: float) -> Floats | None:
         """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
@@ -202,8 +216,6 @@ class Trial(Protocol):
         Returns (G,) the lengths of the residuals of unit weight, zero for what no loss is applied to; None
         where that leads nowhere, and nothing has changed.
         """
-        ...
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
         """Return points that are left with too few rays, and photos without support, when a group is out."""
-        ...

@@ -11,8 +11,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
-from photogram.statistics.snooping.choosing import Choice, Choosing, Level
-from photogram.statistics.snooping.conditioning import UnitWeight
+from photogram.statistics.snooping.choosing import Choosing, Level
+from photogram.statistics.snooping.conditioning import Chosen, UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
@@ -37,9 +37,8 @@ class Settings:
     max_rounds: int = 20
 
 
-RESCUES = 5
-"""Attempts to leave a round with everything determined."""
-_NOT_DETERMINED = "its point is no longer determined and has left the network"
+RESCUES = 5  # Largest number of attempts of a round to determine all unknowns
+_NOT_DETERMINED = Phrase("snooping.point-undetermined")
 
 
 class TakingOut:
@@ -52,7 +51,7 @@ class TakingOut:
         self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool)) if out is None else out
         self.log: list[Removal] = []
         self.rounds: list[Round] = []
-        self.remarks: list[str] = []
+        self.remarks: list[Phrase] = []
         self.returns: set[int] = set()
         self.kept: set[int] = set()
         self.predicted: dict[int, tuple[Prediction, float]] = {}
@@ -71,14 +70,7 @@ class TakingOut:
     def choosing(self, allowed: Bools, out: int, *, ahead: bool) -> Choosing:
         """Return what chooses among allowed groups when so many are out."""
         return Choosing(
-            trial=self.trial,
-            tests=self.tests,
-            unit=self.unit(),
-            scales=self.scales,
-            allowed=allowed,
-            level=self.level,
-            out=out,
-            ahead=ahead,
+            self.trial, self.tests, self.unit(), self.scales, allowed, self.level, out, ahead=ahead
         )
 
     def note_round(
@@ -89,7 +81,6 @@ class TakingOut:
         returned: Sequence[int],
         *,
         out: int = 0,
-        remarks: Sequence[str] = (),
     ) -> None:
         """Add a round to the log: how the network stood before it, with so many out, and what it changed."""
         self.rounds.append(
@@ -102,7 +93,6 @@ class TakingOut:
                 limit=self.level.limit(out),
                 removed=removed,
                 returned=returned,
-                remarks=remarks,
             )
         )
 
@@ -134,30 +124,25 @@ class TakingOut:
             limit=self.level.limit(0),
         )
 
-    def entries(self, choices: list[Choice], number: int) -> list[Removal]:
+    def entries(self, choices: list[Chosen], number: int) -> list[Removal]:
         """Return what was chosen as entries of the log."""
         entries = []
         for choice in choices:
-            own = choice.chosen
-            deviations = self.trial.deviations[own.rows]
+            deviations = self.trial.deviations[choice.rows]
             rivals = tuple(
                 Rival(str(self.suspects.name(group)), statistic, dimension, odds)
-                for group, statistic, dimension, odds in own.rivals
+                for group, statistic, dimension, odds in choice.rivals
             )
+            names = ("first_statistic", "statistic", "dimension", "fisher", "log_probability", "limit")
             entries.append(
                 self.entry(
                     choice.group,
-                    own.rows,
+                    choice.rows,
                     number,
-                    first_statistic=choice.first_statistic,
-                    statistic=own.statistic,
-                    dimension=own.dimension,
-                    fisher=own.fisher,
-                    log_probability=own.log_probability,
-                    error=own.error * deviations,
-                    error_sd=np.sqrt(np.diagonal(own.cofactors)) * deviations,
-                    limit=choice.limit,
+                    error=choice.error * deviations,
+                    error_sd=np.sqrt(np.diagonal(choice.cofactors)) * deviations,
                     rivals=rivals,
+                    **{name: getattr(choice, name) for name in names},
                 )
             )
         return entries
@@ -185,7 +170,7 @@ class TakingOut:
             **values,
         )
 
-    def apply(self, entries: list[Removal], remarks: list[str], returning: Sequence[int] = ()) -> list[int]:
+    def apply(self, entries: list[Removal], returning: Sequence[int] = ()) -> list[int]:
         """Take groups out with what cannot stay without them, and adjust.
 
         Groups without which the network falls apart stay, and are said to.
@@ -228,7 +213,7 @@ class TakingOut:
 
     def _keep(self, entry: Removal) -> None:
         self.kept.add(entry.group)
-        self.log.append(entry.with_(kept="nothing else determines what it belongs to"))
+        self.log.append(entry.with_(kept=Phrase("snooping.needed")))
 
     def _out_with(self, out: Out, entry: Removal) -> Removal:
         """Put a group out, and what cannot stay without it."""
@@ -238,7 +223,7 @@ class TakingOut:
         if photos:
             out.rows[list(entry.rows)] = False
             self.kept.add(entry.group)
-            return entry.with_(kept="it would leave a photo with fewer than three points")
+            return entry.with_(kept=Phrase("snooping.photo-undetermined"))
         own = int(self.suspects.points[entry.group])
         if _NOT_DETERMINED in consequences and own >= 0:
             points = points | {own}
@@ -247,13 +232,13 @@ class TakingOut:
             consequences += self.left(out, point)
         return entry.with_(consequences=tuple(dict.fromkeys(consequences))) if consequences else entry
 
-    def left(self, out: Out, point: int) -> Iterator[str]:
-        """Put everything of a point out, and say so."""
+    def left(self, out: Out, point: int) -> Iterator[Phrase]:
+        """Put everything of a point out, with a message for each group."""
         for group in self.suspects.on_point(point).tolist():
             rows = self.suspects.rows(group)
             if not out.rows[rows].all():
                 out.rows[rows] = True
-                yield f"{self.suspects.name(group)} is no longer used (its point is left with one ray)"
+                yield Phrase("snooping.single-ray", {"name": self.suspects.name(group)})
 
     def adjust(self, out: Out) -> None:
         """Adjust without what is out, and test the rest; raises LostSupportError."""

@@ -11,7 +11,7 @@ from photogram.statistics.distributions import log_chi_square
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import LostSupportError, Out, Standing
 from photogram.statistics.snooping.taking_out import TakingOut
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 FAR = 5.0
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
@@ -19,8 +19,7 @@ LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
 EVEN = 0.25
 """Share of the largest test value of a photo that the median of all of them has where all its images are
 bad: a few huge errors, such as exchanged names, lift the others, but far less."""
-BAD_PHOTOS = 5
-"""Photos that are taken out before single images are tested, at the most."""
+BAD_PHOTOS = 5  # Largest number of photos that are removed before tests of images
 
 
 def take_bad_photos_out(work: TakingOut) -> None:
@@ -42,8 +41,7 @@ def take_bad_photos_out(work: TakingOut) -> None:
             or _is_by_station(work, worst, middles[worst])
         ):
             return
-        said = f"its test values have the median {middles[worst]:.3g}, those of other photos {usual:.3g}"
-        if _photo_out(work, worst, 0, said) is None:
+        if _photo_out(work, worst, 0, phrase("snooping.median", median=middles[worst], usual=usual)) is None:
             return
 
 
@@ -58,13 +56,13 @@ def take_photos_out(work: TakingOut, number: int) -> list[int]:
         images = sum(group in work.images for group in suspects.on_photo(photo).tolist())
         if photo in work.out.photos or counts[photo] <= MOST_OF_PHOTO * images:
             continue
-        said = f"{counts[photo]} of its {images} images had gone one by one"
-        place = _photo_out(work, photo, number, said)
+        reason = phrase("snooping.singly", removed=int(counts[photo]), images=images)
+        place = _photo_out(work, photo, number, reason)
         added += [] if place is None else [place]
     return added
 
 
-def _photo_out(work: TakingOut, photo: int, number: int, said: str) -> int | None:
+def _photo_out(work: TakingOut, photo: int, number: int, reason: Phrase) -> int | None:
     """Take a photo out with all that was observed of it; return the place of its entry in the log."""
     before = work.standing
     out = work.out.copy()
@@ -74,16 +72,16 @@ def _photo_out(work: TakingOut, photo: int, number: int, said: str) -> int | Non
     except LostSupportError:
         work.adjust(work.out)
         return None
-    return log_photo(work, photo, number, before, (said, *consequences))
+    return log_photo(work, photo, number, before, (reason, *consequences))
 
 
-def take_photo(work: TakingOut, out: Out, photo: int) -> list[str]:
+def take_photo(work: TakingOut, out: Out, photo: int) -> list[Phrase]:
     """Put a photo out with all that was observed of it; return what else leaves with it."""
     suspects = work.suspects
     own = suspects.on_photo(photo)
     out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
     out.photos.add(photo)
-    consequences: list[str] = []
+    consequences: list[Phrase] = []
     for group in own.tolist():
         if group not in work.images:
             continue
@@ -94,11 +92,11 @@ def take_photo(work: TakingOut, out: Out, photo: int) -> list[str]:
 
 
 def log_photo(
-    work: TakingOut, photo: int, number: int, before: Standing | None, consequences: tuple[str, ...]
+    work: TakingOut, photo: int, number: int, before: Standing | None, consequences: tuple[Phrase | str, ...]
 ) -> int:
     """Enter a photo that is out, with what has fallen since then; return its place in the log.
 
-    `before` is None where the network has never been adjusted with it.
+    `before` is None if the network has never been adjusted with it.
     """
     suspects = work.suspects
     omega, log_p = math.nan, math.nan

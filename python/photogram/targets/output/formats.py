@@ -9,12 +9,12 @@ from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.output.kalibr import kalibr_camchain
 from photogram.targets.output.mrcal import mrcal_models, valid_region
 from photogram.targets.output.opencv import opencv_yaml
 from photogram.targets.output.rig import Rig, rig_of
-from photogram.targets.output.ros import ros_camera_info
+from photogram.targets.output.ros import kalibr_camchain, ros_camera_info
 from photogram.targets.uncertainty import uncertainty_map
+from photogram.words import phrase
 
 CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
     {
@@ -55,7 +55,7 @@ def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> 
     if need is None:
         return CAMERA_FORMATS[to](rig)
     if to != "mrcal":
-        raise InputError(f"need: {to} has no region of a camera that is known well enough; mrcal has")
+        raise InputError(phrase("error.not-applicable", name="need", other=to))
     maps = (uncertainty_map(calibrated, row) for row in range(len(rig.cameras)))
     return mrcal_models(rig, {row: valid_region(each, need) for row, each in enumerate(maps)})
 

@@ -17,6 +17,7 @@ from photogram.targets.corner_files import KEY
 from photogram.targets.maps import UncertaintyMap
 from photogram.targets.mrcal_model import INDICES, PREFIX
 from photogram.targets.output.rig import TERMS, Rig, terms_of
+from photogram.words import phrase
 
 TITLE = "a .cameramodel of mrcal"
 CORE = frozenset({"f", "fx", "fy", "cx", "cy"})
@@ -159,10 +160,8 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
     sd = np.where(np.isfinite(found.sd), found.sd, np.inf)
     row, column = np.unravel_index(np.argmin(sd), sd.shape)
     if not sd[row, column] <= largest:
-        raise InputError(
-            f"the camera {found.camera} is nowhere known to {largest:g} px: its best pixel has"
-            f" {sd[row, column]:.3g} px"
-        )
+        fields = {"camera": found.camera, "need": largest, "best": float(sd[row, column])}
+        raise InputError(phrase("targets.no-region", **fields))
     middle = np.array([found.columns[column], found.rows[row]])
     angles = np.linspace(0, 2 * np.pi, OUTLINE_DIRECTIONS + 1)
     # Down to the farthest corner, and cut where the picture ends.

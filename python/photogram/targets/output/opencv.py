@@ -20,11 +20,7 @@ DEVIATIONS = ("fx", "fy", "cx", "cy", *TERMS, "tx", "ty")  # order of `std_devia
 
 
 def opencv_yaml(rig: Rig) -> dict[str, bytes]:
-    """Return a file a camera.
-
-    Pixels count from 0 at the centre of the first. `avg_reprojection_error` is as OpenCV has it: the root of
-    the mean of dx^2 + dy^2 over points.
-    """
+    """Return a file a camera."""
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     return {
         f"{name}.yaml": "\n".join(["%YAML:1.0", "---", *_camera(rig, row, lenses), ""]).encode()

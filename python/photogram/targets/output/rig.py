@@ -15,6 +15,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated
+from photogram.words import phrase
 
 # Pinhole, in the order of OpenCV; k4, k5, k6 are in the denominator
 TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
@@ -94,20 +95,15 @@ class Rig:
         """Return width and height of the pictures of a camera; an InputError where they are not known."""
         found = self.sizes[camera]
         if found is None:
-            raise InputError(
-                f"the camera {self.names[camera]}: the size of its pictures is not known: --size WxH beside"
-                " corners, width and height of cameras in a project"
-            )
+            raise InputError(phrase("targets.no-size", camera=self.names[camera]))
         return found
 
-    def refusal(self, camera: int, title: str, models: Sequence[str], why: str = "") -> InputError:
-        """Return the error of a camera that a format cannot hold, with the command that fits another."""
-        own = self.cameras[camera]
-        return InputError(
-            f"{title} cannot hold the camera {self.names[camera]}, {own.model}{why}:"
-            f" `photogram convert-lens IN --to {models[0]}` fits one that it can"
-            + (f" (or {', '.join(models[1:])})" if len(models) > 1 else "")
-        )
+    def refusal(
+        self, camera: int, title: str, models: Sequence[str], code: str = "targets.refused"
+    ) -> InputError:
+        """Return the error of a camera that a format cannot represent, with the models that it can."""
+        fields = {"camera": self.names[camera], "model": self.cameras[camera].model, "to": "|".join(models)}
+        return InputError(phrase(code, title=title, **fields))
 
 
 def rig_of(calibrated: Calibrated) -> Rig:

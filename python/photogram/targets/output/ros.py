@@ -1,4 +1,8 @@
-"""YAML of ROS (`sensor_msgs/CameraInfo`): a file a camera; a pair is rectified so that rows are equal."""
+"""YAML of ROS (`sensor_msgs/CameraInfo`) and Kalibr (`camchain.yaml`).
+
+ROS has a file for each camera, and a pair is rectified so that rows are equal; in the file of Kalibr cameras
+follow each other, each with its pose to the one before.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,9 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.io.yaml_text import matrix_lines
+from photogram.io.yaml_text import camera_info, figures
 from photogram.targets.output.rig import Rig, Terms, terms_of
+from photogram.targets.vision import inverted
 
 TITLE = "camera_info of ROS"
 PLUMB_BOB_TERMS, RATIONAL_TERMS, EQUIDISTANT_TERMS = 5, 8, 4
@@ -20,26 +25,15 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     projection of the second has -fx b, b the base. All others are not rectified.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
-    rectified = [(np.eye(3), np.column_stack([each.matrix, np.zeros(3)])) for each in lenses]
+    rectified: list[tuple[Floats, Floats] | tuple[()]] = [()] * len(lenses)
     if len(lenses) == 2 and rig.tied(1):
-        rectified = _rectified(rig.sensors[1], lenses)
-    found = {}
-    for row, (lens, (turn, projection)) in enumerate(zip(lenses, rectified, strict=True)):
-        name = rig.names[row].replace("\\", "\\\\").replace('"', '\\"')
-        width, height = rig.size(row)
-        model, terms = _distortion(lens)
-        lines = [
-            f"image_width: {width}",
-            f"image_height: {height}",
-            f'camera_name: "{name}"',
-            *matrix_lines("camera_matrix", lens.matrix),
-            f"distortion_model: {model}",
-            *matrix_lines("distortion_coefficients", [terms]),
-            *matrix_lines("rectification_matrix", turn),
-            *matrix_lines("projection_matrix", projection),
-        ]
-        found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
-    return found
+        rectified = [*_rectified(rig.sensors[1], lenses)]
+    return {
+        f"{rig.files[row]}.yaml": camera_info(
+            rig.names[row], rig.size(row), lens.matrix, _distortion(lens), *turned
+        )
+        for row, (lens, turned) in enumerate(zip(lenses, rectified, strict=True))
+    }
 
 
 def _lens(rig: Rig, row: int) -> Terms:
@@ -84,3 +78,42 @@ def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats
         (turn, np.array([[focal, 0, centre[0], shift], [0, focal, centre[1], 0], [0, 0, 1, 0]]))
         for turn, shift in zip(turned, shifts, strict=True)
     ]
+
+
+KALIBR_TITLE = "camchain.yaml of Kalibr"
+KALIBR_TERMS = 4
+
+
+def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
+    """Return the file.
+
+    `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` takes points from the axes of the camera
+    before to those of this one.
+    """
+    lines = []
+    for row in range(len(rig.cameras)):
+        lens = _kalibr_lens(rig, row)
+        width, height = rig.size(row)
+        lines += [
+            f"cam{row}:",
+            "  camera_model: pinhole",
+            f"  intrinsics: {figures([*lens.focal, *lens.centre])}",
+            f"  distortion_model: {'equidistant' if lens.fisheye else 'radtan'}",
+            f"  distortion_coeffs: {figures(lens.first(KALIBR_TERMS) or [])}",
+            f"  resolution: [{width}, {height}]",
+            f"  rostopic: /{rig.files[row]}/image_raw",
+        ]
+        if row:
+            from_before = rig.sensors[row] @ inverted(rig.sensors[row - 1])
+            lines += ["  T_cn_cnm1:", *(f"  - {figures(each)}" for each in from_before)]
+    return {"camchain.yaml": "\n".join([*lines, ""]).encode()}
+
+
+def _kalibr_lens(rig: Rig, row: int) -> Terms:
+    if not (rig.tied(row) and rig.tied(max(row - 1, 0))):
+        raise rig.refusal(row, KALIBR_TITLE, [], "targets.refused-tie")
+    found = terms_of(rig.cameras[row])
+    if found is None or found.first(KALIBR_TERMS) is None:
+        code = "targets.refused" if found is None else "targets.refused-terms"
+        raise rig.refusal(row, KALIBR_TITLE, ["opencv4", "opencv_fisheye"], code)
+    return found
