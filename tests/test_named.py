@@ -16,8 +16,8 @@ from photogram import Block, InputError, adjust, predict, simulate
 from photogram.collection import Collection
 
 NO_NAMES = {
-    "NaN": (math.nan, "has no name: nan"),
-    "None": (None, "has no name: None"),
+    "NaN": (math.nan, "must have a name, got nan"),
+    "None": (None, "must have a name, got None"),
     "masked": (np.ma.masked, "is not a name|has no name"),
     "empty": ("", "is an empty name"),
     "blank": ("  ", "is an empty name"),
