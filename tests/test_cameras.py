@@ -248,7 +248,7 @@ def test_cameras_that_cannot_be(given, match):
         ({"photo_cameras": [0.5] * 12}, "error.absent"),
         ({"photo_cameras": 1.5}, "error.list"),
         ({"cameras": [Camera("brown", {"c": -1.0})] * 2, "photo_cameras": None}, "error.missing"),
-        ({"cameras": [Camera("brown", {"c": -1.0}, name="x")] * 2}, "error.kind"),
+        ({"cameras": [Camera("brown", {"c": -1.0}, name="x")] * 2}, "error.repeated"),
         (
             {"cameras": [Camera("brown", {"c": -1.0}), Camera("brown", {"c": -1.0}, unit="px")]},
             "one unit",

@@ -16,8 +16,8 @@ from photogram import Block, InputError, adjust, predict, simulate
 from photogram.collection import Collection
 
 NO_NAMES = {
-    "NaN": (math.nan, "has no name: nan"),
-    "None": (None, "has no name: None"),
+    "NaN": (math.nan, "must have a name, got nan"),
+    "None": (None, "must have a name, got None"),
     "masked": (np.ma.masked, "is not a name|has no name"),
     "empty": ("", "is an empty name"),
     "blank": ("  ", "is an empty name"),
@@ -288,7 +288,7 @@ def test_angles_without_digits(bad_block):
 
 def test_columns_that_are_no_lists(tables):
     for name, value in (("photo", (name for name in "ABCDEF")), ("photo", 6), ("photo", np.array("A"))):
-        with raises(InputError, "error.list|not a list"):
+        with raises(InputError, "not a list|must be a list"):
             Block.from_tables({**tables["photos"], name: value}, tables["images"], principal_distance=-152.74)
     for table in (None, "photos.csv", Path("photos.csv"), 1, [1]):
         with pytest.raises(InputError, match="photos"):

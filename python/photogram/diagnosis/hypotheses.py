@@ -218,8 +218,10 @@ def _exchanged(block: Block, *, points: bool) -> Block:
 
 def _centres(block: Block, axes: Floats) -> Block:
     """Return a block whose positions are C = -R't of translations t; R = F A', F' = `axes`."""
+    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    to_photo = Attitudes.of(form, block.photo_attitudes).matrices.transpose(0, 2, 1)
     turned = block.photo_positions @ axes
-    return block.replace(photo_positions=-np.einsum("pji,pj->pi", _to_photo(block), turned))
+    return block.replace(photo_positions=-np.einsum("pji,pj->pi", to_photo, turned))
 
 
 def _positions(block: Block) -> Iterator[Hypothesis]:
@@ -234,7 +236,9 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
                 change = partial(_scaled, factors=factors, points=what == "points")
                 yield Hypothesis(f"feet in {part} of {what}", message, change)
     if geographic:
-        yield from _geographic(block)
+        for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
+            if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
+                yield _exchange(f"longitude and latitude of {what}", points=what == "points")
         return
     yield _exchange("X and Y of photos", points=False)
     # R = F A' in the axes of computer vision, A' in those of the photo
@@ -250,16 +254,3 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
 
 def _exchange(name: str, *, points: bool) -> Hypothesis:
     return Hypothesis(name, phrase("mistake.exchanged-axes", axes=name), partial(_exchanged, points=points))
-
-
-def _to_photo(block: Block) -> Floats:
-    """(P, 3, 3) M, object to photo."""
-    form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    matrices: Floats = Attitudes.of(form, block.photo_attitudes).matrices.transpose(0, 2, 1)
-    return matrices
-
-
-def _geographic(block: Block) -> Iterator[Hypothesis]:
-    for what, positions in (("photos", block.photo_positions), ("points", block.point_positions)):
-        if not (np.abs(positions[:, 0]) > _HALF_TURN).any():
-            yield _exchange(f"longitude and latitude of {what}", points=what == "points")
