@@ -76,7 +76,11 @@ def turned(what: str) -> Iterator[None]:
     except OutOfMemoryError:
         raise
     except MemoryError as error:
-        raise OutOfMemoryError(phrase("memory.exhausted", subject=what, error=str(error))) from None
+        detail = f"; {error}" if str(error) else ""
+        # The files of words may not fit into the rest of the memory.
+        exhausted = OutOfMemoryError(f"{what}: there is not enough memory{detail}")
+        exhausted.phrase = phrase("memory.exhausted", subject=what, error=str(error))
+        raise exhausted from None
 
 
 def gibibytes(number: float) -> str:
