@@ -78,7 +78,7 @@ def test_k_is_given_or_follows_from_a_probability(result, names):
     for wrong in (0.0, 1.0, np.nan):
         with rejected("coverage"):
             features(result, wanted, coverage=wrong)
-    with rejected("k is a positive number"):
+    with rejected("error.at k: error.positive"):
         features(result, wanted, k=-2.0)
 
 
@@ -92,11 +92,11 @@ def test_ground_is_no_plane_and_the_test_says_so(result, names):
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        (("circle", ["nowhere", "a", "b"]), "feature f: there is no point 'nowhere'"),
-        (("cone", ["*"]), "feature f: there is no kind of feature 'cone'"),
-        ("plane", "feature f: the definition must be a kind with points"),
-        (("distance", 3), "feature f: a distance requires 2 points, got 3"),
-        (("cylinder", 5), "feature f: a cylinder takes 6 points, not 5"),
+        (("circle", ["nowhere", "a", "b"]), "fit.named f: error.unknown point nowhere"),
+        (("cone", ["*"]), "fit.named f: error.unknown.close kind of feature cone"),
+        ("plane", "fit.named f: fit.definition plane"),
+        (("distance", 3), "fit.named f: fit.two-points 3"),
+        (("cylinder", 5), "error.at a cylinder takes 6 points, not 5: fit.named f"),
     ],
 )
 def test_what_cannot_be_is_named(result, names, wanted, message):
@@ -109,13 +109,13 @@ def test_what_cannot_be_is_named(result, names, wanted, message):
 def test_points_that_took_no_part_are_named(result, names):
     rays = np.array(result.point_rays)
     rays[result.block.point_ids.index(names[1])] = 0
-    with rejected(f"feature f: the point {names[1]} did not take part"):
+    with rejected(f"fit.named f: adjusted.unused-point {names[1]}"):
         features(replace(result, point_rays=rays), {"f": ("plane", names)})
 
 
 def test_geographic_blocks_are_refused(result, names):
     block = simulate(strips=2, photos_per_strip=2, spheroid=Spheroid.wgs84(), control="corners", seed=3).block
-    with rejected("longitudes and latitudes"):
+    with rejected("fit.geographic"):
         features(adjust(block), {"d": ("distance", block.point_ids[:2])})
 
 
@@ -176,7 +176,7 @@ def test_patterns_name_points_in_the_order_in_which_they_are_asked_for():
     points = ["b-1", "b-2", "a", "c*"]
     assert named_points(["a", "b-*", "b-1"], points) == ["a", "b-1", "b-2"]
     assert named_points(["c*"], points) == ["c*"]
-    with rejected("there is no point 'd\\*'"):
+    with rejected("error.absent point d*"):
         named_points(["d*"], points)
 
 
@@ -210,10 +210,10 @@ def test_a_project_declares_them(run, tmp_path):
     assert f"{diameter['value']:.7f}" in again.stdout
 
     for line, message in (
-        ('bore = { circle = ["nobody-*"] }', "[features] bore: there is no point 'nobody-*'"),
+        ('bore = { circle = ["nobody-*"] }', "[features] bore: the point 'nobody-*' is unknown"),
         (
             'bore = { circel = ["hole-1"] }',
-            "[features] bore: there is no kind of features 'circel'; the nearest name is 'circle'",
+            "[features] bore: the kind of features 'circel' is unknown; the nearest name is 'circle'",
         ),
         ('bore = "hole-1"', "[features] bore: must have the form"),
         ("bore = { circle = 3 }", "[features.bore] circle: must be a list"),
@@ -231,7 +231,7 @@ def test_a_project_declares_them(run, tmp_path):
         ((), 2, "contains no features"),
         (("--circle", "bore"), 2, "must be NAME=POINT"),
         (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "the name 'a' is used by two features"),
-        (("--circle", "a=x,y,z"), 1, "feature a: there is no point 'x'"),
+        (("--circle", "a=x,y,z"), 1, "feature a: the point 'x' is unknown"),
     ],
 )
 def test_the_command_refuses(run, options, code, message):
