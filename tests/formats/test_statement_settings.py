@@ -160,7 +160,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "survey_common_sd = 0.004",
             "survey_common_sd = -0.004",
-            "one standard deviation, or three",
+            "error.key check survey_common_sd: error.at survey_common_sd: request.deviations",
         ),
         (
             "survey_common_sd = 0.004",
@@ -173,13 +173,17 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             "error.key check survey_common_sd: error.count 2: toml.or 1,3",
         ),
         ("in_control = true", "in_control = 1", "error.key check survey_common_in_control: error.flag 1"),
-        ('"same-base"', '"perhaps"', "independent is one of yes, same-base, no"),
+        ('"same-base"', '"perhaps"', "error.key check independent: argument.choice independent"),
         (
             'independent = "same-base"',
             "independent = true",
             "error.key check independent: toml.text: error.value True",
         ),
-        ('"asprs-2023"', '"asprs"', "did you mean asprs-2023"),
+        (
+            '"asprs-2023"',
+            '"asprs"',
+            "error.key statement standards: error.unknown.close standard asprs asprs-2023",
+        ),
         ('["asprs-2023", "vdi-2634"]', '"plain"', "error.key statement standards: error.list plain"),
         (
             'class_h = "5cm"',
@@ -189,19 +193,27 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             'class_h = "5cm"',
             "class_h = 5",
-            "error.key statement class_h '5' is not a length with its unit: 5cm",
+            "error.key statement class_h: request.length 5",
         ),
         (
             'class_h = "5cm"',
             'class_h = "5 kms"',
-            "error.key statement class_h there is no unit of length 'kms'; did you mean",
+            "error.key statement class_h: error.unknown.close unit of length kms km",
         ),
-        ('class_h = "5cm"', 'class_h = "0cm"', "the class h is a length, not 0"),
-        ('class_v = "0.1 m"', 'class_v = "1e999m"', "the class v is a length, not inf"),
+        (
+            'class_h = "5cm"',
+            'class_h = "0cm"',
+            "error.key statement class_h: error.at class h: error.positive 0.0",
+        ),
+        (
+            'class_v = "0.1 m"',
+            'class_v = "1e999m"',
+            "error.key statement class_v: error.at class v: error.positive inf",
+        ),
         (
             'area = "12.5km2"',
             'area = "12.5km"',
-            "error.key statement area '12.5km' is not an area with its unit: 12.5km2",
+            "error.key statement area: request.area 12.5km",
         ),
         ('{ middle = "target moved" }', '"middle"', "error.key statement without: error.table middle"),
         (
@@ -214,7 +226,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             '{ midle = "moved" }',
             "error.at without: error.unknown.close point midle middle",
         ),
-        ('language = "de"', 'language = "fr"', "there is no language 'fr': en, de"),
+        ('language = "de"', 'language = "fr"', "error.key statement language: argument.choice language"),
         ('text = "firm.toml"', 'text = "film.toml"', "error.key statement text: error.absent file"),
         ('text = "firm.toml"', f'text = "{"x" * 300}"', "error.key statement text: error.absent file"),
         (
@@ -222,7 +234,11 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             "[1",
             "error.key statement budgets: toml.texts: error.value [1, 'distance north-1",
         ),
-        ("coverage = 0.9", "coverage = 90", "coverage is a probability between 0 and 1"),
+        (
+            "coverage = 0.9",
+            "coverage = 90",
+            "error.key statement coverage: error.at coverage: error.range 90.0 0 1",
+        ),
         ("coverage = 0.9", 'coverage = "90 %"', "error.key statement coverage: error.number 90 %"),
         ('firm = "Verm', 'firma = "Verm', "error.at [statement]: error.unknown.close key firma firm"),
         ("project = 'the \"north\" quarry'", "project = 5", "error.key statement project: toml.text 5"),
@@ -244,7 +260,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "[0.00001, 5e-6, inf]",
             "[1, -5e-6, 1]",
-            "A, K and B of A + K L <= B",
+            "error.key statement length_limit: error.at limit: request.limit",
         ),
         ("expansion = 11.5e-6", "expansion = inf", "error.key statement expansion: error.number inf"),
     ],
@@ -284,9 +300,9 @@ def test_errors_of_names_that_stand_in_several_sections_name_the_right_line(proj
     ("sentences", "record", "said"),
     [
         ('# ours\n"asprs.point" = "{asked}"', 2, "asprs.points"),
-        ('"asprs.points" = "{many}"', 1, "no field 'many'"),
+        ('"asprs.points" = "{many}"', 1, "request.field asprs.points many"),
         ('"asprs.points" = "{asked"', 1, "expected '}'"),
-        ('"asprs.points" = "{asked:.3f}"', 1, "a field is a name in braces"),
+        ('"asprs.points" = "{asked:.3f}"', 1, "request.form asprs.points"),
         ('"asprs.points" = 5', 1, "error.at asprs.points: error.text 5"),
         (
             'asprs.points = "{asked}"',
@@ -352,7 +368,7 @@ def test_cover_of_points_that_are_off_does_not_count(project):
         ("70.765", "", "error.column length: error.empty nan"),
         ("70.765", "-70.765", "error.column length: error.positive -70.765"),
         ("70.765", "long", "column length"),
-        ("0.005", "", "error.column sd: table.no-sd lengths"),
+        ("0.005", "", "error.column sd: cells.no-sd lengths"),
         ("0.005", "-0.005", "error.column sd: error.not-negative -0.005"),
         ("0.005", "inf", "column sd"),
         ("21.5", "warm", "column temperature"),
@@ -382,7 +398,7 @@ def test_lengths_may_have_one_deviation_for_all(project):
 def test_a_standard_about_lengths_needs_their_table(project):
     (project / "lengths.csv").unlink()
     error = refused(project)
-    check_message("a table of lengths lacks", error)
+    check_message("error.requires vdi-2634: request.lengths", error)
     assert error.record == record_of(project / "project.toml", "standards =")
 
 

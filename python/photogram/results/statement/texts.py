@@ -44,7 +44,9 @@ class Texts(Words):
         english = table_of("en")
         for key, sentence in (own or {}).items():
             if key not in english:
-                raise InputError(unknown_name("code", key, english))
+                alike = [code for code in english if code.partition(".")[0] == key.partition(".")[0]]
+                absent = phrase("error.absent", kind="code", name=key)
+                raise InputError(unknown_name("code", key, alike) if alike else absent)
             if not isinstance(sentence, str):
                 raise InputError(
                     phrase("error.at", what=key, message=phrase("error.text", value=value_field(sentence)))
