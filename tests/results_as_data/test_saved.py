@@ -271,7 +271,7 @@ def folder(tmp_path):
 
 
 def test_damaged_folders_are_refused_with_the_file(folder):
-    with pytest.raises(InputError, match=r"nothing/summary\.json: cannot be read"):
+    with pytest.raises(InputError, match=r"nothing/summary\.json: the file cannot be read"):
         read_result(folder / "nothing")
     images = folder / "images.parquet"
     whole = images.read_bytes()
@@ -322,7 +322,7 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
-    with pytest.raises(InputError, match=rf"{table}\.parquet: cannot be read"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the file cannot be read"):
         read_result(folder)
 
 
