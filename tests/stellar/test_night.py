@@ -282,7 +282,7 @@ def test_catalogue_and_prior_from_files(result, folder):
     assert "Given" in [column.head for column in known.document().table("parameters").columns]
     assert inputs(file)[1:] == [folder / "images.csv", folder / "stars.csv", folder / "camera.json"]
     (folder / "stars.csv").write_text(f"{head}\nx,1,2,3,4,5,\n")
-    with pytest.raises(InputError, match="magnitude is blank"):
+    with pytest.raises(InputError, check=coded("error.column", column="magnitude", message="error.empty")):
         read_night(file)
 
 
