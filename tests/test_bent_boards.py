@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden as golden_file
+from nested_codes import raises
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts, read_result
 from photogram.distributed import Division
 from photogram.network import Bend, Figure, Mount, Sensor, rotation_angles
@@ -121,14 +122,14 @@ def test_a_held_figure_is_a_board_of_that_shape() -> None:
 
 def test_points_of_a_figure_are_fixed_and_there() -> None:
     own = board()
-    with pytest.raises(InputError, match=r"no point nowhere, which the figure board names"):
+    with raises(InputError, "error.absent"):
         own.replace(passages=[Figure(Bend("board"), ["nowhere"], np.zeros((1, 2, 3)))])
-    with pytest.raises(InputError, match=r"the point 0 of the figure board is free, weighted or observed"):
+    with raises(InputError, "block.figure-point"):
         own.replace(point_sd=1e-4)
 
 
 def test_parts_and_other_frames_refuse_what_they_do_not_know() -> None:
-    with pytest.raises(InputError, match=r"blocks in parts: images of the block pass a figure"):
+    with raises(InputError, "block.unsupported.passage"):
         adjust_in_parts(board(), Division(parts=2))
 
 

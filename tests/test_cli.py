@@ -17,9 +17,10 @@ import photogram
 from photogram import simulate as simulate_function
 from photogram.cli import app
 from photogram.cli.commands import application
+from photogram.cli.simulate import MotionOptions
 from photogram.cli.simulate import simulate as simulate_command
-from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
+from photogram.words import Phrase
 
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
 OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.html", "report.txt"}
@@ -228,7 +229,7 @@ def test_results_never_go_over_a_project(run, project, tmp_path):
     before = {path.name: path.read_bytes() for path in Path("other").iterdir()}
     result = run("giant", project, "--out", "other")
     assert result.exit_code == 1
-    assert "holds another project (COMMON, CAMERAS, IMAGES); --overwrite allows it" in result.stderr
+    assert "contains another project (COMMON, CAMERAS, IMAGES); --overwrite replaces it" in result.stderr
     assert {path.name: path.read_bytes() for path in Path("other").iterdir()} == before
     assert run("giant", project, "--out", "other", "--overwrite").exit_code == 0
     assert Path("other", "FRAMES").read_bytes() != before["FRAMES"]
@@ -382,7 +383,7 @@ def test_weights_too_weak_for_a_datum_are_an_error_with_the_remark_that_explains
     result = run("giant", "block")
     assert result.exit_code == 3
     assert "GROUND holds no component of a photographed point" in result.stderr
-    assert "the standard deviations of the photos are too large to give a datum" in result.stderr
+    assert str(Phrase("adjust.no-datum.large-sd")) in " ".join(result.stderr.split())
     assert names(tmp_path) == {"block"}
 
 
@@ -406,5 +407,5 @@ def test_a_package_of_an_extra_that_is_not_there_is_named(
         monkeypatch.delitem(sys.modules, module, raising=False)
     result = run(*command)
     assert result.exit_code == 1
-    assert f"{package} is needed: pip install 'photogram[{extra}]'" in result.stderr
+    assert f"{package} is required; run pip install 'photogram[{extra}]'" in result.stderr
     assert not list(tmp_path.iterdir())

@@ -129,7 +129,7 @@ def test_help_of_parents_names_their_commands(run):
 
 def test_progress_is_told_in_words():
     from photogram import Progress
-    from photogram.cli.progress import shown
+    from photogram.cli.job import shown
 
     lines = []
     tell = shown(SimpleNamespace(update=lines.append), "weighted sum of squares", 1.0)

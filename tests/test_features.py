@@ -210,7 +210,7 @@ def test_a_project_declares_them(run, tmp_path):
     assert f"{diameter['value']:.7f}" in again.stdout
 
     for line, message in (
-        ('bore = { circle = ["nobody-*"] }', "the feature bore: there is no point 'nobody-*'"),
+        ('bore = { circle = ["nobody-*"] }', "[features] bore: there is no point 'nobody-*'"),
         (
             'bore = { circel = ["hole-1"] }',
             "[features] bore: there is no kind of features 'circel'; the nearest name is 'circle'",
@@ -228,9 +228,9 @@ def test_a_project_declares_them(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        ((), 2, "name what to fit"),
-        (("--circle", "bore"), 2, "is not NAME=POINT"),
-        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "two features are called a"),
+        ((), 2, "contains no features"),
+        (("--circle", "bore"), 2, "must be NAME=POINT"),
+        (("--circle", "a=1,2,3", "--plane", "a=1,2,3"), 2, "the name 'a' is used by two features"),
         (("--circle", "a=x,y,z"), 1, "feature a: there is no point 'x'"),
     ],
 )

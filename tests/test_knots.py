@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden
+from nested_codes import raises
 from photogram import Attitudes, Block, Camera, InputError, adjust
 from photogram.network.knots import beyond_knots
 
@@ -104,30 +105,30 @@ def test_cameras_with_knots_are_values(camera, knots):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"order": 4}, "order of the camera .* is 2 or 3, not 4"),
-        ({"nx": 3}, "nx of the camera .* splines of order 3 have 4 to 10000 knots along an axis, not 3"),
-        ({"ny": 8.5}, "not 8.5"),
-        ({"fov_x_deg": 360.0}, "between 0 and 360 degrees, not 360"),
-        ({"nx": 12}, r"knots of the camera .* has the shape \(8, 11, 2\), not \(8, 12, 2\)"),
+        ({"order": 4}, "error.whole-range"),
+        ({"nx": 3}, "error.whole-range"),
+        ({"ny": 8.5}, "error.whole-range"),
+        ({"fov_x_deg": 360.0}, "error.range"),
+        ({"nx": 12}, r"knots of camera .* has the shape \(8, 11, 2\), not \(8, 12, 2\)"),
     ],
 )
 def test_constants_that_are_none_of_a_spline_are_refused(knots, changes, message):
-    with pytest.raises(InputError, match=message):
+    with raises(InputError, message):
         Camera("splined_stereographic", CORE | SPLINE | changes, knots=knots)
 
 
 def test_knots_of_other_models_and_their_deviations_are_refused(knots, camera):
-    with pytest.raises(InputError, match="pinhole has no knots; splined_stereographic has"):
+    with raises(InputError, "error.not-applicable"):
         Camera("pinhole", CORE, knots=knots)
-    with pytest.raises(InputError, match="knot_sd of the camera pinhole: it has no knots"):
+    with raises(InputError, "error.requires"):
         Camera("pinhole", CORE, knot_sd=0.1)
-    with pytest.raises(InputError, match="no standard deviation: -1"):
+    with raises(InputError, "error.not-negative"):
         camera.replace(knot_sd=-1.0)
-    with pytest.raises(InputError, match="held, weighted or free in both directions"):
+    with raises(InputError, "block.knot-sd"):
         camera.replace(knot_sd=[np.inf, 0.1])
-    with pytest.raises(InputError, match="not all finite"):
+    with raises(InputError, "error.finite"):
         camera.replace(knots=np.full((8, 11, 2), np.nan))
-    with pytest.raises(InputError, match="fov_x_deg must be given"):
+    with raises(InputError, "error.missing"):
         Camera("splined_stereographic", CORE | {"order": 3, "nx": 11, "ny": 8})
 
 

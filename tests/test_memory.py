@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from nested_codes import raises
 from photogram import AdjustmentError, InputError, OutOfMemoryError, adjust, memory, simulate
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
@@ -137,7 +138,7 @@ def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
 def test_what_would_not_fit_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 2**30)
     memory.require(2**30, "a table")
-    with pytest.raises(OutOfMemoryError, match="a table would take 2 GiB of memory, and 1 GiB are free"):
+    with pytest.raises(OutOfMemoryError, match="a table requires 2 GiB of memory, but only 1 GiB are free"):
         memory.require(2**31, "a table")
     monkeypatch.setattr(memory, "available_memory", lambda: None)
     memory.require(2**60, "a table")
@@ -159,7 +160,7 @@ def test_absurd_numbers_of_threads(small_block):
         result = adjust(small_block, threads=threads)
         assert (result.photo_positions == expected.photo_positions).all()
     for threads in (0, -1):
-        with pytest.raises(InputError, match="threads must be positive"):
+        with raises(InputError, "error.least"):
             adjust(small_block, threads=threads)
     for threads in (2.5, 2**70):
         with pytest.raises(InputError, match="threads is not a whole number"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
-from nested_codes import codes
+from nested_codes import codes, raises
 from photogram import (
     AdjustmentError,
     Block,
@@ -134,7 +134,7 @@ def test_first_values_without_a_datum():
         photo_position_sd=np.inf,
         photo_attitude_sd=np.inf,
     )
-    with pytest.raises(AdjustmentError, match="photos on trajectories have theirs"):
+    with raises(AdjustmentError, "first.no-datum-of-photos"):
         first_values(moved)
 
 

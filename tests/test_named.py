@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nested_codes import raises
 from photogram import Block, InputError, adjust, predict, simulate
 from photogram.collection import Collection
 
@@ -105,11 +106,9 @@ def test_a_point_has_one_image_on_a_photo(bad_block):
         bad_block[name] = np.append(bad_block[name], bad_block[name][4])
     for name in ("image_xy", "image_sd"):
         bad_block[name] = np.vstack([bad_block[name], bad_block[name][4:5]])
-    row = len(bad_block["image_xy"]) - 1
-    point = bad_block["point_ids"][bad_block["image_points"][4]]
-    with pytest.raises(
-        InputError, match=rf"the point {point} has two images on the photo 0101 \(rows 4 and {row}\)"
-    ):
+    len(bad_block["image_xy"]) - 1
+    bad_block["point_ids"][bad_block["image_points"][4]]
+    with raises(InputError, "block.repeated-image"):
         Block(**bad_block)
 
 
@@ -222,7 +221,7 @@ def test_conventions_that_cannot_be(small_block, change):
 @pytest.mark.parametrize("block", [None, "block", Path("block"), 1, {"photo_ids": []}])
 @pytest.mark.parametrize("command", [adjust, predict])
 def test_what_is_no_block(command, block):
-    with pytest.raises(InputError, match="is not a Block"):
+    with raises(InputError, "error.kind"):
         command(block)
 
 
@@ -257,11 +256,11 @@ def test_arguments_of_a_simulation_of_another_type(argument, value):
 
 
 def test_simulations_that_are_too_large():
-    with pytest.raises(InputError, match="a photo shows about 142857 points, not 100"):
+    with raises(InputError, "simulation.many-points"):
         simulate(forward_overlap=0.99999)
     with pytest.raises(InputError, match="GiB of memory"):
         simulate(strips=10**6, photos_per_strip=10**6)
-    with pytest.raises(InputError, match=r"tilt: photos that see 7.* rad .* look up to 0\.02 rad aside"):
+    with raises(InputError, "error.most"):
         simulate(principal_distance=-15274000.0, tilt=0.01)
     assert len(simulate(strips=1, photos_per_strip=12, forward_overlap=0.9).block.photo_ids) == 12
 
@@ -283,13 +282,13 @@ def test_simulations_that_cannot_be(arguments):
 
 def test_angles_without_digits(bad_block):
     bad_block["photo_attitudes"][1, 2] = 1e16
-    with pytest.raises(InputError, match=r"photo_attitudes of 0102 is beyond 1e\+06 radians"):
+    with raises(InputError, "block.value.angle"):
         Block(**bad_block)
 
 
 def test_columns_that_are_no_lists(tables):
     for name, value in (("photo", (name for name in "ABCDEF")), ("photo", 6), ("photo", np.array("A"))):
-        with pytest.raises(InputError, match="photos, column photo is not a list of names"):
+        with raises(InputError, "error.list"):
             Block.from_tables({**tables["photos"], name: value}, tables["images"], principal_distance=-152.74)
     for table in (None, "photos.csv", Path("photos.csv"), 1, [1]):
         with pytest.raises(InputError, match="photos"):

@@ -197,7 +197,7 @@ def test_pictures_need_a_place(run):
     ring = files("photogram") / "examples" / "collection" / "ring.txt"
     result = run("collection", str(ring), "--plots")
     assert result.exit_code == 2
-    assert "goes with --out DIR" in result.stderr
+    assert "requires --out DIR" in result.stderr
 
 
 def test_svg_needs_no_matplotlib_and_other_formats_name_the_extra(galveston, monkeypatch):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
+from nested_codes import raises
 from photogram import (
     Attitudes,
     Distance,
@@ -242,7 +243,7 @@ def test_what_is_not_determined_is_named(scripts):
     ]
     fixed = {"photo_position_sd": 0.0, "photo_attitude_sd": 0.0}
     angles = np.zeros_like(block.photo_attitudes)
-    with pytest.raises(RankError, match="3 moving lever arm antenna, shift strip 1"):
+    with raises(RankError, "adjust.undetermined"):
         adjust(block.replace(observations=positions, photo_attitudes=angles, **fixed))
 
 
@@ -340,28 +341,28 @@ def test_unknowns_in_every_space(spheroid):
         (lambda: LeverArm("", 0.0), "name of a lever arm"),
         (lambda: LeverArm("a", [0, 0]), "value of lever arm a"),
         (lambda: LeverArm("a", [0, np.nan, 0]), "lever arm a"),
-        (lambda: Shift("s", sd=-1.0), "sd of shift s is no standard deviation"),
+        (lambda: Shift("s", sd=-1.0), "error.not-negative"),
         (lambda: Drift("d", sd=[1.0, 1.0]), "sd of drift d"),
         (lambda: Drift("d", epoch=np.nan), "epoch of drift d"),
-        (lambda: Boresight("b", 2 * np.eye(3)), "value of boresight b is no rotation matrix"),
-        (lambda: Sensor("s", [0, 0, 0], -np.eye(3)), "matrix of sensor s is mirrored"),
-        (lambda: Plane("p", [0, 0, 0], [0, 0, 0]), "normal of plane p is no direction"),
+        (lambda: Boresight("b", 2 * np.eye(3)), "error.kind"),
+        (lambda: Sensor("s", [0, 0, 0], -np.eye(3)), "error.kind"),
+        (lambda: Plane("p", [0, 0, 0], [0, 0, 0]), "error.kind"),
         (lambda: Line("l", [0, np.inf, 0], [0, 0, 0]), "direction of line l"),
         (lambda: Level("h", "high"), "height of level h is not a number"),
-        (lambda: Instrument("i", np.nan), "instrument i has a value that is not finite"),
-        (lambda: OnPlane("1", Level("h", 0.0), 1.0), "plane of on plane is no Plane"),
-        (lambda: OnLevel("1", None, 1.0), "level of on level is no Level"),
-        (lambda: Position("1", [0, 0, 0], 1.0, lever_arm=Shift("s")), "lever_arm of position is no LeverArm"),
+        (lambda: Instrument("i", np.nan), "error.finite"),
+        (lambda: OnPlane("1", Level("h", 0.0), 1.0), "error.kind"),
+        (lambda: OnLevel("1", None, 1.0), "error.kind"),
+        (lambda: Position("1", [0, 0, 0], 1.0, lever_arm=Shift("s")), "error.kind"),
         (
             lambda: Attitude("1", np.eye(3), 1.0, boresight=Shift("s")),
-            "boresight of attitude is no Boresight",
+            "error.kind",
         ),
-        (lambda: Prior("lever arm", sd=1.0), "unknown of prior is no Unknown"),
-        (lambda: Mount("1", "2", "sensor"), "the sensor of the photo 1 is no Sensor"),
+        (lambda: Prior("lever arm", sd=1.0), "error.kind"),
+        (lambda: Mount("1", "2", "sensor"), "error.kind"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):
-    with pytest.raises(InputError, match=message):
+    with raises(InputError, message):
         make()
 
 
@@ -369,20 +370,18 @@ def test_a_block_refuses_mounts_and_names_that_contradict_it(scripts):
     block = scripts["stereo_rig"].measured()
     first = block.mounts[0]
     sensor = first.sensor
-    with pytest.raises(InputError, match="the block has no photo left 9, which a mount names"):
+    with raises(InputError, "error.absent"):
         block.replace(mounts=[Mount("left 1", "left 9", sensor)])
-    with pytest.raises(InputError, match="the photo right 1 is mounted twice"):
+    with raises(InputError, "error.repeated"):
         block.replace(mounts=[first, first])
-    with pytest.raises(InputError, match="the photo left 1 is mounted on a frame and stands for one"):
+    with raises(InputError, "block.mounted-frame"):
         block.replace(mounts=[first, Mount("left 1", "left 2", sensor)])
-    with pytest.raises(InputError, match=r"mounts\[0\] is no Mount"):
+    with raises(InputError, "error.kind"):
         block.replace(mounts=["right 1"])
-    with pytest.raises(
-        InputError, match="photo_position_sd of right 1 is weighted or fixed, but the photo is on"
-    ):
+    with raises(InputError, "block.value.mounted"):
         block.replace(photo_position_sd=1.0)
     other = Sensor("right", [0.5, 0, 0])
-    with pytest.raises(InputError, match="two unknowns are called sensor right"):
+    with raises(InputError, "block.repeated-object"):
         block.replace(observations=[Base(None, other, 0.5, 0.1)])
-    with pytest.raises(InputError, match="is of one unknown alone"):
+    with raises(InputError, "error.repeated"):
         Base(sensor, sensor, 0.5, 0.1)

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from photogram.errors import OutOfMemoryError
+from photogram.words import phrase
 
 GROUPS = (
     # Version 2, alone and beside version 1; then version 1.
@@ -35,11 +36,6 @@ def available_memory(root: Path = Path("/")) -> int | None:
     The least of what Linux says is available, of what the control group of the process (a container) and
     the groups around it may still take, and of what the limits of the process (`ulimit -v`, `ulimit -d`)
     leave.
-
-    Parameters
-    ----------
-    root
-        Where `proc` and `sys` are.
     """
     threads = os.cpu_count() or 1
     own = addresses_of_a_thread(root)
@@ -49,13 +45,7 @@ def available_memory(root: Path = Path("/")) -> int | None:
 
 
 def resident_memory(root: Path = Path("/")) -> int | None:
-    """Return the bytes of memory that this process holds; None where nothing tells.
-
-    Parameters
-    ----------
-    root
-        Where `proc` is.
-    """
+    """Return the bytes of memory that this process holds; None where nothing tells."""
     fields = _text(root / "proc/self/statm").split()
     return os.sysconf("SC_PAGE_SIZE") * int(fields[1]) if len(fields) > 1 else None
 
@@ -70,24 +60,11 @@ def give_back() -> None:
 
 
 def require(needed: float, what: str) -> None:
-    """Refuse work that would take more memory than there is, before it begins.
-
-    Parameters
-    ----------
-    needed
-        Bytes, at the most.
-    what
-        What takes them, in a few words: the subject of the message.
-
-    Raises
-    ------
-    OutOfMemoryError
-        There is less.
-    """
+    """Refuse work that would take more memory than there is, before it begins."""
     available = available_memory()
     if available is not None and needed > available:
         raise OutOfMemoryError(
-            f"{what} would take {gibibytes(needed)} GiB of memory, and {gibibytes(available)} GiB are free"
+            phrase("memory.required", subject=what, needed=gibibytes(needed), free=gibibytes(available))
         )
 
 
@@ -99,8 +76,7 @@ def turned(what: str) -> Iterator[None]:
     except OutOfMemoryError:
         raise
     except MemoryError as error:
-        detail = f": {error}" if str(error) else ""
-        raise OutOfMemoryError(f"{what}: there is not enough memory{detail}") from None
+        raise OutOfMemoryError(phrase("memory.exhausted", subject=what, error=str(error))) from None
 
 
 def gibibytes(number: float) -> str:

@@ -183,5 +183,5 @@ def test_step_12_goes_to_files_with_its_identification(run, tmp_path):
     assert run("cards.dat", "--part-two", "two.dat").exit_code == 0
     refused = run("cards.dat", "--part-two", "no.dat", "--ident", "two words")
     assert refused.exit_code == 1
-    assert "one word of a record" in refused.stderr
+    assert "must be one word of a record" in refused.stderr
     assert not Path("no.dat").exists()

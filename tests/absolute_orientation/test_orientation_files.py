@@ -44,14 +44,18 @@ def test_csv_and_cards_say_the_same(case, tmp_path):
 def test_zeros_are_values_unless_told(case, tmp_path):
     path = write(tmp_path, cards_of(case["stations"], zeros=True))
     if case["id"] == "partial_mixed":
-        with pytest.raises(InputError, match=r"record 2: N is 6 and MN 4, but 8 elevations and 8 horizontal"):
+        with pytest.raises(
+            InputError, match="record 2: ", check=lambda error: error.code == "orientation.counts"
+        ):
             read_cards(path)
         np.testing.assert_array_equal(
             read_cards(path, zero_missing=True).stations.control, stations(case["stations"]).control
         )
     else:
         assert read_cards(path).stations.given.all()
-        with pytest.raises(InputError, match="record 2: N is"):
+        with pytest.raises(
+            InputError, match="record 2: ", check=lambda error: error.code == "orientation.counts"
+        ):
             read_cards(path, zero_missing=True)
 
 
@@ -73,18 +77,18 @@ def test_csv_columns(tmp_path):
     ("text", "message"),
     [
         ("", "contains no table"),
-        (HEADER, "holds no stations"),
+        (HEADER, "must contain stations"),
         ("id,X,Y,x,y,z\n", "record 1: the column Z is missing"),
-        ("id,X,Y,Z,x,y,z,w\n", "record 1: the header does not know the column 'w'"),
+        ("id,X,Y,Z,x,y,z,w\n", "record 1: the column 'w' is unknown"),
         ("id,X,Y,Z,x,y,z,x\n", "record 1: the column 'x' occurs more than once"),
-        ("id,X,Y,Z,x,y,z,sd_x\nA,1,2,3,4,5,6,7\n", "sd_x, sd_y and sd_z come together"),
+        ("id,X,Y,Z,x,y,z,sd_x\nA,1,2,3,4,5,6,7\n", "sd_x, sd_y and sd_z are required together"),
         (HEADER + "A,1,2,3,4,5\n", "record 2: the record has 6 cells, but the table has 7 columns"),
         (HEADER + "A,1,2,3,4,5,six\n", "record 2: column z: must be a number, got 'six'"),
         (HEADER + "A,1,2,3,4,5,\n", "record 2: column z: must have a value"),
         (HEADER + "A,1,2,nan,4,5,6\n", "record 2: column Z: must be a number, got 'nan'"),
         (HEADER + "A,1,2,inf,4,5,6\n", "record 2: column Z: must be a number, got 'inf'"),
-        (HEADER + "A,1,2,3,4,5,6\n\nA,1,2,3,4,5,6\n", "record 4: station A occurs in record 2 already"),
-        (HEADER + ",1,2,3,4,5,6\n", "record 2: the id is empty"),
+        (HEADER + "A,1,2,3,4,5,6\n\nA,1,2,3,4,5,6\n", "record 4: station A occurs twice"),
+        (HEADER + ",1,2,3,4,5,6\n", "record 2: a station requires an id"),
         (HEADER + "9" * 140_000 + ",1,2,3,4,5,6\n", "record 2: the record has 140012 characters"),
         (HEADER[:-1] + "," * 420_000 + "\n1,2,3,4,5,6,7\n", "record 1: the record has 420014 characters"),
     ],
@@ -103,19 +107,19 @@ def test_faults_of_a_csv_file(text, message, tmp_path):
     ("old", "new", "message"),
     [
         ("5 3 2 9\n", "", "record 2: constants"),
-        ("5 3 2 9", "6 3 2 9", "record 2: M is 6, but there are 5 station records"),
-        ("5 3 2 9", "5 2 2 9", "record 2: N is 2 and MN 2, but 3 elevations and 2 horizontal pairs"),
-        ("5 3 2 9", "5 3 x 9", "record 2: MN: 'x' is not a count"),
-        ("- - 20 0.2", "20 0.2", "record 5: station X1 X2 X3 x1 x2 x3 number: 5 words, not 7"),
-        ("0.02 3", "0.0z 3", "record 5: x3: '0.0z' is not a number"),
+        ("5 3 2 9", "6 3 2 9", "record 2: M must be the number of station records, 5, but is 6"),
+        ("5 3 2 9", "5 2 2 9", "record 2: N must be the number of elevations, 3, but is 2"),
+        ("5 3 2 9", "5 3 x 9", "record 2: MN: must be a count, got 'x'"),
+        ("- - 20 0.2", "20 0.2", "record 5: station X1 X2 X3 x1 x2 x3 number: 7 words are required, got 5"),
+        ("0.02 3", "0.0z 3", "record 5: x3: must be a number, got '0.0z'"),
         ("0.03 4", "0.03 3", "record 6: station 3 occurs twice"),
-        ("0 0 0 0 0 0 0 9", "0 0 2 1 0 0 0 9", "record 1: a sine is beyond 1"),
-        ("0 0 0 0 0 0 0 9", "0 0 0.1 0 1 0 0 9", "record 1: s is not positive"),
+        ("0 0 0 0 0 0 0 9", "0 0 2 1 0 0 0 9", "record 1: sines must be"),
+        ("0 0 0 0 0 0 0 9", "0 0 0.1 0 1 0 0 9", "record 1: s must be positive"),
         ("0 0 0 0 0 0 0 9", "0 0 0", "record 1: parameters"),
-        ("500 500 -", "500 - -", "N is 3 and MN 2, but 3 elevations and 1 horizontal pairs"),
-        ("5 3 2 9", "² 3 2 9", "record 2: M: '²' is not a count"),
-        ("5 3 2 9", "9" * 5000 + " 3 2 9", "record 2: M: '999"),
-        ("500 500 -", "9" * 5000 + " 500 -", "record 3: X1: '999"),
+        ("500 500 -", "500 - -", "pairs, 1, but is 2"),
+        ("5 3 2 9", "² 3 2 9", "record 2: M: must be a count, got '²'"),
+        ("5 3 2 9", "9" * 5000 + " 3 2 9", "record 2: M: must be a count, got '999"),
+        ("500 500 -", "9" * 5000 + " 500 -", "record 3: X1: must be a number, got '999"),
     ],
 )
 def test_faults_of_cards(old, new, message, tmp_path):
@@ -160,7 +164,7 @@ def test_without_horizontal_stations_in_front_the_quadrant_is_assumed(tmp_path):
     text = "\n".join([record, lines[1], *reversed(lines[2:])]) + "\n"
     deck = read_cards(write(tmp_path, text))
     assert abs(deck.former.angles[2]) < np.pi / 2
-    assert "quadrant of kappa" in str(deck.messages[0])
+    assert deck.messages[0].code == "orientation.kappa"
 
 
 def test_transformation_records(tmp_path):
@@ -169,7 +173,7 @@ def test_transformation_records(tmp_path):
     again = read_transformation(write(tmp_path, text))
     np.testing.assert_array_equal(again.rotation, truth.rotation)
     np.testing.assert_array_equal(again.translation, truth.translation)
-    with pytest.raises(InputError, match="do not make a rotation"):
+    with pytest.raises(InputError, check=lambda error: error.code == "orientation.rotation"):
         read_transformation(write(tmp_path, text.replace(text.split()[0], "0.1234", 1)))
     with pytest.raises(InputError, match="two records"):
         read_transformation(write(tmp_path, text.splitlines()[0]))
@@ -185,21 +189,21 @@ def full(count=6):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"ids": ["1", "1", "2", "3", "4", "5"]}, "station 1 occurs more than once"),
-        ({"model": np.zeros((5, 3))}, "model has the shape (5, 3), not (6, 3)"),
-        ({"model_sd": np.zeros(2)}, "does not broadcast"),
-        ({"model_sd": 0.0}, "a coordinate whose standard deviation is zero in both systems"),
-        ({"control_sd": -1.0, "model_sd": 1.0}, "standard deviation of control"),
-        ({"control_sd": 0.1}, "the control has standard deviations but the model has none"),
-        ({"model_sd": -1.0}, "standard deviation of the model that is not finite, zero or positive"),
+        ({"ids": ["1", "1", "2", "3", "4", "5"]}, "station 1 occurs twice"),
+        ({"model": np.zeros((5, 3))}, "model must have the shape (6, 3), got (5, 3)"),
+        ({"model_sd": np.zeros(2)}, "must have the shape (6, 3)"),
+        ({"model_sd": 0.0}, "the standard deviation zero in both systems"),
+        ({"control_sd": -1.0, "model_sd": 1.0}, "standard deviations of control must be"),
+        ({"control_sd": 0.1}, "the model requires standard deviations, too"),
+        ({"model_sd": -1.0}, "standard deviations of the model must be finite"),
         ({"model": "text"}, "model is not an array of numbers"),
         ({"control": None}, "control is not an array"),
         ({"ids": 6}, "ids is not a list of names"),
         ({"ids": ["\ud800", *"bcdef"]}, "characters that do not print"),
         ({"model": np.ma.masked_less(np.arange(18.0).reshape(6, 3), 2)}, "model has masked values"),
         ({"model": 10**400}, "model"),
-        ({"control": np.inf}, "control coordinate that is not a finite number"),
-        ({"model": np.nan}, "model coordinate that is not a finite number"),
+        ({"control": np.inf}, "control coordinates must be finite"),
+        ({"model": np.nan}, "model coordinates must be finite"),
     ],
 )
 def test_arrays_that_cannot_be(change, message):
@@ -215,17 +219,17 @@ def test_arrays_that_cannot_be(change, message):
     [
         ({"method": "fast"}, "method is one of"),
         ({"start": "best"}, "start is one of"),
-        ({"reject": ["nobody"]}, "station nobody cannot be rejected"),
-        ({"max_iterations": 0}, "one iteration"),
+        ({"reject": ["nobody"]}, "the rejected station nobody does not exist"),
+        ({"max_iterations": 0}, "max_iterations must be positive"),
         ({"max_iterations": 2**64}, "max_iterations is not a whole number"),
         ({"max_iterations": None}, "max_iterations is not a whole number"),
         ({"reject": 5}, "reject is not a list of names"),
-        ({"former": "first.json"}, "a former result is"),
-        ({"tolerance": np.nan}, "criterion"),
+        ({"former": "first.json"}, "former must be"),
+        ({"tolerance": np.nan}, "tolerance must be"),
         ({"tolerance": "1"}, "tolerance is not a number"),
-        ({"trace": True}, "cycles to trace"),
-        ({"tolerance": 0.0}, "criterion"),
-        ({"unit_variance": "unity"}, "needs standard deviations"),
+        ({"trace": True}, "cycles for a trace"),
+        ({"tolerance": 0.0}, "tolerance must be"),
+        ({"unit_variance": "unity"}, "requires standard deviations"),
     ],
 )
 def test_options_that_cannot_be(options, message):
@@ -248,7 +252,7 @@ def test_later_edits_change_no_result():
 def test_the_methods_of_the_report_take_no_weights():
     given = full()
     weighted = Stations(given.ids, given.control, given.model, model_sd=1.0)
-    with pytest.raises(InputError, match="takes no standard deviations"):
+    with pytest.raises(InputError, check=lambda error: error.code == "orientation.method-sd"):
         orient(weighted, method="report")
 
 
@@ -257,9 +261,7 @@ def test_the_methods_of_the_report_take_no_weights():
 
 def test_too_few_components_after_a_rejection():
     given = full(3)
-    with pytest.raises(
-        RankError, match=r"insufficient control: 3 known coordinates \(7 needed\), 2 of them h"
-    ):
+    with pytest.raises(RankError, check=lambda error: error.code == "orientation.insufficient"):
         orient(given, reject=["0", "1"])
 
 

@@ -117,7 +117,7 @@ def test_the_option_writes_every_print_for_each_cycle(run, case):
 def test_only_the_cycles_of_the_report_can_be_traced(run):
     refused = run("absolute-orientation", "--example", "--trace", "trace.txt")
     assert refused.exit_code == 2
-    assert "goes with --method report or fill-in" in refused.output
-    with pytest.raises(InputError, match="cycles to trace"):
+    assert "requires --method report or fill-in" in refused.output
+    with pytest.raises(InputError, check=lambda error: error.code == "orientation.trace"):
         orient(stations(load("cases.json")["cases"][0]["stations"]), trace=True)
     assert not orient(stations(load("cases.json")["cases"][1]["stations"]), method="report").traces

@@ -82,7 +82,7 @@ def test_every_model_of_the_crate_can_be_named():
     for name, (formula, parameters, constants, *_) in models.items():
         assert "image = " in formula
         if name == "splined_stereographic":
-            with pytest.raises(InputError, match="camera is one of"):
+            with pytest.raises(InputError, check=lambda error: error.code == "collection.camera"):
                 MADE.collection.replace(camera=name)
             continue
         # In front of the camera; lengths in the image are one, terms of lenses nothing.
@@ -96,7 +96,7 @@ def test_every_model_of_the_crate_can_be_named():
 
 
 def test_models_that_cannot_be_are_refused_by_name():
-    with pytest.raises(InputError, match=r"camera is one of perspective, bal, radial, .*, not 'x'"):
+    with pytest.raises(InputError, check=lambda error: error.code == "collection.camera"):
         MADE.collection.replace(camera="x")
     with pytest.raises(InputError, match=r"photo_parameters has the shape \(8, 9\), not \(8, 11\)"):
         MADE.collection.replace(camera="radial")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from photogram import _photocore, snoop
+from photogram import Message, _photocore, snoop
 from photogram.collection import adjust, simulate
 
 # A datum of its own: standard deviations depend on it, and without it on where the iterations end.
@@ -45,9 +45,7 @@ def test_the_others_are_as_if_the_point_were_not_there(tolerance, digits):
     expected = adjust(SOUND, tolerance=tolerance)
     result = adjust(with_point(), tolerance=tolerance)
     assert result.converged
-    assert any(
-        str(m) == f"left out, points that ran into the station of a photo: {WRONG}" for m in result.messages
-    )
+    assert Message.of("collection.points-collapsed", names=[str(WRONG)]) in result.messages
     assert result.point_rays[WRONG] == 0
     assert np.isnan(result.point_positions[WRONG]).all()
     np.testing.assert_allclose(result.photo_sd, expected.photo_sd, rtol=digits)
@@ -96,8 +94,7 @@ def test_a_photo_with_too_few_points_is_left_out(count):
 
     result, expected = adjust(keep(alone | few)), adjust(keep(alone))
     assert result.converged
-    said = "left as they are, photos that their image points do not determine: 3"
-    assert said in [str(each) for each in result.messages]
+    assert Message.of("collection.photos-undetermined", names=["3"]) in result.messages
     others = np.arange(8) != 3
     np.testing.assert_allclose(result.photo_sd[others], expected.photo_sd[others], rtol=1e-5)
     assert np.isnan(result.photo_sd[3]).all()

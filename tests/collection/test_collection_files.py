@@ -60,13 +60,13 @@ def with_line(number: int, text: str):
     ("number", "text", "message"),
     [
         (1, "3 4 x", "the numbers of photos, points and images"),
-        (1, "3 4.5 9", "not the numbers of photos, points and images"),
-        (1, "-3 4 9", "not the numbers of photos, points and images"),
-        (3, "0 0 1.5 1.5.5", "is not a finite number"),
-        (3, "0 0 nan 1.5", "is not a finite number"),
-        (3, "3 0 1.5 1.5", "3 is no photo: they count from 0 to 2"),
-        (3, "1.5 0 1.5 1.5", "1.5 is no photo"),
-        (3, "0 -1 1.5 1.5", "-1 is no point: they count from 0 to 3"),
+        (1, "3 4.5 9", "must contain the numbers of photos, points and images"),
+        (1, "-3 4 9", "must contain the numbers of photos, points and images"),
+        (3, "0 0 1.5 1.5.5", "must be a finite number"),
+        (3, "0 0 nan 1.5", "must be a finite number"),
+        (3, "3 0 1.5 1.5", "a photo must be 0 to 2, got 3"),
+        (3, "1.5 0 1.5 1.5", "a photo must be 0 to 2, got 1.5"),
+        (3, "0 -1 1.5 1.5", "a point must be 0 to 3, got -1"),
     ],
 )
 def test_a_bad_line_is_named_and_shown(tmp_path, number, text, message):
@@ -107,9 +107,9 @@ def test_nothing_but_an_input_error_comes_of_any_bytes(tmp_path_factory, data):
     ("name", "value", "message"),
     [
         ("photo_parameters", np.zeros((3, 8)), "has the shape"),
-        ("point_positions", np.full((4, 3), np.nan), "point_positions[0, 0] is not finite"),
-        ("image_sd", 0.0, "image_sd[0, 0] is not positive"),
-        ("photo_sd", -1.0, "photo_sd[0, 0] is not a standard deviation"),
+        ("point_positions", np.full((4, 3), np.nan), "point_positions[0, 0] must be finite"),
+        ("image_sd", 0.0, "image_sd[0, 0] must be positive"),
+        ("photo_sd", -1.0, "photo_sd[0, 0] must be a standard deviation"),
         ("image_photos", np.full(len(SMALL.image_xy), 3), "outside 0 to 2"),
         ("image_points", np.zeros(len(SMALL.image_xy)), "whole numbers"),
     ],

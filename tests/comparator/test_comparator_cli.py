@@ -176,7 +176,7 @@ def test_the_date_of_the_run_stands_on_the_title_page_only(run, tables, monkeypa
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "²")
     refused = run(*tables, "--no-plots", "--out", "c")
     assert refused.exit_code == 1
-    assert "SOURCE_DATE_EPOCH is '²': no seconds since 1970" in refused.stderr
+    assert "SOURCE_DATE_EPOCH must be a number of seconds since 1970, got '²'" in refused.stderr
     assert not Path("c").exists()
 
 

@@ -409,7 +409,7 @@ def test_feature_22_documents_round_trip(tmp_path, full):
     assert Correction.read(path).scale_x == full.correction.scale_x
     for text in (b"{}", b"[]", b"nonsense", b'{"polynomial": {}}'):
         path.write_bytes(text)
-        with pytest.raises(InputError, match="holds no correction"):
+        with pytest.raises(InputError, match="the document must describe a correction"):
             Correction.read(path)
     with pytest.raises(InputError, match="cannot be read"):
         Correction.read(tmp_path / "nowhere.json")

@@ -175,7 +175,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
         compare([first, other])
     for text in ("{}", "[1]", "nonsense", '{"joint": {"correction": 1}}'):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError, match=r"bad\.json: holds no calibration"):
+        with pytest.raises(InputError, match=r"bad\.json: the document must describe a calibration"):
             compare([tmp_path / "bad.json", first])
 
 

@@ -92,10 +92,10 @@ def test_another_version_is_refused(client, tmp_path, monkeypatch):
     assert (workers, limit) == (2, 2**30)
     assert 2**26 < held < 2**30
     monkeypatch.setattr(_photocore, "__version__", "0.0.1")
-    with pytest.raises(InputError, match=r"all workers must have photogram 0\.0\.1, as here: tcp://.* has"):
+    with pytest.raises(InputError, match="tcp://", check=lambda error: error.code == "parts.versions"):
         check_workers(client, tmp_path)
 
 
 def test_a_folder_that_workers_do_not_see_is_refused(client, tmp_path):
-    with pytest.raises(InputError, match="do not see"):
+    with pytest.raises(InputError, check=lambda error: error.code == "parts.no-shared-disk"):
         check_workers(client, tmp_path / "nowhere")

@@ -105,7 +105,7 @@ def test_threads_that_are_no_number_of_threads_are_usage_errors(run, command, va
 def test_integers_beyond_all_counts_are_usage_errors(run, tmp_path, option):
     result = run("simulate", "block", option, "9" * 20)
     assert result.exit_code == 2
-    assert f"Invalid value for {option}: is too large" in result.stderr
+    assert f"Invalid value for {option}: must be at most" in result.stderr
     assert not list(tmp_path.iterdir())
 
 
@@ -180,7 +180,7 @@ def test_an_ignored_signal_stays_ignored(tmp_path):
     """As under nohup."""
     program = (
         "import os, signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from photogram.cli.signals import end_by_signals\n"
+        "from photogram.cli.process import end_by_signals\n"
         "end_by_signals(); os.kill(os.getpid(), signal.SIGHUP); print('alive')"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -240,7 +240,7 @@ def test_a_file_is_no_directory_for_results(run, place, name, option):
     (place / "file").write_text("old")
     result = run(*words(name, **{option: "file"}))
     assert result.exit_code == 1
-    assert "file: is not a directory" in result.stderr
+    assert "file: must be a folder, but is a file" in result.stderr
     for other in outputs(name):
         result = run(*words(name, **{option: "results", other: "results"}))
         assert result.exit_code == 1
@@ -254,8 +254,9 @@ def test_no_output_makes_a_project_ambiguous(run, place, name, target):
     for option in outputs(name):
         result = run(*words(name, **{option: f"galveston/{target}"}))
         assert result.exit_code == 1, result.output
-        assert f"galveston/{target}: would be taken for the {Path(target).stem.upper()} of the project" in (
-            result.stderr
+        assert (
+            f"galveston/{target}: the file would be read as {Path(target).stem.upper()} of the project"
+            in (result.stderr)
         )
         assert not (place / "galveston" / target).exists()
 
@@ -266,7 +267,7 @@ def test_a_project_that_is_overwritten_gets_no_second_files(run, place, name):
     before = content(place)
     result = run(*words(name, out="second"), "--overwrite")
     assert result.exit_code == 1, result.output
-    assert "second/ground.txt: the project there would have a second GROUND" in result.stderr
+    assert "second/ground.txt: the project in this folder would have two files GROUND" in result.stderr
     assert content(place) == before
 
 

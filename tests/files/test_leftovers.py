@@ -72,9 +72,7 @@ def test_the_mark_stays_until_all_its_files_are_written_again(half):
 
 def test_a_command_remarks_on_inputs_of_an_incomplete_set(run, half):
     result = run("collection", half / "a")
-    assert f"remark: {half / 'a'}: an interrupted run may have left it out of step with other files" in (
-        result.stderr
-    )
+    assert f"remark: {half / 'a'}: an interrupted run may have changed other files" in (result.stderr)
     assert str(marks(half)[0]) in result.stderr
 
 
@@ -166,7 +164,7 @@ def test_a_signal_that_ends_a_command_leaves_nothing(tmp_path, number):
     program = (
         "import os, sys\n"
         "from pathlib import Path\n"
-        "from photogram.cli.signals import end_by_signals\n"
+        "from photogram.cli.process import end_by_signals\n"
         "from photogram.io.writing import OutputSet\n"
         "end_by_signals()\n"
         "with OutputSet() as outputs:\n"

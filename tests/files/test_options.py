@@ -71,7 +71,7 @@ def test_pictures_without_a_place_are_refused(run, tmp_path):
     for command in (["plan"], ["collection", str(examples / "collection" / "ring.txt")]):
         refused = run(*command, "--plots")
         assert refused.exit_code == 2
-        assert "goes with --out DIR" in refused.stderr
+        assert "requires --out DIR" in refused.stderr
     assert not list(tmp_path.iterdir())
 
 
@@ -98,7 +98,7 @@ def test_a_file_is_no_place_for_an_adjusted_collection(run, tmp_path):
     for name in ("adjusted.txt", "adjusted.txt.bz2"):
         refused = run("collection", "--example", "--out", name)
         assert refused.exit_code == 2
-        assert "adjusted.txt goes there" in refused.stderr
+        assert "adjusted.txt is written into it" in refused.stderr
     assert not list(tmp_path.iterdir())
 
 

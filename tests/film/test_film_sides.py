@@ -132,4 +132,4 @@ def test_a_photo_without_marks_is_told_to_be_taken_as_not_mirrored(tmp_path: Pat
     without_starts(tmp_path)
     keep_marks(tmp_path, "p3", ())
     found = read(tmp_path)
-    assert any("photo p3: its marks do not tell the side" in str(each) for each in found.messages)
+    assert any("photo p3: its fiducials do not determine the side" in str(each) for each in found.messages)

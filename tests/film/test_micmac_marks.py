@@ -12,6 +12,7 @@ from photogram import InputError
 from photogram.formats import Project, Wishes, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
 from photogram.network import Fiducial
+from refusals import refused
 from test_film import project, project_again
 
 
@@ -91,13 +92,13 @@ def test_a_list_of_names_is_that_of_the_camera(tmp_path: Path) -> None:
     for changed, message in (
         (
             text.replace("ll\n", "nn\n"),
-            r"id_fiducial.txt, record 1: the mark nn is no mark of MeasuresCamera",
+            "format.undefined what=mark name=nn",
         ),
-        (f"{text}ll\n", r"record 9: the mark ll is there twice"),
-        (text.replace("ll\n", ""), r"has no ll, which MeasuresCamera.xml has"),
+        (f"{text}ll\n", "format.repeated what=mark name=ll"),
+        (text.replace("ll\n", ""), "micmac.unnamed names=['ll'] file=MeasuresCamera.xml"),
     ):
         path.write_text(changed)
-        with pytest.raises(InputError, match=message):
+        with refused(message):
             read_marks(folder)
 
 
@@ -114,15 +115,15 @@ def test_files_at_fault_are_refused(tmp_path: Path) -> None:
     path = folder / "Ori-InterneScan" / "MeasuresIm-p2.xml"
     text = path.read_text()
     path.write_text(text.replace("<NamePt>ur<", "<NamePt>nn<"))
-    with pytest.raises(InputError, match=r"MeasuresIm-p2.xml: the camera has no mark nn"):
+    with refused("format.undefined what=mark name=nn"):
         read_marks(folder)
     path.write_text(text.replace("<NamePt>ur<", "<NamePt>ll<"))
-    with pytest.raises(InputError, match=r"the mark ll is there twice"):
+    with refused("format.name what=mark name=ll"):
         read_marks(folder)
     (folder / "Ori-InterneScan" / "MeasuresCamera.xml").unlink()
     with pytest.raises(InputError, match=r"MeasuresCamera.xml"):
         read_marks(folder)
-    with pytest.raises(InputError, match=r"has no MeasuresIm"):
+    with refused("format.files name=MeasuresIm-*.xml"):
         read_marks(tmp_path)
 
 

@@ -65,9 +65,9 @@ def test_a_camera_of_stars_is_that_of_a_certificate(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ("camera,calibration,c\nrc10-2345,camera.json,152\n", "which says model and parameters"),
+        ("camera,calibration,c\nrc10-2345,camera.json,152\n", "specifies model and parameters"),
         ("camera,calibration\nrc10-2345,scanners.csv\n", "scanners.csv"),
-        ("camera,calibration\nrc10-2345,none.json\n", "none.json: cannot be read"),
+        ("camera,calibration\nrc10-2345,none.json\n", "none.json: the file cannot be read"),
     ],
 )
 def test_calibrations_that_cannot_be_are_refused(folder: Path, table: str, said: str) -> None:
@@ -79,5 +79,5 @@ def test_calibrations_that_cannot_be_are_refused(folder: Path, table: str, said:
 def test_a_plate_is_no_camera_of_pixels(folder: Path) -> None:
     settings = (folder / "project.toml").read_text().replace('image = "mm"', 'image = "px"')
     (folder / "project.toml").write_text(settings)
-    with pytest.raises(InputError, match=r"is in mm, and \[units\] image is not"):
+    with pytest.raises(InputError, match=r"is in mm; \[units\] image must be equal"):
         read(folder)

@@ -16,12 +16,12 @@ from block import (
     with_noise,
 )
 from damaged import check_damaged
-from refusals import refused
 from test_plain_project import EXAMPLE, written
 
 from photogram import Attitudes, Camera, InnerConstraints, adjust, formats
 from photogram.formats.colmap.content import MODELS
 from photogram.formats.self_check import agreement
+from refusals import refused
 
 
 @pytest.mark.parametrize("dress", ["text", "text_legacy", "binary"])
@@ -85,7 +85,7 @@ def test_a_round_trip_keeps_all_but_features_without_point(tmp_path, dress, targ
 def test_what_is_written_of_the_plain_project_adjusts_to_the_same(tmp_path):
     project = formats.read(EXAMPLE)
     lost = " ".join(formats.cannot_hold(project, "colmap"))
-    for word in ("standard deviations", "4 held and 1 check points", "7 observations beside images"):
+    for word in ("standard deviations", "4 control and 1 check points", "7 observations other than images"):
         assert word in lost
     other = formats.read(written(project, tmp_path / "there", "colmap"))
     # names.csv beside the model keeps the names of points.
@@ -123,7 +123,7 @@ def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
         "adjust", "moved", "--control", EXAMPLE / "control.csv", "--sd", "control=0.01", "--sd", "images=0.5"
     )
     assert done.exit_code == 0, done.output
-    assert "carried onto" in done.output
+    assert "the model is transformed to" in done.output
     place = tmp_path / "moved-adjusted"
     assert {"covariances.json", "images.bin", "photo_covariances.bin"} <= {
         each.name for each in (place / "adjusted-colmap").iterdir()
@@ -221,7 +221,7 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
             "images.txt",
             " 1 DJI_0002.JPG",
             " 2 DJI_0002.JPG",
-            ["images.txt", "record 5", "format.reference", "what=camera other=2"],
+            ["images.txt", "record 5", "format.undefined", "what=camera name=2"],
         ),
         (
             "points3D.txt",
@@ -229,7 +229,7 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
             "107 -51.7594",
             ["points3D.txt", "record 3", "format.repeated", "what=point name=107"],
         ),
-        ("frames.txt", "10 1 0.0103", "10 9 0.0103", ["frames.txt", "format.reference", "what=rig other=9"]),
+        ("frames.txt", "10 1 0.0103", "10 9 0.0103", ["frames.txt", "format.undefined", "what=rig name=9"]),
     ],
 )
 def test_a_fault_of_a_text_file_is_named_with_its_line(tmp_path, file, old, new, words):
@@ -263,7 +263,7 @@ def test_rigs_that_cameras_do_not_tell_are_written_as_photos(tmp_path):
     block = project.block
     one = block.replace(photo_cameras=[0] * len(block.photo_ids))
     lost = " ".join(formats.cannot_hold(project.replace(block=one), "colmap"))
-    assert "rigs whose sensors are not told by their cameras" in lost
+    assert "rigs: photos have their own poses" in lost
     assert "rigs" not in " ".join(formats.cannot_hold(project, "colmap"))
     other = formats.read(written(project.replace(block=one), tmp_path, "colmap")).block
     assert not other.mounts

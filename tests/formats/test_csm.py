@@ -8,13 +8,14 @@ import pytest
 
 from ephemeris_seconds import added_to_ephemeris_seconds
 from golden_data import SHARED, needs
-from photogram import Block, InputError, adjust
+from photogram import Block, adjust
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
 from photogram.formats.csm.isd import Positions
 from photogram.formats.csm.photos import trajectory_of, with_polynomial_pointing
 from photogram.io.pvl import parsed
 from photogram.network import Table, Trajectory
+from refusals import refused
 
 MOVING = SHARED / "moving"
 OURS = np.diag([1.0, -1.0, -1.0])
@@ -92,10 +93,9 @@ def test_the_pixels_of_isis_are_half_a_pixel_from_those_of_csm():
 
 def test_lines_that_do_not_fit_their_tables_are_told():
     isd = read_support(MOVING / "csm" / "orbitalLineScan.json")
-    assert isd.remarks == (
-        "the 16 lines take 1.6 s by line_scan_rate, the table of instrument_pointing 1.5 s: the table is"
-        " short by 6.3 %",
-    )
+    [remark] = isd.remarks
+    values = [round(remark.fields[name], 4) for name in ("lines", "span", "table", "percent")]
+    assert (remark.code, values) == ("csm.duration", [16, 1.6, 1.5, 6.25])
     assert not read_support(MOVING / "csm" / "constVelocityLineScan.json").remarks
 
 
@@ -134,7 +134,7 @@ def test_the_times_of_lines_take_what_the_keywords_say(side, lro, isds):
     assert first == 0.0
     assert zero == pytest.approx(truth["line_time_zero"], abs=1e-6)
     assert rate == pytest.approx(truth["seconds_per_line"], rel=1e-9)
-    assert "ADDITIONAL_PREROLL" in isd.remarks[0]
+    assert isd.remarks[0].code == "csm.drift"
     # The span of its own tables, to a microsecond.
     assert isd.lines.times([isd.size[1]])[0] == pytest.approx(isd.pointing.times[-1], abs=2e-6)
 
@@ -161,7 +161,7 @@ def test_a_pointing_of_polynomials_is_that_of_its_angles(side, isds):
     expected = np.swapaxes(of_angles(fit.at(times)), 1, 2) @ OURS
     # A turn of 1e-3 rad a second, times that have 6e-8 s of resolution.
     np.testing.assert_allclose(turned.reshape(-1, 3, 3), expected, rtol=0, atol=3e-10)
-    with pytest.raises(InputError, match="503 records of the pointing do not give polynomials"):
+    with refused("csm.degree n=503 degree=503"):
         with_polynomial_pointing(isd, 503)
 
 

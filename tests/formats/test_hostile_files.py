@@ -17,6 +17,7 @@ from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
 from photogram.network.similarity import similarity
+from refusals import refused
 
 EXAMPLE = Path(formats.__path__[0]).with_name("examples") / "project"
 
@@ -29,14 +30,14 @@ def packed(path, content, kind=zipfile.ZIP_DEFLATED):
 
 def reads(path, match, root="document"):
     begin = time.process_time()
-    with pytest.raises(InputError, match=match):
+    with refused(match):
         read_stream(path, {}, root)
     assert time.process_time() - begin < 10
 
 
 def test_an_archive_that_would_grow_without_end_is_refused_by_its_header(tmp_path):
     path = packed(tmp_path / "bomb.xml", b"<document>" + b" " * 80_000_000 + b"</document>")
-    reads(path, r"holds doc\.xml, which would grow from \d{5} to 80000021 bytes")
+    reads(path, r"doc\.xml would expand from \d{5} to 80000021 bytes")
 
 
 @pytest.mark.parametrize(
@@ -94,20 +95,20 @@ def test_an_archive_unpacks_no_more_than_its_header_says(tmp_path):
     size, lie = len(content).to_bytes(4, "little"), (1000).to_bytes(4, "little")
     assert data.count(size) == 2
     path.write_bytes(data.replace(size, lie))
-    reads(path, "cannot be unpacked: Bad CRC-32")
+    reads(path, "xml.packed reason=Bad CRC-32")
 
 
 @pytest.mark.parametrize(
     ("content", "match"),
     [
-        (b'<document a="' + b"x" * 30_000_000 + b'"/>', r"record 1: a tag of more than 1048576 bytes"),
-        (b"<document><!-- " + b"x" * 30_000_000 + b" --></document>", "a tag of more than"),
-        (b"<document><a>" + b"x" * 30_000_000 + b"</a></document>", "a text of more than"),
-        (b"<document>" + b"<a/>" * 3_000_000 + b"</document>", "more than 1000000 elements stand in one"),
-        (b"<document>" + b"<a>" * 300, "nested too deep"),
+        (b'<document a="' + b"x" * 30_000_000 + b'"/>', "xml.tag most=1048576"),
+        (b"<document><!-- " + b"x" * 30_000_000 + b" --></document>", "xml.tag most=1048576"),
+        (b"<document><a>" + b"x" * 30_000_000 + b"</a></document>", "xml.text most=1048576"),
+        (b"<document>" + b"<a/>" * 3_000_000 + b"</document>", "xml.elements most=1000000"),
+        (b"<document>" + b"<a>" * 300, "xml.depth most=200"),
         (
             b"<document>" + (b'<a b="' + b"x" * 100_000 + b'"/>') * 700 + b"</document>",
-            "more than 1000000 elements",
+            "xml.elements most=1000000",
         ),
     ],
     ids=["attribute", "comment", "text", "elements", "depth", "attributes"],
@@ -135,7 +136,7 @@ def test_an_encoding_that_is_none_is_refused_and_spoils_no_folder(tmp_path, enco
     content = f'<?xml version="1.0" encoding="{encoding}"?><document version="1.2"/>'.encode()
     (tmp_path / "a.xml").write_bytes(content)
     assert root_of(tmp_path / "a.xml")[0] in ("", "document")
-    reads(tmp_path / "a.xml", r"a\.xml.*is no XML")
+    reads(tmp_path / "a.xml", "xml.syntax reason=")
     shutil.copytree(EXAMPLE, tmp_path, dirs_exist_ok=True)
     assert formats.read(tmp_path).title == "plain project"
 
@@ -171,7 +172,7 @@ def test_a_camera_that_is_no_name_is_refused(tmp_path, camera):
     }
     (tmp_path / "reconstruction.json").write_text(json.dumps([model]))
     (tmp_path / "tracks.csv").write_text("OPENSFM_TRACKS_VERSION_v2\n")
-    with pytest.raises(InputError, match=r"reconstruction\.json.*one\.jpg/camera: is no text"):
+    with pytest.raises(InputError, match=r"reconstruction\.json.*one\.jpg/camera: must be text"):
         formats.read(tmp_path)
 
 
@@ -231,12 +232,12 @@ def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path):
     for name in ("one", "other"):
         shutil.copytree(EXAMPLE, tmp_path / name)
     (tmp_path / "one" / "more.csv").symlink_to("more.csv")
-    assert "tables of other names are not read: more.csv" in [
+    assert "files without the name of a table are ignored: more.csv" in [
         each.text for each in formats.read(tmp_path / "one").messages
     ]
     (tmp_path / "other" / "images.csv").unlink()
     (tmp_path / "other" / "images.csv").symlink_to("images.csv")
-    with pytest.raises(InputError, match=r"has no table of images \(images\.csv\)"):
+    with pytest.raises(InputError, match=r"images\.csv is missing"):
         formats.read(tmp_path / "other")
     (tmp_path / "loop").symlink_to("loop")
     assert default_out(tmp_path / "loop", "-adjusted").name == "loop-adjusted"

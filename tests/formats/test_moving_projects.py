@@ -390,7 +390,7 @@ def test_what_tables_cannot_hold(tmp_path):
         formats.to_files(own, "colmap")
     drone = project_of(block, tmp_path, sizes=((3000, 2000),))
     lost = formats.cannot_hold(drone, "colmap")
-    assert "trajectories: 6 photos with the poses that they are about" in lost
+    assert "trajectories: 6 photos with their approximate poses" in lost
 
 
 def test_what_counts_from_where_is_kept(moving_projects):
@@ -434,7 +434,7 @@ def test_adjust_and_info_on_the_command_line(run, moving_projects, tmp_path):
         done = run("adjust", moving_projects / name, "--out", name, "--no-html")
         assert done.exit_code in (0, 4), done.output
         if name == "lines":
-            assert "columns that the table trajectories does not have are not read: colour" in " ".join(
+            assert "columns unknown to the table trajectories are not read: colour" in " ".join(
                 done.output.split()
             )
         result = adjust(formats.read(moving_projects / name).block)

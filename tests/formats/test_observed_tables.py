@@ -123,7 +123,7 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
     ("file", "old", "new", "words"),
     [
         ("level_points", "lake,t", "lake,x", ["level_points.csv", "record 2", "column point", "no point"]),
-        ("level_points", "0.01", "", ["record 2", "column sd", "level_points under [sd]"]),
+        ("level_points", "0.01", "", ["record 2", "error.column sd: table.no-sd level_points"]),
         (
             "level_points",
             "pond",
@@ -131,8 +131,8 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
             ["record 4", "column level", "error.column level: table.similar Lake lake"],
         ),
         ("planes", "1,2,3", "1,,3", ["planes.csv", "record 2", "some of x, y, z are empty"]),
-        ("planes", "0,0,1", "0,0,0", ["planes.csv", "record 2", "is no direction"]),
-        ("planes", "1,2,3,0,0,1", ",,,0,0,1", ["record 2", "through of plane wall must be given"]),
+        ("planes", "0,0,1", "0,0,0", ["planes.csv", "record 2", "a vector with a positive length"]),
+        ("planes", "1,2,3,0,0,1", ",,,0,0,1", ["record 2", "plane wall is weighted or fixed"]),
         ("lines", "1,2,3,1,0,0", "1,2,3,,,", ["lines.csv", "record 2", "must be given"]),
         (
             "line_points",
@@ -168,7 +168,7 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
             ["record 6", "error.unknown.close parameter of the camera drone k9 k2"],
         ),
         ("covariances", "camera,drone,k1,k2", "camera,phone,k1,k2", ["record 8", "no camera 'phone'"]),
-        ("covariances", "k1,k2,-5e-9", "k1,k2,-5e-7", ["record 6", "not symmetric and positive definite"]),
+        ("covariances", "k1,k2,-5e-9", "k1,k2,-5e-7", ["record 6", "symmetric and positive definite"]),
         ("height_differences", "0.002", "0", ["height_differences.csv", "record 2"]),
     ],
 )

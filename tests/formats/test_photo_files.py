@@ -1,6 +1,7 @@
 """Positions that photographs carry, in a project: precedence, heights, groups, the way to the report."""
 
 import shutil
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,13 @@ import pytest
 
 from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
-from photogram import InputError, Position, formats
+from photogram import Position, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
+from photogram.formats.metadata.pictures import DOP_ALONE, RADIAL
 from photogram.formats.metadata.search import Photos
 from photogram.formats.metadata.systems import located
 from photogram.words import Phrase, option_sd
+from refusals import refused
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"
 PLACE = (8.5, 47.3, 500.0)
@@ -40,8 +43,10 @@ def positions(project):
     return {each.photo: each for each in project.block.observations if isinstance(each, Position)}
 
 
-def said(project):
-    return " ".join(str(each) for each in project.messages)
+def fields(project, code):
+    """Return the fields of the only message with a code."""
+    (own,) = [each.phrase.fields for each in project.messages if each.code == code]
+    return own
 
 
 def test_positions_of_pictures_are_observations_with_their_own_deviations(run, flown):
@@ -53,7 +58,8 @@ def test_positions_of_pictures_are_observations_with_their_own_deviations(run, f
     np.testing.assert_allclose(
         np.sqrt(np.diag(found["DJI_0101"].covariance)), (0.012, 0.011, 0.025), rtol=1e-6
     )
-    assert "6 positions of photos are observations (6 of XMP); standard deviations: 6 of XMP" in said(project)
+    observed = fields(project, "photos.observed")
+    assert observed == {"n": 6, "positions": "6 of XMP", "deviations": ["6 of XMP"]}
     done = run("adjust", folder, "--photos-dir", folder / "photos", "--out", "out", "--no-html")
     assert done.exit_code == 0, done.output
     assert "Accepted" in done.output
@@ -94,11 +100,9 @@ def test_heights_of_exif_need_a_word(tmp_path):
         picture(path, gps=tags(*place, tag_31=3.0))
 
     block_with_pictures(tmp_path, write=write)
-    with pytest.raises(
-        InputError, match=r"above the geoid \(as mostly\).*--photos-crs EPSG:4326\+geoid=46.5"
-    ):
+    with refused("photos.height-kind option=--photos-crs"):
         adjusted(tmp_path)
-    with pytest.raises(InputError, match="WGS 84, which EPSG:25832 is not"):
+    with refused("photos.wgs84 crs=EPSG:25832 option=--photos-crs"):
         adjusted(tmp_path, crs="EPSG:25832")
     ellipsoidal, above = (
         positions(adjusted(tmp_path, crs=crs))["DJI_0101"] for crs in ("EPSG:4979", "EPSG:4326+geoid=47")
@@ -113,9 +117,7 @@ def test_heights_of_two_kinds_are_refused_by_photos_of_both(tmp_path):
     picture(tmp_path / "b.jpg", gps=tags(*PLACE, tag_31=3.0))
     found = read_metadata(tmp_path)
     for crs in (None, "EPSG:4326+geoid=47"):
-        with pytest.raises(
-            InputError, match=r"heights of two kinds: those of a\.jpg \(XMP\).*b\.jpg \(EXIF\)"
-        ):
+        with refused("photos.heights one=above the ellipsoid first=['a.jpg (XMP)']"):
             located(list(found.photos.values()), crs)
     assert located(list(found.photos.values()), "EPSG:4979").systems == ("EPSG:4979",) * 2
 
@@ -128,20 +130,16 @@ def test_altitude_references_2_and_3_are_sea_level(tmp_path):
     records = list(read_metadata(tmp_path).photos.values())
     geoid = "EPSG:4326+geoid=47"
     assert located(records, geoid).systems == (geoid,) * 2
-    with pytest.raises(
-        InputError, match=r"above sea level .* nothing says where that is: --photos-crs EPSG:4326\+"
-    ):
+    with refused("photos.sea-level option=--photos-crs"):
         located(records)
     for crs in ("EPSG:4979", "EPSG:4326"):
-        with pytest.raises(InputError, match=f"above sea level .* heights of {crs} are above the ellipsoid"):
+        with refused("photos.sea-level option=--photos-crs"):
             located(records, crs)
     picture(tmp_path / "b.jpg", gps=tags(*PLACE, tag_31=3.0))
     records = list(read_metadata(tmp_path).photos.values())
     assert located(records, geoid).systems == (geoid,) * 2
     for crs in (None, "EPSG:4979"):
-        with pytest.raises(
-            InputError, match=r"those of a\.jpg \(EXIF\) are above the geoid, those of b\.jpg"
-        ):
+        with refused("photos.heights one=above the geoid first=['a.jpg (EXIF)']"):
             located(records, crs)
 
 
@@ -192,7 +190,7 @@ def test_deviations_come_from_the_next_source_that_has_some(tmp_path):
 def test_the_second_of_two_tables_is_told(tmp_path):
     all_sources(tmp_path)
     (message,) = read_metadata(tmp_path).messages
-    assert message.text == "positions of 1 photo are those of another table, not of this one"
+    assert (message.code, message.phrase.fields["n"]) == ("photos.other-table", 1)
     assert message.file.name == "reference.csv"
 
 
@@ -216,10 +214,10 @@ def test_a_project_names_the_folder_itself(flown):
     toml.write_text(text + '[photos]\ndirectory = "photos"\n')
     assert len(positions(formats.read(folder))) == 6
     toml.write_text(text + '[photos]\ndirectory = "nowhere"\n')
-    with pytest.raises(InputError, match="there is no folder nowhere"):
+    with refused("there is no folder nowhere"):
         formats.read(folder)
     toml.write_text(text + '[photos]\ndirectory = "photos"\nmrk_antenna = 3\n')
-    with pytest.raises(InputError, match="true or false"):
+    with refused("true or false"):
         formats.read(folder)
 
 
@@ -233,7 +231,7 @@ def test_deviations_that_lack_are_told_and_given_by_the_option(tmp_path):
     assert Phrase("read.positions", {"n": 6, "option": option_sd("gnss")}) in project.lacks
     project = adjusted(tmp_path, sd={"gnss": (0.02, 0.02, 0.04)})
     assert len(positions(project)) == 6
-    assert "standard deviations: 6 given (--sd gnss)" in said(project)
+    assert fields(project, "photos.observed")["deviations"] == ["6 of --sd gnss"]
     toml = tmp_path / "project.toml"
     toml.write_text(toml.read_text().replace("images = 0.5", "images = 0.5\ngnss = 0.03"))
     assert len(positions(adjusted(tmp_path))) == 6
@@ -249,14 +247,19 @@ def test_solutions_that_are_not_fixed_and_accuracies_of_exif_are_told(tmp_path):
             picture(path, gps=tags(*place, **({"tag_31": 3.0} if number < 6 else {"tag_11": 1.2})))
 
     block_with_pictures(tmp_path, write=write)
-    text = said(adjusted(tmp_path, crs="EPSG:4979", sd={"gnss": (5.0,)}))
-    assert "the solution of the receiver was float for 1 photo: DJI_0102.JPG" in text
-    assert "single for 1 photo: DJI_0103.JPG" in text
-    assert "how sure" in text
-    assert "(2 photos)" in text
-    assert "GPSDOP of EXIF gives no metres: it is not taken (1 photo)" in text
-    assert "3 of XMP, 3 of EXIF" in text
-    assert "3 of XMP, 2 of EXIF, 1 given (--sd gnss)" in text
+    project = adjusted(tmp_path, crs="EPSG:4979", sd={"gnss": (5.0,)})
+    fixes = [own.fields for own in map(attrgetter("phrase"), project.messages) if own.code == "photos.fix"]
+    assert [(own["fix"], own["names"]) for own in fixes] == [
+        ("float", ["DJI_0102.JPG"]),
+        ("single", ["DJI_0103.JPG"]),
+    ]
+    remarks = [
+        own.fields for own in map(attrgetter("phrase"), project.messages) if own.code == "photos.remark"
+    ]
+    assert {own["remark"]: own["n"] for own in remarks} == {RADIAL: 2, DOP_ALONE: 1}
+    observed = fields(project, "photos.observed")
+    assert observed["positions"] == "3 of XMP, 3 of EXIF"
+    assert observed["deviations"] == ["3 of XMP, 2 of EXIF", "1 of --sd gnss"]
 
 
 def test_exposures_without_a_photo_are_counted_and_flights_are_files_of_a_folder(tmp_path):
@@ -274,16 +277,16 @@ def test_exposures_without_a_photo_are_counted_and_flights_are_files_of_a_folder
     }
     flights = {each.flight for each in found.photos.values()}
     assert {each.rpartition("/")[2] for each in flights} == {"100_0004", "100_0005"}
-    assert [each.text for each in found.messages] == ["2 of 3 exposures have no photo here"]
+    assert [each.phrase.fields for each in found.messages] == [{"n": 2, "total": 3}]
     picture(tmp_path / "DJI_0001.JPG")
-    with pytest.raises(InputError, match=r"DJI_0001\.JPG may be of 100_0004_Timestamp\.MRK, 100_0005"):
+    with refused(r"photos.flight photo=DJI_0001\.JPG names=\['100_0004_Timestamp\.MRK', '100_0005"):
         read_metadata(tmp_path)
 
 
 def test_a_model_in_axes_of_its_own_is_carried_onto_its_positions(flown):
     folder, *_ = flown
     project = adjusted(folder)
-    assert "is carried onto 6 positions of photos by a similarity" in said(project)
+    assert fields(project, "photos.transformed")["n"] == 6
     found = np.array([each.position for each in positions(project).values()])
     assert np.abs(project.block.photo_positions - found).max() < 0.2
 
@@ -297,7 +300,7 @@ def test_poses_that_do_not_fit_are_found_anew(run, flown):
         row[2:5] = other if row[0] != "DJI_0101" else ["900", "3", "5"]
     (folder / "photos.csv").write_text("\n".join([*heads, *(",".join(row) for row in rows)]))
     project = adjusted(folder)
-    assert "are found anew" in said(project)
+    assert fields(project, "photos.new-poses")
     assert np.isnan(project.block.photo_positions).all()
     done = run("adjust", folder, "--photos-dir", folder / "photos", "--out", "out", "--no-html")
     assert done.exit_code == 0, done.output
@@ -307,7 +310,7 @@ def test_poses_that_do_not_fit_are_found_anew(run, flown):
 def test_control_in_axes_of_its_own_leaves_no_way_for_positions(flown):
     folder, *_ = flown
     shutil.copy(EXAMPLE / "control.csv", folder)
-    with pytest.raises(InputError, match="no place on the earth"):
+    with refused("photos.place"):
         adjusted(folder, sd={"control": (0.01,)})
 
 
@@ -352,19 +355,19 @@ def test_photos_of_one_name_in_two_folders_are_refused(flown):
     folder, *_ = flown
     (folder / "photos" / "b").mkdir()
     shutil.copy(folder / "photos" / "DJI_0101.JPG", folder / "photos" / "b")
-    with pytest.raises(InputError, match=r"DJI_0101 may be .*DJI_0101\.JPG, b/DJI_0101\.JPG"):
+    with refused("photos.ambiguous photo=DJI_0101 names=['DJI_0101.JPG', 'b/DJI_0101.JPG']"):
         adjusted(folder)
 
 
 def test_folders_that_say_nothing_are_refused(tmp_path, flown):
     folder, *_ = flown
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="holds nothing that says"):
+    with refused("photos.sources"):
         read_metadata(tmp_path / "empty")
-    with pytest.raises(InputError, match="is no folder"):
+    with refused("photos.folder"):
         read_metadata(folder / "project.toml")
     picture(tmp_path / "others" / "a.jpg", xmp=packet(dji(*PLACE)))
-    with pytest.raises(InputError, match="holds none of the photos DJI_0101"):
+    with refused("photos.none"):
         formats.read(folder, wishes=Wishes(photos=PhotoFiles(tmp_path / "others")))
 
 
@@ -424,5 +427,5 @@ def test_positions_that_are_not_used_are_of_no_kind(tmp_path):
     project = adjusted(tmp_path)
     assert len(positions(project)) == 5
     assert Phrase("read.positions", {"n": 1, "option": option_sd("gnss")}) in project.lacks
-    with pytest.raises(InputError, match="heights of two kinds"):
+    with refused("photos.heights one=above the geoid or above the ellipsoid first=['DJI_0101.JPG (EXIF)']"):
         adjusted(tmp_path, sd={"gnss": (5.0,)})

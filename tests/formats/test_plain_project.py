@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from photogram import (
     formats,
     simulate,
 )
+from photogram.formats.plain.schema import TABLES
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
@@ -599,5 +601,14 @@ def test_images_name_the_photos_of_a_project_without_a_table_of_photos(example):
     assert {each.name for each in formats.read(example).block.cameras} >= {name}
     lines[1] = lines[1].removesuffix(name) + "other"
     (example / "images.csv").write_text("\n".join(lines) + "\n")
-    with rejected("another camera"):
+    with rejected("plain.other-camera"):
         formats.read(example)
+
+
+def test_the_page_describes_every_table_and_its_columns():
+    page = (Path(__file__).parents[2] / "docs" / "formats.md").read_text()
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", page, re.MULTILINE))
+    assert list(TABLES) == [name for name in rows if name in TABLES]
+    for name, table in TABLES.items():
+        for column in {*table.required, *table.texts} - {"strip", "frame"}:
+            assert f"`{column}`" in rows[name], (name, column)

@@ -76,7 +76,7 @@ def test_lengths_in_millimetres_have_no_covariances(tmp_path):
     (tmp_path / "covariances.csv").write_text(
         "kind,name,first,second,covariance\ncamera,A,c,c,4\ncamera,A,K1,K1,1e-12\n"
     )
-    with pytest.raises(InputError, match="camera A has lengths in mm and a row of covariances"):
+    with pytest.raises(InputError, match="camera A has lengths in mm, but its covariances must be in px"):
         read(tmp_path, "plain", "camera,width,height,pixel_mm,c,K1\nA,5472,3648,0.0024,8.8,1e-5\n")
 
 

@@ -76,7 +76,7 @@ def test_tables_of_ranges_come_back(tmp_path):
     edited(place / "ranges.csv", lambda table: table.assign(time=["9999.0", *table["time"][1:]]))
     late = formats.read(place)
     assert sum(each.KIND == "range" for each in late.block.observations) == len(TIMES) - 1
-    assert "1 record at times that their trajectory does not reach" in str(late.messages[0])
+    assert late.messages[0].code == "plain.outside-trajectory"
 
 
 def test_ranges_of_photos_come_back(tmp_path):

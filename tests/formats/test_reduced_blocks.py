@@ -11,6 +11,7 @@ from test_plain_project import written
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import Wishes, supplements
 from photogram.network.directions import image_directions
+from refusals import refused
 
 FOCAL = {"A": 8.67, "B": 9.315}
 
@@ -83,20 +84,20 @@ def test_rotations_that_are_the_other_way_round_are_found(tmp_path):
     (tmp_path / "names.csv").write_text(names)
     (tmp_path / "orientation.ori").write_text("\n".join(lines) + "\n")
     other = formats.read(tmp_path)
-    assert any("transposed" in str(each) for each in other.messages)
+    assert any(each.code == "reduced.transposed" for each in other.messages)
     np.testing.assert_allclose(other.block.photo_attitudes, project.block.photo_attitudes, atol=1e-9)
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("image.im", "8670.000", "8.670", ["image.im", "record 1", "is the unit another one"]),
+        ("image.im", "8670.000", "8.670", ["image.im", "record 1", "reduced.distance"]),
         ("image.im", "-1480.7692", "-1480,7692", ["record 2", "x: '-1480,7692' is not a number"]),
         (
             "orientation.ori",
             "0.998950838367",
             "0.598950838367",
-            ["orientation.ori", "record 1", "no rotation matrix"],
+            ["orientation.ori", "record 1", "format.rotation"],
         ),
         ("control.con", "-22.15520", "x", ["control.con", "record 1", "X: 'x'"]),
     ],
@@ -106,10 +107,8 @@ def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):
         text = each.read_text()
         assert each.name != file or old in text
         (tmp_path / each.name).write_text(text.replace(old, new, 1) if each.name == file else text)
-    with pytest.raises(InputError) as refused:
+    with refused(*words):
         formats.read(tmp_path)
-    for word in words:
-        assert word in str(refused.value)
 
 
 SD = Wishes(sd={"control": (0.02, 0.02, 0.03)})
@@ -169,7 +168,7 @@ def test_bingo_keeps_all_digits(tmp_path):
 def test_patb_keeps_the_digits_that_are_stated(tmp_path):
     project = pinholes()
     lost = " ".join(formats.cannot_hold(project, "patb"))
-    assert "image coordinates are written to 1e-4 micrometres, positions to 1e-5" in lost
+    assert "image coordinates have 1e-4 micrometres, positions 1e-5" in lost
     place = written(project, tmp_path, "patb")
     assert [len(line) for line in (place / "block.ori").read_text().splitlines()[:3]] == [80, 80, 64]
     other = formats.read(place, None, SD)
@@ -219,9 +218,9 @@ def test_names_that_are_no_words_of_bingo_are_refused():
     project = pinholes()
     names = list(project.block.photo_ids)
     twins = [names[0], names[0].replace("_", " "), *names[2:]]
-    with pytest.raises(InputError, match="differ by blanks alone"):
+    with refused("bingo.blanks"):
         formats.to_files(project.replace(block=project.block.replace(photo_ids=twins)), "bingo")
-    with pytest.raises(InputError, match="the name -99 means something else"):
+    with refused("bingo.reserved name=-99"):
         formats.to_files(project.replace(block=project.block.replace(photo_ids=["-99", *names[1:]])), "bingo")
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from test_plain_project import EXAMPLE, change
 
-from photogram import Attitudes, InputError, Spheroid, adjust, formats, simulate
+from photogram import Attitudes, Spheroid, adjust, formats, simulate
 from photogram.formats import Frame
 from photogram.formats.planes import bend, plane_remarks
 from photogram.giant import Project, write_project
+from refusals import refused
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
@@ -72,11 +73,11 @@ def test_attitudes_refer_to_the_grid(result):
 
 def test_what_a_frame_has_no_place_for_is_refused(result):
     free = replace(result, block=result.block.in_frame(Frame()))
-    with pytest.raises(InputError, match="nothing says where on the earth the frame"):
+    with refused("crs.results-place crs=EPSG:32632"):
         places.placed(free, UTM)
-    with pytest.raises(InputError, match="from ft: metres are needed"):
+    with refused("crs.metres crs=EPSG:32632 unit=ft"):
         places.placed(replace(result, block=result.block.replace(linear_unit="ft")), UTM)
-    with pytest.raises(InputError, match="no coordinate reference system"):
+    with refused("crs.unknown crs=EPSG:1"):
         places.check_place(result.block, "EPSG:1")
     same = places.placed(free)
     np.testing.assert_array_equal(same.points, result.point_positions[same.rows])
@@ -100,7 +101,7 @@ def test_geographic_blocks_have_a_place():
     # Axes of the ellipsoid at the point are those of the block itself.
     np.testing.assert_allclose(found.photo_turns, np.broadcast_to(np.eye(3), (8, 3, 3)), atol=1e-9)
     clarke = adjust(simulate(spheroid=Spheroid.clarke_1866(), **common).block)
-    with pytest.raises(InputError, match=r"nothing says of which datum; --crs .* EPSG:4267"):
+    with refused("crs.ellipsoid crs=EPSG:4979"):
         places.placed(clarke, "EPSG:4979")
     # A system on their ellipsoid takes longitudes and latitudes as its own: no grid is asked for.
     own = places.placed(clarke, "EPSG:4267")
@@ -144,7 +145,7 @@ def test_the_command_writes_tables_in_the_system(run, quarry):
 def test_the_command_refuses_before_it_adjusts(run):
     done = run("adjust", EXAMPLE, "--crs", UTM, "--out", "out")
     assert done.exit_code == 1
-    assert "nothing says where on the earth the frame (cartesian) is" in " ".join(done.output.split())
+    assert "the position of the frame on the earth is unknown (cartesian)" in " ".join(done.output.split())
     assert not Path("out").exists()
 
 
@@ -167,7 +168,9 @@ def test_a_block_in_a_plane_is_told_by_how_much_it_bends(run, tmp_path):
     shift_tables(place, [465000.0, 5247000.0, 0.0])
     project = formats.read(place)
     remark = next(each.text for each in project.messages if "cartesian" in each.text)
-    assert remark.startswith("the plane of EPSG:32632 is adjusted as if it were cartesian: heights bend by")
+    assert remark.startswith(
+        "positions in the plane of EPSG:32632 are adjusted as cartesian: heights bend by"
+    )
     assert "ppm" in remark
     assert run("adjust", place, "--out", "out").exit_code == 0
     assert remark in Path("out/report.txt").read_text()
@@ -182,7 +185,7 @@ def test_numbers_that_look_like_a_map_are_told_without_a_name(tmp_path):
     local = formats.read(place)
     assert plane_remarks(local.block, place, local.starts) == []
     shift_tables(place, [465000.0, 5247000.0, 0.0])
-    remarks = [each for each in formats.read(place).messages if "look like those of a map" in each.text]
+    remarks = [each for each in formats.read(place).messages if each.code == "planes.map"]
     assert len(remarks) == 1
 
 
@@ -212,7 +215,7 @@ def test_control_of_a_map_without_a_name_is_told_too(run, tmp_path):
     shutil.move(tmp_path / "moved" / "control.csv", tmp_path / "control.csv")
     (place / "control.csv").unlink()
     done = run("info", place, "--control", tmp_path / "control.csv", "--sd", "control=0.02")
-    assert "coordinates look like those of a map" in " ".join(done.output.split())
+    assert "coordinates are similar to coordinates of a map" in " ".join(done.output.split())
 
 
 def test_giant_projects_in_a_plane_are_told_too(run):
@@ -220,7 +223,7 @@ def test_giant_projects_in_a_plane_are_told_too(run):
     block = simulate(origin=(465000.0, 5247000.0, 300.0), **common).block
     write_project(Project.from_block(block), "plane")
     assert run("giant", "plane").exit_code == 0
-    assert "coordinates look like those of a map" in Path("plane-adjusted/report.txt").read_text()
+    assert "coordinates are similar to coordinates of a map" in Path("plane-adjusted/report.txt").read_text()
     write_project(Project.from_block(simulate(**common).block), "local")
     assert run("giant", "local").exit_code == 0
     assert "of a map" not in Path("local-adjusted/report.txt").read_text()

@@ -38,7 +38,7 @@ TOLERANCE = 1e-9
 """Of the engine."""
 HOPELESS = 1e6
 """Condition of the scaled equations beyond which normal equations have no digits that could be compared."""
-TOLD = ("hardly determine", "lose digits to rounding")
+TOLD = ("adjust.weak", "adjust.rounding")
 """Of the engine's remarks that its values may be off."""
 SAID = "differ, and said so"
 ENDINGS = ("agree", "too weak to compare", "not converged", "refused by name", SAID, "differ")
@@ -192,7 +192,7 @@ def _compared(block: Block, result: Result) -> Comparison:
     redundancy = float(np.abs(result.redundancy[place.images].ravel() - numbers).max())
     fine = max(EXACT, ROUNDING * condition**2, _bent(block, result, deviations / scale))
     same = moved < max(NEAR, fine) and cofactors < fine and redundancy < fine
-    told = any(remark in str(message) for message in result.messages for remark in TOLD)
+    told = any(message.code.startswith(remark) for message in result.messages for remark in TOLD)
     ending = "agree" if same else SAID if told else "differ"
     return Comparison(ending, condition, moved, cofactors, redundancy)
 

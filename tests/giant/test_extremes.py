@@ -66,7 +66,7 @@ def test_a_number_that_its_columns_could_not_hold_is_refused(sound, tmp_path):
     lines = sound[0]["IMAGES"].decode().split("\n")
     lines[3] = f"{lines[3][:10]}{'1.5+154':>10}{lines[3][20:]}"
     files = sound[0] | {"IMAGES": "\n".join(lines).encode()}
-    with pytest.raises(InputError, match=r"columns 11-20: 1\.5e\+154 is out of range, 10 columns") as caught:
+    with pytest.raises(InputError, match=r"columns 11-20: 1\.5e\+154 is out of range") as caught:
         read_project(written(tmp_path, files))
     assert (caught.value.record, caught.value.file.name) == (4, "IMAGES")
 
@@ -148,14 +148,16 @@ def test_links_to_nothing_are_named(sound, tmp_path):
 def test_two_files_for_one_name_are_named(sound, tmp_path):
     place = written(tmp_path, sound[0])
     (place / "ground.txt").write_bytes(b"")
-    with pytest.raises(InputError, match=r"more than one file could be GROUND: GROUND, ground\.txt"):
+    with pytest.raises(
+        InputError, match=r"GROUND, ground\.txt", check=lambda error: error.code == "giant.several"
+    ):
         read_project(place)
 
 
 @pytest.mark.parametrize("given", ["no such directory", "COMMON"])
 def test_what_is_no_directory_is_named(given, sound, tmp_path):
     place = written(tmp_path, sound[0])
-    with pytest.raises(InputError, match="directory cannot be read"):
+    with pytest.raises(InputError, check=lambda error: error.code == "giant.folder"):
         read_project(place / given)
     with pytest.raises(InputError, match="not a path"):
         read_project(Path("a\0b"))

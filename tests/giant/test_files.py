@@ -10,9 +10,8 @@ from small_project import FRAMES, GROUND, IMAGES, ground_record, replaced
 
 from photogram import InputError
 from photogram.giant import Common
-from photogram.giant.cameras import camera_records, parse_cameras
 from photogram.giant.common import common_records, parse_common
-from photogram.giant.frames import frame_records, parse_frames
+from photogram.giant.frames import camera_records, frame_records, parse_cameras, parse_frames
 from photogram.giant.ground import ground_records, parse_ground
 from photogram.giant.images import image_records, parse_images
 from photogram.giant.records import Source
@@ -136,9 +135,9 @@ def test_every_column_of_the_job_record():
 @pytest.mark.parametrize(
     ("job", "why"),
     [
-        ("2", "column 1: 2"),
+        ("2", "column 1: .* got 2"),
         ("x", r"columns 1-1 \(whole number\)"),
-        ("000000000003", "column 12: 3"),
+        ("000000000003", "column 12: .* got 3"),
         ("00000000000000 00-1", "columns 18-19"),
         (f"{'':50}{'1.0':>10}{'2.0':>10}", "semi-minor"),
         (f"{'':30}{'NaN':>10}", r"columns 31-40 \(F10.3\): must be a number, got '       NaN'"),
@@ -152,7 +151,7 @@ def test_bad_job_records(job, why):
 
 @pytest.mark.giant("2.2", "record 3 is optional")
 def test_section_2_2_common_is_too_short_or_too_long():
-    with pytest.raises(InputError, match="two records are needed"):
+    with pytest.raises(InputError, check=lambda error: error.code == "giant.two-records"):
         parse_common(source("T"))
     long = source("T", "", "", "MORE")
     parse_common(long)
@@ -202,7 +201,7 @@ def test_section_14_two_spellings_of_one_name_are_refused(strip):
     ("records", "why"),
     [
         (["A         -152740", "A         -153000"], "already defined in record 1"),
-        (["A         -152740", "B"], "no principal distance"),
+        (["A         -152740", "B"], "requires a principal distance"),
         (["A         -152740", "B         -15O740"], r"columns 11-20 \(F10.3\)"),
     ],
 )
@@ -237,7 +236,7 @@ def test_section_2_5_frames_keep_their_order_and_round_trip():
         (replaced(FRAMES, 2, FRAMES[3]), 2, "second record .* of the frame 'A'"),
         (FRAMES[:3], 3, "second record .* of the frame 'B'"),
         ([*FRAMES, *FRAMES[:2]], 5, "'A' is already listed in record 1"),
-        (["", FRAMES[0].replace("A", " ")], 2, "no name"),
+        (["", FRAMES[0].replace("A", " ")], 2, "requires a name"),
         (replaced(FRAMES, 1, FRAMES[0].replace("100.000", "1OO.000")), 1, r"columns 9-20 \(F12.3\)"),
         (
             replaced(FRAMES, 2, FRAMES[1].replace("900000", "906100")),
@@ -258,7 +257,7 @@ def test_bad_frames(records, number, why):
 
 
 def test_latitudes_end_at_the_poles():
-    with pytest.raises(InputError, match="latitude is beyond 90 degrees"):
+    with pytest.raises(InputError, check=lambda error: error.code == "giant.latitude"):
         parse_frames(source(f"{'A':20}{'900000.001':>12}", "A"), geographic=True)
     (frame,) = parse_frames(source(f"{'A':20}{'-900000.000':>12}", "A"), geographic=True)
     assert frame.position[1] == pytest.approx(-math.pi / 2)
@@ -329,13 +328,13 @@ def test_section_2_1_unreadable_coordinates_name_file_record_and_text(field):
 @pytest.mark.parametrize(
     ("records", "number", "why"),
     [
-        (IMAGES[:-1], 9, r"the frame 'B' \(record 6\) has no terminator"),
-        (IMAGES[:6], 6, r"the frame 'B' \(record 6\) has no terminator"),
-        ([*IMAGES[:4], *IMAGES[5:]], 5, r"a point without coordinates; .* terminator"),
+        (IMAGES[:-1], 9, r"the frame 'B' \(record 6\) requires a terminator"),
+        (IMAGES[:6], 6, r"the frame 'B' \(record 6\) requires a terminator"),
+        ([*IMAGES[:4], *IMAGES[5:]], 5, r"lacks coordinates; .* terminator"),
         ([*IMAGES[:4], f"{'B':20}{'0.0060':>10}{'0.0080':>10}", *IMAGES[6:]], 5, "terminator"),
-        (["****", *IMAGES], 1, "without the header"),
-        (replaced(IMAGES, 2, IMAGES[1].replace("1 ", "  ", 1)), 2, "the point has no name"),
-        (replaced(IMAGES, 6, IMAGES[5].replace("B", " ", 1)), 6, "the frame has no name"),
+        (["****", *IMAGES], 1, "requires the header"),
+        (replaced(IMAGES, 2, IMAGES[1].replace("1 ", "  ", 1)), 2, "the point requires a name"),
+        (replaced(IMAGES, 6, IMAGES[5].replace("B", " ", 1)), 6, "the frame requires a name"),
         (replaced(IMAGES, 6, IMAGES[5].replace("0.0060", "-.0060")), 6, "negative"),
     ],
 )
@@ -363,22 +362,22 @@ def test_section_6_of_duplicate_control_the_first_is_kept():
     assert points[0].position == (110, 210, 10)
     (message,) = file.messages
     assert (message.file, message.record, message.record_text) == (Path("FILE"), 4, file.lines[3])
-    assert "duplicate control point 1: record 1 is kept" in str(message)
+    assert message.code == "giant.control-repeated"
 
 
 def test_a_blank_component_that_is_held_is_remarked_on():
     file = source(ground_record("1", "", "2.", "3."))
     (point,) = parse_ground(file, geographic=False)
     assert point.position == (0, 2, 3)
-    assert "held at zero" in str(file.messages[0])
+    assert file.messages[0].code == "giant.blank-component"
 
 
 @pytest.mark.parametrize(
     ("record", "why"),
     [
-        (ground_record("1", "1.", "2.", "3.", code="8"), "type code 8 is not one of 0 to 7"),
+        (ground_record("1", "1.", "2.", "3.", code="8"), "column 80: must be 0 to 7, got 8"),
         (ground_record("1", "1.", "2.", "3.", code="x"), "columns 80-80"),
-        (ground_record("", "1.", "2.", "3."), "no name"),
+        (ground_record("", "1.", "2.", "3."), "requires a name"),
         (ground_record("1", "1.", "2.", "nan"), r"columns 33-44 \(F12.3\)"),
         (ground_record("1", "1.", "2.", "3.", "", "-1."), "columns 55-64: .* negative"),
     ],

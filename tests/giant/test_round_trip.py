@@ -184,7 +184,7 @@ def close(one, other, geographic):
 @pytest.mark.parametrize("strip", ["AB", "\t", "\n"])
 def test_only_one_printable_character_is_stripped(tmp_path, strip):
     project = Project(Common(strip=strip), [], [], [], [])
-    with pytest.raises(InputError, match="COMMON cannot be written: the character stripped from names"):
+    with pytest.raises(InputError, match="COMMON cannot be written: the character that COMMON strips"):
         write_project(project, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
@@ -193,7 +193,7 @@ def test_only_one_printable_character_is_stripped(tmp_path, strip):
 def test_names_that_would_be_stripped_are_refused(tmp_path, item):
     cameras, points = ([item], []) if isinstance(item, Camera) else ([], [item])
     project = Project(Common(strip="0"), cameras, [], [], points)
-    with pytest.raises(InputError, match=f"'{item.name}' cannot be written: COMMON strips '0'"):
+    with pytest.raises(InputError, check=lambda error: error.code == "giant.stripped-name"):
         write_project(project, tmp_path / "new")
     item.name = "0"  # a name of nothing else keeps one
     write_project(project, tmp_path / "new")

@@ -34,7 +34,8 @@ def test_a_blunder_on_a_plate_of_eight_points_is_named(eight):
     assert result.outliers[0] == (2, 1)
     assert abs(result.studentized[2, 1]) > 50
     (message,) = result.messages
-    assert "data set 1: readings beyond the limit 4.00" in str(message)
+    assert message.code == "projector.outliers"
+    assert (message.phrase.fields["set"], round(message.phrase.fields["limit"], 2)) == (1, 4.0)
     assert "point 3 Y (t " in str(message)
     last = summary(set_document(result), "parameters")[-1]
     assert f" {len(result.outliers)} (studentized residuals beyond 4.00: " in last

@@ -332,11 +332,11 @@ def test_without_the_extra_there_is_a_remark_and_an_error_only_where_it_was_aske
     html._environment.cache_clear()
     done = run("giant", "--example")
     assert done.exit_code == 0
-    assert "no report.html: pip install 'photogram[report]'" in done.stderr
+    assert "report.html is not written; run pip install 'photogram[report]'" in done.stderr
     assert "report.html" not in done.stdout
     asked = run("giant", "--example", "--html", "report.html", "--out", "o")
     assert asked.exit_code == 1
-    assert "jinja2 is needed: pip install 'photogram[report]'" in asked.stderr
+    assert "jinja2 is required; run pip install 'photogram[report]'" in asked.stderr
     assert not (tmp_path / "o").exists()
 
 

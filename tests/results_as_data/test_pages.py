@@ -56,7 +56,7 @@ def test_a_folder_that_is_the_input_is_refused(run):
     shutil.copytree(EXAMPLE, "quarry")
     done = run("adjust", "quarry", "--parquet", "quarry/images.csv")
     assert done.exit_code == 1
-    assert "is not a directory" in done.output
+    assert "must be a folder" in done.output
     for place in ("quarry", "./quarry/"):
         done = run("adjust", "quarry", "--parquet", place)
         assert done.exit_code == 1
@@ -100,4 +100,4 @@ def test_results_of_collections_are_no_projects(run):
     assert run("collection", "--example", "--parquet", "data", "--quiet").exit_code == 0
     done = run("info", "data")
     assert done.exit_code == 1
-    assert "holds the result of a collection" in " ".join(done.output.split())
+    assert "the folder contains the result of a collection" in " ".join(done.output.split())

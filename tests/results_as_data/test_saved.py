@@ -29,6 +29,7 @@ from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
 from photogram.results.cameras import AdjustedCamera
+from refusals import refused
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -275,10 +276,10 @@ def test_damaged_folders_are_refused_with_the_file(folder):
     images = folder / "images.parquet"
     whole = images.read_bytes()
     images.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"images\.parquet: is not the file that was written with summary"):
+    with pytest.raises(InputError, match=r"images\.parquet: the checksum differs from summary"):
         read_result(folder)
     resealed(folder)
-    with pytest.raises(InputError, match=r"images\.parquet: cannot be read as Parquet"):
+    with pytest.raises(InputError, match=r"images\.parquet: the file must be valid Parquet"):
         read_result(folder)
     table = parquet.read_table(folder / "points.parquet")
     images.write_bytes(whole)
@@ -317,7 +318,7 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
     (folder / f"{table}.parquet").write_bytes((other / f"{table}.parquet").read_bytes())
     same = summary["tables"][table] == others["tables"][table]
     if not same:
-        with pytest.raises(InputError, match=rf"{table}\.parquet: is not the file that was written with"):
+        with pytest.raises(InputError, match=rf"{table}\.parquet: the checksum differs from"):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
@@ -362,7 +363,7 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
     }[values]
     parquet.write_table(found.set_column(found.schema.get_field_index(column), column, new), path)
     resealed(folder)
-    with pytest.raises(InputError, match=rf"{table}\.parquet: the column {column} does not hold"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the column {column} must contain"):
         read_result(folder)
 
 
@@ -385,13 +386,16 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
             lambda document: document["kept"]["block"].update(point_ids="x"),
             "point_ids is 'x', not a sequence",
         ),
-        (lambda document: document["kept"]["block"].update(other=1), "does not hold together: .*'other'"),
-        (lambda document: document["kept"]["block"].pop("spheroid"), "does not hold together: 'spheroid'"),
+        (lambda document: document["kept"]["block"].update(other=1), "results.contradiction .*'other'"),
+        (
+            lambda document: document["kept"]["block"].pop("spheroid"),
+            "results.contradiction reason='spheroid'",
+        ),
     ],
 )
 def test_damaged_summaries_are_refused(folder, change, message):
     resealed(folder, change)
-    with pytest.raises(InputError, match=rf"summary\.json: .*{message}"):
+    with refused("summary.json", message):
         read_result(folder)
 
 

@@ -110,9 +110,9 @@ def test_outliers_as_mrcal_marks_them(left):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--board", "9x6"], "needs --spacing"),
-        (["--board", "9by6", "--spacing", "25"], "is two numbers"),
-        (["--spacing", "25"], "goes with --board"),
+        (["--board", "9x6"], "requires --spacing"),
+        (["--board", "9by6", "--spacing", "25"], "must be two numbers"),
+        (["--spacing", "25"], "requires --board"),
         (["--sd", "control=1"], "images=S"),
         (["--snoop", "--loss", "huber"], "cannot be combined with --loss"),
         (["--model", "pinhole9"], "pinhole"),

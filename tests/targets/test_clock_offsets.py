@@ -234,9 +234,9 @@ def test_it_is_an_option_of_the_command(folder, tmp_path):
     assert float(clock[-6]) == 1e-6
     assert "54 points held where given, which nothing tests" in " ".join(report.split())
     for words, said in (
-        (["--offset", "b=0"], "--sync offset"),
-        (["--sync", "offset", "--offset", "b=x"], "is CAMERA=S or CAMERA=S,SD"),
-        (["--sync", "offset", "--offset", "b=1,-1"], "is CAMERA=S or CAMERA=S,SD"),
+        (["--offset", "b=0"], "--sync offset makes them unknowns"),
+        (["--sync", "offset", "--offset", "b=x"], "must be CAMERA=S or CAMERA=S,SD"),
+        (["--sync", "offset", "--offset", "b=1,-1"], "must be CAMERA=S or CAMERA=S,SD"),
     ):
         assert said in " ".join(run(*words).output.split()), words
 

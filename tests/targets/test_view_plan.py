@@ -154,9 +154,9 @@ def test_it_is_an_option_of_the_command(tmp_path):
     assert {"report.html", "report.txt", "views.csv", "map-camera-infinity.npz"} <= names
     for words, said in (
         (["corners", "--plan", 5], "give PATH, or --example, or --plan"),
-        (["--plan", 5, *board], "needs --size, and --field or --focal"),
-        (["--plan", 5, "--size", "800x600", "--field", 60], "needs --board"),
-        (["--plan", 5, *board, "--field", 60, "--snoop"], "goes without --plan"),
+        (["--plan", 5, *board], "requires --size, and --field or --focal"),
+        (["--plan", 5, "--size", "800x600", "--field", 60], "requires --board"),
+        (["--plan", 5, *board, "--field", 60, "--snoop"], "cannot be combined with --plan"),
         (["--example", "--field", 60], "go with --plan"),
     ):
         assert said in " ".join(run(*words).output.replace("│", " ").split()), words

@@ -22,6 +22,7 @@ from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
 from photogram.statistics.limits import externally_studentized, global_test
+from photogram.words import phrase
 
 __all__ = ["Method", "Start", "UnitVariance", "orient"]
 
@@ -35,11 +36,6 @@ TRIAL_ITERATIONS = 15
 """Control that fits needs four or five; one that needs more explains nothing."""
 WEAK = 1e3
 """Condition number from which control is called weak."""
-WEAKNESS = {
-    "coincident": "the stations with horizontal coordinates almost coincide in plan",
-    "elevations in line": "the stations with elevations are almost in a straight line in plan",
-    "stations in line": "the stations are almost in a straight line",
-}
 SUSPICIOUS = 1e-4
 """Root mean square residual, in sizes of the model, from which a cause is looked for; a good one is a few
 parts in a hundred thousand."""
@@ -125,7 +121,7 @@ def orient(
     rejected = tuple(names_of("reject", reject))
     _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance, trace)
     if scale is not None and not 0 < number("scale", scale) < math.inf:
-        raise InputError(f"a scale that is held is positive, not {scale!r}")
+        raise InputError(phrase("orientation.positive", name="scale", value=scale))
     used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
     rows = np.flatnonzero(used.any(axis=1))
     control = np.where(used, stations.control, np.nan)[rows]
@@ -152,9 +148,7 @@ def orient(
     except _photocore.SimilarityError as error:
         raise _named(stations, used, rows, scale is not None, *error.args) from None
     if not np.isfinite(solution.sum_of_squares):
-        raise AdjustmentError(
-            "the weighted sum of squares is beyond double precision: standard deviations are too small"
-        )
+        raise AdjustmentError(phrase("orientation.overflow"))
     result = _orientation(stations, used, rejected, method, unit_variance, rows, solution, scale is not None)
 
     def fit(changed: Floats) -> Fit | None:
@@ -176,12 +170,7 @@ def _doubts(
     solution: _photocore.SimilaritySolution,
     fit: Callable[[Floats], Fit | None],
 ) -> tuple[list[Message], list[Message]]:
-    """Look for what may be wrong where the model fits badly, and what a good fit leaves open.
-
-    Returns
-    -------
-    Remarks, those of the result among them, and why it is not to be used.
-    """
+    """Look for what may be wrong where the model fits badly, and what a good fit leaves open."""
     model = result.stations.model[rows]
     size = math.sqrt(float(((model - model.mean(axis=0)) ** 2).sum() / len(rows)))
     # What rounding leaves of a perfect fit, in the unit of the sum of squares.
@@ -199,15 +188,10 @@ def _doubts(
             degrees_of_freedom=result.degrees_of_freedom,
             orient=fit,
         )
-        grave = [Message(hint.text) for hint in hints if hint.accepted]
-        messages[:0] = [Message(hint.text) for hint in hints if not hint.accepted]
+        grave = [Message(hint.message) for hint in hints if hint.accepted]
+        messages[:0] = [Message(hint.message) for hint in hints if not hint.accepted]
     if not grave and result.rms > NO_FIT * size and (result.test is None or result.test.rejected_high):
-        grave.append(
-            Message(
-                "the model does not fit its control: the residuals are"
-                f" {100 * result.rms / size:.2g} percent of its size"
-            )
-        )
+        grave.append(Message.of("orientation.no-fit", percent=100 * result.rms / size))
     elif not grave and _in_a_plane(model[np.isfinite(control[:, 2])], result.rms, size):
         here = Fit(solution.sum_of_squares, float(result.similarity.rotation[2, 2]))
         if open_question := undecided(control, here, rounding, fit):
@@ -230,7 +214,14 @@ def _parameters(former: Similarity | Orientation | None) -> _photocore.Parameter
         return None
     similarity = former.similarity if isinstance(former, Orientation) else former
     if not isinstance(similarity, Similarity):
-        raise InputError(f"a former result is an Orientation or a Similarity, not {type(former).__name__}")
+        raise InputError(
+            phrase(
+                "orientation.type",
+                name="former",
+                kinds="Orientation or Similarity",
+                value=type(former).__name__,
+            )
+        )
     return similarity.scale, similarity.rotation.tolist(), similarity.translation.tolist()
 
 
@@ -245,23 +236,25 @@ def _check_options(
     trace: bool,
 ) -> None:
     if not isinstance(stations, Stations):
-        raise InputError(f"stations are given as Stations, not as {type(stations).__name__}")
+        raise InputError(
+            phrase("orientation.type", name="stations", kinds="Stations", value=type(stations).__name__)
+        )
     one_of("start", start, get_args(Start))
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     if whole_number("max_iterations", max_iterations) < 1:
-        raise InputError("there must be one iteration at least")
+        raise InputError(phrase("orientation.positive", name="max_iterations", value=max_iterations))
     if not 0 < number("tolerance", tolerance) < math.inf:
-        raise InputError(f"the criterion of convergence must be positive, not {tolerance!r}")
+        raise InputError(phrase("orientation.positive", name="tolerance", value=tolerance))
     truth_value("trace", trace)
     if trace and method == "rigorous":
-        raise InputError("only the report's methods, 'report' and 'fill-in', have cycles to trace")
+        raise InputError(phrase("orientation.trace"))
     unknown = [name for name in rejected if name not in stations.ids]
     if unknown:
-        raise InputError(f"station {unknown[0]} cannot be rejected: it is not there")
+        raise InputError(phrase("orientation.no-station", station=unknown[0]))
     if stations.model_sd is not None and method != "rigorous":
-        raise InputError(f"the {method} method takes no standard deviations")
+        raise InputError(phrase("orientation.method-sd", method=method))
     if stations.model_sd is None and unit_variance == "unity":
-        raise InputError("unit_variance 'unity' needs standard deviations")
+        raise InputError(phrase("orientation.unity"))
 
 
 def _orientation(
@@ -330,24 +323,21 @@ def _messages(
     """Collect remarks that did not stop the orientation, the gravest first."""
     messages = []
     if solution.alternatives:
-        others = "; ".join(
-            "omega {:.3f}, phi {:.3f}, kappa {:.3f}".format(*np.degrees(Similarity.from_core(row).angles))
-            for row in solution.alternatives
-        )
-        reason = "starts there" if solution.started == "report" else "has the least sum of squares"
-        messages.append(
-            Message(f"the control fits another orientation as well ({others} deg); the one given {reason}")
-        )
+        angles = [np.degrees(Similarity.from_core(row).angles).tolist() for row in solution.alternatives]
+        others = [
+            phrase("orientation.angles", omega=omega, phi=phi, kappa=kappa) for omega, phi, kappa in angles
+        ]
+        kind = "report" if solution.started == "report" else "least"
+        messages.append(Message.of(f"orientation.alternatives.{kind}", angles=others))
     if solution.weakness:
         kind, concerned = solution.weakness
-        messages.append(Message(WEAKNESS[kind] + ": " + ", ".join(names[i] for i in concerned)))
+        code = f"orientation.{kind.replace(' ', '-')}"
+        messages.append(Message.of(code, names=[names[i] for i in concerned]))
     elif solution.condition > WEAK:
-        messages.append(
-            Message(f"the control is weak: the condition number of the equations is {solution.condition:.1e}")
-        )
+        messages.append(Message.of("orientation.weak", condition=solution.condition))
     if freedom == 0:
-        scaled = "covariances are unknown" if scale is None else "covariances are scaled by 1"
-        messages.append(Message(f"there are no degrees of freedom: nothing checks the control, and {scaled}"))
+        covariances = "unknown" if scale is None else "unscaled"
+        messages.append(Message.of(f"orientation.no-freedom.{covariances}"))
     return messages
 
 
@@ -363,19 +353,13 @@ def _named(
     """Put names to the stations of a failure of the core."""
     names = [stations.ids[rows[i]] for i in concerned if i < len(rows)]
     if kind == "insufficient":
-        x, y, z = (int(count) for count in used.sum(axis=0))
-        text = (
-            f"insufficient control: {x + y + z} known coordinates ({7 - held} needed), {x + y} of them"
-            " horizontal"
-            f" ({4 - held} needed; {x} X and {y} Y, 1 of each needed), {z} elevations (3 needed)"
-        )
+        counts = dict(zip("xyz", map(int, used.sum(axis=0)), strict=True))
+        text = phrase("orientation.insufficient", **counts, all=7 - held, horizontal=4 - held)
         return RankError(text, [], [stations.ids[row] for row in rows])
     if kind == "undetermined":
         return RankError(f"{message}: {', '.join(names)}" if names else message, [], names)
     if kind == "first stations":
-        return InputError(f"{message} ({', '.join(names)}); the report's initial values need two far apart")
+        return InputError(phrase("orientation.first-stations", message=message, names=names))
     if kind == "scale":
-        return AdjustmentError(
-            "the scale became zero or negative: the model is a mirror image or not that of its control"
-        )
+        return AdjustmentError(phrase("orientation.scale"))
     return AdjustmentError(message)

@@ -19,8 +19,9 @@ from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, quoted
+from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
+from photogram.words import phrase
 
 __all__ = [
     "Deck",
@@ -36,24 +37,12 @@ MISSING = ("", "-")
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """The cards of part I.
+    """The cards of part I."""
 
-    Attributes
-    ----------
-    stations
-        The station records.
-    former
-        The approximate parameters of the first record; None when its words are zeros.
-    identification
-        The last word of the constants.
-    messages
-        Remarks on the records.
-    """
-
-    stations: Stations
-    former: Similarity | None
-    identification: str
-    messages: list[Message] = field(default_factory=list)
+    stations: Stations  # The station records
+    former: Similarity | None  # The approximate parameters of the first record; None when its words are zeros
+    identification: str  # The last word of the constants
+    messages: list[Message] = field(default_factory=list)  # Remarks on the records
 
 
 class _Record(Place):
@@ -63,8 +52,8 @@ class _Record(Place):
         split = text.split(",") if "," in text else text.split()
         words = [word.strip() for word in split]
         if not least <= len(words) <= most:
-            wanted = f"{least}" if least == most else f"{least} or {most}"
-            raise self.error(f"{what}: {len(words)} words, not {wanted}")
+            counts = sorted({least, most})
+            raise self.error(phrase("orientation.words", subject=what, counts=counts, value=len(words)))
         return words
 
     def number_of(self, word: str, what: str) -> float:
@@ -72,13 +61,13 @@ class _Record(Place):
         try:
             return finite_number(word.upper().replace("D", "E"))
         except ValueError:
-            raise self.error(f"{what}: {quoted(word)} is not a number") from None
+            raise self.error(phrase("orientation.number", subject=what, value=word)) from None
 
     def count_of(self, word: str, what: str) -> int:
         try:
             return whole_number(word)
         except ValueError:
-            raise self.error(f"{what}: {quoted(word)} is not a count") from None
+            raise self.error(phrase("orientation.count", subject=what, value=word)) from None
 
 
 def read_cards(
@@ -110,18 +99,15 @@ def read_cards(
     """
     records = _records(path)
     if len(records) < 2:
-        raise InputError("a deck begins with a record of parameters and one of constants", file=path)
+        raise InputError(phrase("orientation.deck"), file=path)
     constants = records[1].words(3, 4, "constants M, N, MN and identification")
     m, n, mn = (records[1].count_of(w, name) for w, name in zip(constants, ("M", "N", "MN"), strict=False))
     if len(records) - 2 != m:
-        raise records[1].error(f"M is {m}, but there are {len(records) - 2} station records")
+        raise records[1].error(phrase("orientation.m", m=m, n=len(records) - 2))
     stations = _stations(path, records[2:], zero_missing, ground_unit, model_unit)
     pairs, elevations = int(stations.given[:, :2].all(axis=1).sum()), int(stations.given[:, 2].sum())
     if (elevations, pairs) != (n, mn):
-        raise records[1].error(
-            f"N is {n} and MN {mn}, but {elevations} elevations and {pairs} horizontal pairs are given"
-            " (a missing coordinate is '-'; --zero-missing takes 0 for one, as the bulletin does)"
-        )
+        raise records[1].error(phrase("orientation.counts", n=n, mn=mn, elevations=elevations, pairs=pairs))
     messages: list[Message] = []
     former = _former(records[0], stations, messages)
     identification = constants[3] if len(constants) > 3 else ""
@@ -147,7 +133,7 @@ def _stations(
         control.append([math.nan if zero_missing and value == 0 else value for value in row])
         model.append([record.number_of(word, f"x{k}") for k, word in enumerate(words[3:6], 1)])
         if words[6] in ids:
-            raise record.error(f"station {words[6]} occurs twice")
+            raise record.error(phrase("orientation.repeated", station=words[6]))
         ids[words[6]] = None
     try:
         return Stations(
@@ -158,20 +144,14 @@ def _stations(
             model_unit=model_unit,
         )
     except InputError as error:
-        raise InputError(error.message, file=path) from None
+        raise InputError(error.phrase or error.message, file=path) from None
 
 
 def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Similarity | None:
-    """Read the record of a restart (TB 19, step 12): eight words, for the stations of the new solution.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds something else; names file, record and text.
-    """
+    """Read the record of a restart (TB 19, step 12): eight words, for the stations of the new solution."""
     records = _records(path)
     if len(records) != 1:
-        raise InputError("a restart is one record of eight words", file=path)
+        raise InputError(phrase("orientation.restart"), file=path)
     return _former(records[0], stations, messages)
 
 
@@ -182,14 +162,13 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
     if not values.any():
         return None
     if np.abs(values[:3]).max() > 1:
-        raise record.error("a sine is beyond 1")
+        raise record.error(phrase("orientation.sine"))
     if values[3] <= 0:
-        raise record.error("s is not positive")
+        raise record.error(phrase("orientation.positive", name="s", value=values[3]))
     angles = np.arcsin(values[:3])
     kappa = _kappa(stations)
     if kappa is None:
-        remark = "the quadrant of kappa is not in its sine; it is taken within 90 degrees"
-        messages.append(record.message(remark))
+        messages.append(record.message(phrase("orientation.kappa")))
     elif math.cos(kappa) < 0:
         angles[2] = math.pi - angles[2]
     return Similarity.from_parameters(values[3], rotation_matrix(angles[np.newaxis])[0], values[4:])
@@ -218,21 +197,15 @@ def transformation_records(similarity: Similarity, identification: str) -> list[
 
 def _record(values: list[float] | Floats, identification: str) -> str:
     if len(identification.replace(",", " ").split()) > 1:
-        raise InputError(f"an identification is one word of a record, not {quoted(identification)}")
+        raise InputError(phrase("orientation.identification", value=identification))
     return " ".join([*(f"{value:.17g}" for value in values), identification or "0"])
 
 
 def read_transformation(path: Path) -> Similarity:
-    """Read the two records of part II, the output of part I. Its covariance is unknown.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds something else; names file, record and text.
-    """
+    """Read the two records of part II, the output of part I. Its covariance is unknown."""
     records = _records(path)
     if len(records) < 2:
-        raise InputError("a transformation has two records", file=path)
+        raise InputError(phrase("orientation.transformation"), file=path)
     first = records[0].words(6, 7, "a11 a12 a13 a21 a22 a23, identification")
     second = records[1].words(7, 8, "a31 a32 a33 s b1 b2 b3, identification")
     values = [
@@ -242,4 +215,4 @@ def read_transformation(path: Path) -> Similarity:
     try:
         return Similarity.from_parameters(values[9], np.reshape(values[:9], (3, 3)), values[10:])
     except InputError as error:
-        raise InputError(error.message, file=path) from None
+        raise InputError(error.phrase or error.message, file=path) from None

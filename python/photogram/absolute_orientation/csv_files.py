@@ -16,6 +16,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.io.rows import Row, Table, cells
+from photogram.words import phrase
 
 __all__ = ["header", "is_csv", "read_csv", "spelling"]
 
@@ -26,13 +27,7 @@ SPELLINGS = {f"{letter}{k + 1}": "xyz"[k] if letter == "x" else "XYZ"[k] for let
 
 
 def is_csv(path: Path) -> bool:
-    """Whether the first line that says anything is the header of a CSV file and not a record of numbers.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or that line is too long to be either.
-    """
+    """Whether the first line that says anything is the header of a CSV file and not a record of numbers."""
     lines = enumerate(read_lines(path), 1)
     first = next(
         (Place(path, n, line) for n, line in lines if line.strip() and not line.startswith("#")), None
@@ -41,13 +36,7 @@ def is_csv(path: Path) -> bool:
 
 
 def header(place: Place) -> list[str]:
-    """Return the names of columns in a record, in the spelling X, Y, Z, x, y, z.
-
-    Raises
-    ------
-    InputError
-        The record is too long to be one, or cannot be split.
-    """
+    """Return the names of columns in a record, in the spelling X, Y, Z, x, y, z."""
     return [spelling(cell) for cell in cells(place)]
 
 
@@ -73,11 +62,16 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
     _check_header(table)
     rows = list(table.rows())
     if not rows:
-        raise InputError("holds no stations", file=path)
-    _check_ids(rows)
+        raise InputError(phrase("orientation.no-stations"), file=path)
+    known: dict[str, Place] = {}
+    for row in rows:
+        if not row.cells["id"]:
+            raise row.place.error(phrase("orientation.no-id"))
+        if known.setdefault(row.cells["id"], row.place) is not row.place:
+            raise row.place.error(phrase("orientation.repeated", station=row.cells["id"]))
     weighted = [name for name in MODEL_SD_COLUMNS if name in table.columns]
     if weighted and len(weighted) < 3:
-        raise InputError(f"has {', '.join(weighted)} only; sd_x, sd_y and sd_z come together", file=path)
+        raise InputError(phrase("orientation.incomplete-sd", names=weighted), file=path)
 
     def numbers(columns: tuple[str, ...], blank: float | None) -> list[list[float]]:
         return [[_number(row, name, blank) for name in columns] for row in rows]
@@ -96,27 +90,14 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
             model_unit=model_unit,
         )
     except InputError as error:
-        raise InputError(error.message, file=path) from None
+        raise InputError(error.phrase or error.message, file=path) from None
 
 
 def _check_header(table: Table) -> None:
     allowed = (*REQUIRED, *OPTIONAL)
     table.require(*REQUIRED)
     if unknown := [name for name in table.columns if name not in allowed]:
-        raise table.head.error(
-            f"the header does not know the column {unknown[0]!r} (columns: {', '.join(allowed)})"
-        )
-
-
-def _check_ids(rows: list[Row]) -> None:
-    known: dict[str, Place] = {}
-    for row in rows:
-        name = row.cells["id"]
-        if not name:
-            raise row.place.error("the id is empty")
-        first = known.setdefault(name, row.place)
-        if first is not row.place:
-            raise row.place.error(f"station {name} occurs in record {first.record} already")
+        raise table.head.error(phrase("orientation.column", column=unknown[0], names=list(allowed)))
 
 
 def _number(row: Row, column: str, blank: float | None) -> float:

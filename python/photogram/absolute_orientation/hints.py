@@ -16,6 +16,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.likelihood import judged
+from photogram.words import Phrase, phrase
 
 FOOT = 0.3048
 STATIONS = 60
@@ -36,10 +37,7 @@ SCALE_DEVIATIONS = 3.0
 ROUNDING = 1e-5
 """And what coordinates of a few digits leave of it."""
 
-UNITS = {
-    FOOT: "in feet where {rest} is in metres",
-    1 / FOOT: "in metres where {rest} is in feet",
-}
+UNITS = {FOOT: "feet", 1 / FOOT: "metres"}
 
 
 @dataclass(frozen=True)
@@ -52,10 +50,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class Hint:
-    """What explains the residuals: a sentence, and whether it can be taken for sure."""
+    """An explanation of the residuals."""
 
-    text: str
-    accepted: bool
+    message: Phrase
+    accepted: bool  # Whether it is significant
 
 
 Orient = Callable[[Floats], Fit | None]
@@ -64,9 +62,9 @@ Orient = Callable[[Floats], Fit | None]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A hypothesis and the sum of squares that it leaves."""
+    """A hypothesis and its sum of squares."""
 
-    text: str
+    text: Phrase
     control: Floats
     sum_of_squares: float
 
@@ -95,9 +93,9 @@ def find(
         if verdict is None:
             break
         best = [tried[place] for place in verdict.best]
-        word = "probably" if verdict.accepted else "possibly"
-        what = "; or ".join(each.text for each in best)
-        text = f"{word} {what}: residuals would be {verdict.fall:.3g} times smaller"
+        kind = "probable" if verdict.accepted else "possible"
+        causes = [trial.text for trial in best]
+        text = phrase(f"orientation.{kind}", causes=causes, factor=float(verdict.fall))
         hints.append(Hint(text, verdict.accepted))
         if not verdict.accepted:
             break
@@ -114,25 +112,21 @@ def trials(names: list[str], control: Floats, placed: Floats, rounding: float, o
     ]
 
 
-def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[tuple[str, Floats]]:
-    yield (
-        "the control is a mirror image of the model (X and Y exchanged, or an axis reversed, in one of them)",
-        control * [1.0, 1.0, -1.0],
-    )
+def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[tuple[Phrase, Floats]]:
+    yield phrase("orientation.mirror"), control * [1.0, 1.0, -1.0]
     for factor, unit in UNITS.items():
-        elevations = unit.format(rest="the plan")
-        yield f"the elevations of the control are {elevations}", control * [1.0, 1.0, factor]
-    rest = UNITS[FOOT].format(rest="the rest")
-    yield f"X of the control is {rest}", control * [FOOT, 1.0, 1.0]
-    yield f"Y of the control is {rest}", control * [1.0, FOOT, 1.0]
+        yield phrase(f"orientation.elevations-in-{unit}"), control * [1.0, 1.0, factor]
+    yield phrase("orientation.axis-in-feet", axis="X"), control * [FOOT, 1.0, 1.0]
+    yield phrase("orientation.axis-in-feet", axis="Y"), control * [1.0, FOOT, 1.0]
     suspects = _suspects(control, control - placed)
     for row in suspects:
-        changes: list[tuple[str, Floats]] = []
+        changes: list[tuple[Phrase, Floats]] = []
         if np.isfinite(control[row, :2]).all():
-            changes.append((f"X and Y of station {names[row]} are exchanged", control[row, [1, 0, 2]]))
+            exchanged = phrase("orientation.axes-exchanged", station=names[row])
+            changes.append((exchanged, control[row, [1, 0, 2]]))
         for factor, unit in UNITS.items():
-            rest = unit.format(rest="the rest")
-            changes.append((f"the coordinates of station {names[row]} are {rest}", control[row] * factor))
+            in_unit = phrase(f"orientation.station-in-{unit}", station=names[row])
+            changes.append((in_unit, control[row] * factor))
         for text, changed in changes:
             whole = control.copy()
             whole[row] = changed
@@ -140,7 +134,7 @@ def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[t
     for one, other in _pairs(control, placed, suspects):
         whole = control.copy()
         whole[[one, other]] = control[[other, one]]
-        yield f"the coordinates of stations {names[one]} and {names[other]} are exchanged", whole
+        yield phrase("orientation.stations-exchanged", first=names[one], second=names[other]), whole
 
 
 def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[int, int]]:
@@ -172,41 +166,23 @@ def _suspects(control: Floats, residuals: Floats) -> list[int]:
     return sorted({row for rows in worst for row in rows})
 
 
-def unit_of(scale: float, sd: float) -> str | None:
-    """Return a remark where a scale is that of feet and metres: nothing else in the data can tell these.
-
-    Parameters
-    ----------
-    scale, sd
-        Of the similarity x = s A X + B, model units per ground unit, and its standard deviation; NaN where
-        it is not known.
-    """
-    for factor, units in (
-        (FOOT, "in feet, the model in metres"),
-        (1 / FOOT, "in metres, the model in feet"),
-    ):
+def unit_of(scale: float, sd: float) -> Phrase | None:
+    """Return a remark if a scale with its standard deviation (or NaN) is the ratio of feet and metres."""
+    for factor, unit in UNITS.items():
         near = abs(math.log(scale / factor))
         if near <= SAME_SCALE and not near > max(SCALE_DEVIATIONS * sd / scale, ROUNDING):
-            return (
-                f"the scale is {scale:.6f}, as of control {units}: where both should be in one unit, one of"
-                " them is not"
-            )
+            return phrase(f"orientation.scale-in-{unit}", scale=scale)
     return None
 
 
-def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str | None:
-    """Say so where a mirror image of the model fits as well: control in a plane cannot tell it.
+def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> Phrase | None:
+    """Return a remark if a mirror image of the model fits as well, because control is in a plane.
 
-    `control` (n, 3) is NaN where it takes no part; a sum of squares up to `rounding` is no more than that.
+    `control` (n, 3) is NaN if it is not used; a sum of squares up to `rounding` is rounding only.
     """
     mirrored = orient(control * [1.0, 1.0, -1.0])
     if mirrored is None or mirrored.sum_of_squares > AS_WELL * fit.sum_of_squares + rounding:
         return None
-    text = (
-        "whether the model is a mirror image of its control cannot be decided: the elevations are those of"
-        " points in one plane, as far as the residuals tell"
-    )
     # Mirrored, the third axis points the other way.
-    if fit.upright < 0 < -mirrored.upright:
-        text += "; as it is the model lies upside down, mirrored it would lie upright"
-    return text
+    is_upside_down = fit.upright < 0 < -mirrored.upright
+    return phrase("orientation.plane.upside-down" if is_upside_down else "orientation.plane")

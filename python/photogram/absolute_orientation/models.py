@@ -22,6 +22,7 @@ from photogram.network.block import Block, refuse_trajectories
 from photogram.network.datum import MinimumConstraints
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
+from photogram.words import phrase
 
 LEAST = 5
 """Points that determine the relative orientation of two photos."""
@@ -95,17 +96,17 @@ def relative_model(block: Block, first: str, second: str) -> Model:
     """
     missing = [name for name in (first, second) if name not in block.photo_ids]
     if missing or first == second:
-        raise InputError(f"a model has two photos of the block: {missing[0] if missing else first}")
+        raise InputError(phrase("orientation.model-photos", photo=missing[0] if missing else first))
     if block.geographic:
-        raise InputError("a model is cartesian: geographic coordinates have no place there")
+        raise InputError(phrase("orientation.geographic"))
     refuse_trajectories(block, "a model of two photos")
     pair = of_photos(block, np.isin(np.array(block.photo_ids, dtype=object), [first, second]))
     twice = np.bincount(pair.image_points, minlength=len(pair.point_ids)) == 2
     if np.count_nonzero(twice) < LEAST:
-        text = (
-            f"photos {first} and {second} have {np.count_nonzero(twice)} common points, not {LEAST} or more"
+        counts = {"n": int(np.count_nonzero(twice)), "least": LEAST}
+        raise RankError(
+            phrase("orientation.common-points", first=first, second=second, **counts), [first, second], []
         )
-        raise RankError(text, [first, second], [])
     rows = np.flatnonzero(twice)
     number = np.cumsum(twice) - 1
     pair = kept_images(pair, twice[pair.image_points])
@@ -154,7 +155,7 @@ def strip_of(block: Block, photos: Sequence[str]) -> Strip:
         Models that have too few places in common, or all of them on a line.
     """
     if len(photos) < 2:
-        raise InputError("a strip has two photos at least")
+        raise InputError(phrase("orientation.strip"))
     models = [relative_model(block, *pair) for pair in pairwise(photos)]
     places = dict(zip(models[0].ids, models[0].positions, strict=True))
     counts = dict.fromkeys(places, 1)
@@ -167,7 +168,7 @@ def strip_of(block: Block, photos: Sequence[str]) -> Strip:
             found = orient(Stations(common, ground, model.positions[rows].reshape(-1, 3)))
         except RankError as error:
             raise RankError(
-                f"the model after photo {name} cannot be joined: {error}", [name], common
+                phrase("orientation.join", photo=name, error=error.phrase or str(error)), [name], common
             ) from None
         carried = found.similarity.transform(model.positions)[0]
         rms.append(found.rms / found.similarity.scale)

@@ -33,27 +33,16 @@ class Trace:
     """What one cycle of the bulletin computed on its way: its prints under sense switches.
 
     Coordinates are counted from the centres of both systems.
-
-    Attributes
-    ----------
-    rotation
-        (3, 3) A as the cycle began, after statement 8.
-    equations
-        The m equations, after 27: station (among those that took part) and component of each, and (m, 8)
-        P-values: omega, phi, kappa, s, three translations, constant.
-    normal, auxiliary
-        (7, 8) C after 29 and D after 33.
-    results
-        Seven results of the back solution, after 35.
-    parameters
-        Seven corrected parameters, after 36: omega, phi, kappa in radians, s, b1, b2, b3.
     """
 
-    rotation: list[list[float]]
+    rotation: list[list[float]]  # (3, 3) A as the cycle began, after statement 8
+    # The m equations, after 27: station (among those that took part) and component of each, and (m, 8)
+    # P-values: omega, phi, kappa, s, three translations, constant
     equations: tuple[list[tuple[int, int]], Floats]
-    normal: Floats
+    normal: Floats  # (7, 8) C after 29 and D after 33
     auxiliary: Floats
-    results: list[float]
+    results: list[float]  # Seven results of the back solution, after 35
+    # Seven corrected parameters, after 36: omega, phi, kappa in radians, s, b1, b2, b3
     parameters: list[float]
 
 
@@ -294,7 +283,7 @@ class Orientation(Documented, Judged, Brief):
         return to_json(self)
 
     def _findings(self) -> Findings:
-        from photogram.absolute_orientation.findings import orientation_findings
+        from photogram.absolute_orientation.document import orientation_findings
 
         return orientation_findings(self)
 

@@ -24,17 +24,7 @@ def control_plot(
     used: NDArray[np.bool_],
     rms: float,
 ) -> Plot:
-    """Plot residuals of control, given minus transformed: arrows in plan, bars for elevations.
-
-    Parameters
-    ----------
-    stations, rows
-        Stations, and the k rows of the control among them.
-    plan, residuals
-        (k, 2) ground coordinates of the control, and (k, 3) residuals in ground units.
-    used, rms
-        (k, 3) coordinates that took part, and the root mean square of the residuals.
-    """
+    """Plot residuals of control, given minus transformed: arrows in plan, bars for elevations."""
     unit = stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
     largest = float(np.nanmax(np.abs(residuals)))

@@ -18,6 +18,7 @@ from photogram.io import json
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import rotation_angles
+from photogram.words import phrase
 
 __all__ = ["Similarity", "read_similarity"]
 
@@ -113,9 +114,9 @@ class Similarity:
         if not (
             np.abs(a).max() < 2 and np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0
         ):
-            raise InputError("the nine direction cosines do not make a rotation")
+            raise InputError(phrase("orientation.rotation"))
         if not (0 < scale < math.inf and 0 < deviation_factor < math.inf):
-            raise InputError("a similarity needs a positive scale and a positive factor of deviations")
+            raise InputError(phrase("orientation.scales"))
         centre, model = (
             shaped(name, value, (3,))
             for name, value in (("control_centre", control_centre), ("model_centre", model_centre))
@@ -123,7 +124,7 @@ class Similarity:
         with np.errstate(over="ignore", invalid="ignore"):
             shift = b + scale * a @ centre - model
         if not np.isfinite(shift).all():
-            raise InputError("a similarity needs a finite translation and finite centres")
+            raise InputError(phrase("orientation.finite"))
         made = cls(scale, a, centre, model, shift, None, deviation_factor)
         return made if covariance is None else made._with_covariance(covariance)
 
@@ -133,7 +134,7 @@ class Similarity:
             back = np.linalg.inv(self.parameter_partials)
             tangent: Floats = back @ given @ back.T
         if not (is_covariance(given, singular=True) and np.isfinite(tangent).all()):
-            raise InputError("the covariance of the similarity is none")
+            raise InputError(phrase("orientation.covariance"))
         return replace(self, tangent_covariance=tangent)
 
     @property
@@ -196,7 +197,7 @@ class Similarity:
         try:
             sd = np.broadcast_to(numbers("model_sd", model_sd), points.shape) * self.deviation_factor
         except ValueError:
-            raise InputError(f"model_sd does not broadcast to the shape of model, {points.shape}") from None
+            raise InputError(phrase("orientation.broadcast", shape=str(points.shape))) from None
         covariance = self.tangent_covariance
         known = np.full((7, 7), np.nan) if covariance is None else covariance
         return _photocore.transform_points(self._row(), known, points, sd)
@@ -215,7 +216,7 @@ def _rows(name: str, values: ArrayLike) -> Floats:
     """Return an array (n, 3)."""
     array = numbers(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{name} has the shape {array.shape}, not (n, 3)")
+        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows="n"))
     return array
 
 
@@ -234,11 +235,9 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     """
     with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))
-        if usable and not found["usable"]:
-            reasons = "; ".join(map(str, found["messages"])) or found["status"]
-            raise InputError(f"holds an orientation that is not to be used: {reasons}")
-        centres = found["centres"]
-        return Similarity.from_parameters(
+        is_refused, centres = usable and not found["usable"], found["centres"]
+        reasons = ([*map(str, found["messages"])] or [found["status"]]) if is_refused else []
+        similarity = Similarity.from_parameters(
             found["scale"],
             found["rotation"],
             found["translation"],
@@ -247,6 +246,9 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
             model_centre=centres["model"],
             deviation_factor=found["deviation_factor"],
         )
+    if is_refused:
+        raise InputError(phrase("orientation.unusable", reasons=reasons), file=path)
+    return similarity
 
 
 def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:

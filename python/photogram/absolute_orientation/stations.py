@@ -14,6 +14,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +116,7 @@ class Stations(Brief):
         """
         missing = [name for name in ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS) if name not in table]
         if missing:
-            raise InputError(f"the table has no column {', '.join(missing)}")
+            raise InputError(phrase("orientation.missing-columns", names=missing))
         control_sd = [
             table[name].fillna(0.0) if name in table else 0.0 * table["x"] for name in CONTROL_SD_COLUMNS
         ]
@@ -142,36 +143,30 @@ class Stations(Brief):
     def _check(self) -> None:
         repeated = [name for name, count in Counter(self.ids).items() if count > 1]
         if repeated:
-            raise InputError(f"station {repeated[0]} occurs more than once")
-        self._refuse(~np.isfinite(self.model), "has a model coordinate that is not a finite number")
-        self._refuse(np.isinf(self.control), "has a control coordinate that is not a finite number")
+            raise InputError(phrase("orientation.repeated", station=repeated[0]))
+        self._refuse(~np.isfinite(self.model), "model-coordinate")
+        self._refuse(np.isinf(self.control), "control-coordinate")
         sd = np.where(self.given, self.control_sd, 0.0)
-        self._refuse(~(sd >= 0), "has a standard deviation of control that is not zero or positive")
+        self._refuse(~(sd >= 0), "control-sd")
         if self.model_sd is not None:
             positive = (self.model_sd >= 0) & np.isfinite(self.model_sd)
-            self._refuse(
-                ~positive, "has a standard deviation of the model that is not finite, zero or positive"
-            )
+            self._refuse(~positive, "model-sd")
             exact = self.held & (sd == 0) & (self.model_sd == 0).all(axis=1, keepdims=True)
-            self._refuse(exact, "has a coordinate whose standard deviation is zero in both systems")
+            self._refuse(exact, "exact")
         elif (sd[self.held] > 0).any():
-            raise InputError(
-                "the control has standard deviations but the model has none:"
-                " without them errors cannot be shared out"
-            )
+            raise InputError(phrase("orientation.no-model-sd"))
 
-    def _refuse(self, faulty: Bools, text: str) -> None:
+    def _refuse(self, faulty: Bools, code: str) -> None:
         if faulty.any():
-            raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
+            station = self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]
+            raise InputError(phrase(f"orientation.{code}", station=station))
 
 
 def _table(name: str, values: ArrayLike, count: int) -> Floats:
     array = numbers(name, values, missing=name == "control")
     if array.ndim == 2 and array.shape != (count, 3):
-        raise InputError(f"{name} has the shape {array.shape}, not ({count}, 3)")
+        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows=count))
     try:
         return frozen(np.broadcast_to(array, (count, 3)))
     except ValueError:
-        raise InputError(
-            f"{name} has the shape {array.shape}, which does not broadcast to ({count}, 3)"
-        ) from None
+        raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows=count)) from None

@@ -23,7 +23,7 @@ from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD, cells
 from photogram.io.writing import OutputSet
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import quoted
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,21 +38,11 @@ OUTPUT = b"id,X,Y,Z,sd_X,sd_Y,sd_Z\n"
 
 @dataclass(frozen=True)
 class Document:
-    """A JSON document that the points are written into as well.
+    """A JSON document that the points are written into as well."""
 
-    Attributes
-    ----------
-    path
-        Where it goes.
-    head
-        Everything up to its first point.
-    first
-        Points that come before those of the file.
-    """
-
-    path: Path
-    head: bytes
-    first: bytes = b""
+    path: Path  # Where it goes
+    head: bytes  # Everything up to its first point
+    first: bytes = b""  # Points that come before those of the file
 
 
 def transform_file(
@@ -103,7 +93,7 @@ def transform_file(
         A file cannot be written.
     """
     if not 0 <= point_sd < np.inf:
-        raise InputError(f"point_sd is not a standard deviation: {point_sd}")
+        raise InputError(phrase("orientation.point-sd", value=point_sd))
     source, target = Path(source), Path(target)
     done = 0
     with OutputSet([source]) if outputs is None else nullcontext(outputs) as files:
@@ -115,7 +105,9 @@ def transform_file(
         separator = b"," if document and document.first else b""
         for ids, points, sd in _chunks(source):
             positions, covariances = similarity.transform(points, point_sd if sd is None else sd)
-            _check_finite(ids, positions, source)
+            beyond = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+            if beyond.size:
+                raise InputError(phrase("orientation.transformed", point=ids[beyond[0]]), file=source)
             out.write(_lines(ids, positions, covariances, decimals))
             if json:
                 json.write(separator + point_rows(ids, positions, covariances))
@@ -124,16 +116,10 @@ def transform_file(
             if progress:
                 progress(done)
         if not done:
-            raise InputError("holds no points", file=source)
+            raise InputError(phrase("orientation.empty"), file=source)
         if json:
             json.write(b"\n  ]\n}\n")
     return done
-
-
-def _check_finite(ids: list[str], positions: Floats, source: Path) -> None:
-    beyond = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if beyond.size:
-        raise InputError(f"point {ids[beyond[0]]} is beyond double precision once transformed", file=source)
 
 
 def decimals_for(deviation: float) -> int:
@@ -190,7 +176,9 @@ def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
     except (ValueError, UnicodeDecodeError, pd.errors.ParserError) as error:
         if isinstance(error, InputError):
             raise
-        raise _fault(source, names) or InputError(str(error), file=source) from None
+        raise _fault(source, names) or InputError(
+            phrase("orientation.not-read", error=str(error)), file=source
+        ) from None
 
 
 def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
@@ -203,15 +191,15 @@ def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
     names = header(place)
     if "x" not in names:
         if not first:
-            raise InputError("holds no points", file=source)
+            raise InputError(phrase("orientation.empty"), file=source)
         separator = "," if "," in first else r"\s+"
         return [*MODEL_COLUMNS, "id"], {"names": [*MODEL_COLUMNS, "id"], "header": None, "sep": separator}
     if repeated := [name for name, count in Counter(names).items() if count > 1]:
-        raise place.error(f"the column {quoted(repeated[0])} is there twice")
+        raise place.error(phrase("orientation.column-repeated", column=repeated[0]))
     wanted = {"id", *MODEL_COLUMNS, *(MODEL_SD_COLUMNS if set(names) & set(MODEL_SD_COLUMNS) else ())}
     missing = sorted(wanted - set(names))
     if missing:
-        raise place.error(f"the header lacks the column {missing[0]!r}")
+        raise place.error(phrase("orientation.missing-columns", names=missing[:1]))
     return names, {"names": names, "header": 0}
 
 
@@ -222,11 +210,11 @@ def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Fl
     sd = table[list(MODEL_SD_COLUMNS)].to_numpy() if weighted else None
     # pandas takes the first column for an index where rows have one field more than the header.
     if not isinstance(table.index, pd.RangeIndex):
-        raise ValueError("a record has more fields than the header")
+        raise ValueError(phrase("orientation.too-many-fields"))
     if any("\n" in name or "\r" in name for name in table["id"]):
-        raise ValueError("an id holds the end of a line")
+        raise ValueError(phrase("orientation.line-in-id"))
     if not np.isfinite(points).all() or (sd is not None and not (sd >= 0).all()):
-        raise ValueError("a coordinate is not a finite number, or a standard deviation is negative")
+        raise ValueError(phrase("orientation.values"))
     return table["id"].tolist(), points, sd
 
 
@@ -248,14 +236,12 @@ def _fault(source: Path, names: list[str]) -> InputError | None:
             except InputError as error:
                 return error
             if len(found) != len(names):
-                return place.error(f"has {len(found)} fields, not {len(names)}")
+                return place.error(phrase("orientation.fields", n=len(names), value=len(found)))
             fields = dict(zip(names, found, strict=True))
             for name in numeric:
                 if not _readable(fields[name], name):
-                    positive = ", zero or positive" if name in MODEL_SD_COLUMNS else ""
-                    return place.error(
-                        f"column {name}: {quoted(fields[name])} is not a finite number{positive}"
-                    )
+                    code = "orientation.cell-sd" if name in MODEL_SD_COLUMNS else "orientation.cell"
+                    return place.error(phrase(code, column=name, value=fields[name]))
     return None
 
 

@@ -81,11 +81,11 @@ class Cleaned(Brief, Documented):
 
     def section(self) -> Section:
         """Return the section on weights: what was done to them, and the components that are left."""
-        from photogram.results.components_document import components_parts, sentences
+        from photogram.results.components_document import components_section
 
-        parts: list[Part] = [Remarks(sentences(self.changes))]
+        parts: list[Part] = [Remarks(self.changes)]
         if self.components is not None:
-            parts += components_parts(self.components)
+            parts += components_section(self.components).parts
         intro = "Weights were estimated from the observations that are left: the adjustment has these."
         return Section("components", "Weights", parts, intro)
 

@@ -16,7 +16,7 @@ from photogram.network.cameras import rays_of_row
 from photogram.network.geometry import Cartesian
 from photogram.network.observations import Attitude, Observation
 from photogram.network.observations.observation import with_unknowns
-from photogram.network.rays import meet
+from photogram.network.rays import meet_rays
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
 from photogram.words import phrase
 
@@ -87,17 +87,9 @@ class _Sites:
             inner[own] = rays_of_row(cameras[row], block.image_xy[images[own]])
         seen = np.isfinite(inner).all(axis=1)
         images, photos = images[seen], photos[seen]
-        rays = np.einsum("mij,mj->mi", known.attitudes[photos], inner[seen])
-        across = np.eye(3) - rays[:, :, np.newaxis] * rays[:, np.newaxis]
-        # Counted from a photo: geocentric coordinates are large.
-        first = known.positions[photos[0]] if len(photos) else np.zeros(3)
-        right = np.einsum("mij,mj->mi", across, known.positions[photos] - first)
-        normal, constant, count = np.zeros((len(rows), 3, 3)), np.zeros((len(rows), 3)), np.zeros(len(rows))
-        place = np.searchsorted(rows, block.image_points[images])
-        np.add.at(normal, place, across)
-        np.add.at(constant, place, right)
-        np.add.at(count, place, 1.0)
-        return meet(normal, constant, count) + first
+        directions = np.einsum("mij,mj->mi", known.attitudes[photos], inner[seen])
+        places = np.searchsorted(rows, block.image_points[images])
+        return meet_rays(places, len(rows), known.positions[photos], directions)
 
     def local(self, middle: Floats) -> Floats:
         """Return (3, 3) the axes X, Y, Z or, in geographic space, east, north, up at a place, as rows."""

@@ -7,7 +7,7 @@ the covariance holds for, and which configurations determine no pose.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, Self
 
 import numpy as np
@@ -32,10 +32,10 @@ from photogram.messages import Message
 from photogram.network.geometry import Spheroid
 from photogram.results.iteration import Iteration
 from photogram.show.methods import Judged
-from photogram.statistics.findings import Findings
+from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.statistics.reliability import standardized
-from photogram.words import phrase
+from photogram.statistics.reliability import TESTABLE, standardized
+from photogram.words import Phrase, phrase
 
 __all__ = ["Pose", "Resection", "resect"]
 
@@ -47,6 +47,7 @@ SOLVED = (
     *("residuals", "redundancy", "standardized", "degrees_of_freedom", "outside_danger_cylinder"),
 )
 """What a resection has as the core gives it."""
+UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
 DOUBTFUL = 3.0
 """A station is near the danger cylinder when it is within this multiple of its standard deviation."""
 
@@ -143,9 +144,42 @@ class Resection(Judged):
     outside_danger_cylinder: float | None
 
     def _findings(self) -> Findings:
-        from photogram.adjustment.findings import resection_findings
+        from photogram.results.observation_kinds import parts_of
 
-        return resection_findings(self)
+        def named(code: str, row: int) -> Phrase:
+            return Phrase(code, {"point": str(self.point_ids[row])})
+
+        # Standard deviations are given, so the unit weight is known.
+        tests: tuple[tuple[str, Floats, Floats, Callable[[tuple[int, ...]], Phrase]], ...] = (
+            (
+                "test.image_coordinates",
+                self.standardized,
+                self.redundancy,
+                lambda index: parts_of("xy"[index[1]], named("named.object_point", index[0])),
+            ),
+            (
+                "test.components_of_control",
+                self.point_standardized,
+                self.point_redundancy,
+                lambda index: parts_of([UNKNOWNS[index[1]]], named("named.control", index[0])),
+            ),
+            (
+                "test.components_of_station",
+                self.pose_standardized,
+                self.pose_redundancy,
+                lambda index: parts_of([UNKNOWNS[index[0]]], Phrase("named.station")),
+            ),
+        )
+        return Findings(
+            status=self.status,
+            observations=[
+                Tested(Phrase(code), np.where(redundancy > TESTABLE, w, np.nan), name, "w")
+                for code, w, redundancy, name in tests
+            ],
+            degrees_of_freedom=self.degrees_of_freedom,
+            global_test=self.global_test,
+            untested=Phrase("untested.freedom"),
+        )
 
     @property
     def converged(self) -> bool:

@@ -54,7 +54,7 @@ from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 __all__ = [
     "block_trial",
@@ -363,7 +363,7 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
     found = None if block.mounts or block.timed else _consensus(block)
     if found is None:
         return None
-    wrong = {
+    wrong: dict[int, str | Phrase] = {
         photo: found.missing[name] for photo, name in enumerate(block.photo_ids) if name in found.contradicted
     }
     if len(wrong) > MOST_PHOTOS * len(block.photo_ids) or not (wrong or found.set_aside.any()):

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_remark, print_sections
+from photogram.cli.command_classes import misuse
+from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
 from photogram.cli.options import Quiet, default_out
@@ -65,67 +66,58 @@ def absolute_orientation(
     Stations without control are transformed, too. Exit code 3: no convergence, or control that does not fit.
     """
     if trace and method == "rigorous":
-        raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
-    with job:
-        from photogram import orient
-        from photogram.messages import Message
+        raise misuse("--trace", "requires", options="--method report or fill-in")
+    from photogram import orient
+    from photogram.absolute_orientation.trace import trace_text
+    from photogram.messages import Message
 
-        if file is None:
-            directory = job.packaged(EXAMPLE)
-            file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-            points = points or directory / "points.csv"
-            job.reads(file, points)
-        folder = out or (Path("example-oriented") if example else default_out(file, "-oriented"))
-        target = points_out
-        if points and not target:
-            target = folder / f"{points.stem}-transformed.csv"
-        pictures = documents.announce(job, folder, TEXT, picture="residuals")
-        if target and target is not points_out:
-            job.writes(target)
-        deck = _read(file, format, zero_missing, ground_unit, model_unit)
-        result = orient(
-            deck.stations,
-            method=method,
-            start=start,
-            former=_restart(restart, deck) if restart else deck.former,
-            reject=reject or (),
-            unit_variance=unit_variance,
-            trace=trace is not None,
-            scale=scale,
-        )
-        result.messages[:0] = deck.messages
-        if points and not result.usable:
-            result.messages.append(Message("no points were transformed: the orientation is not to be used"))
-            points = None
-        made = _small_files(result, folder, pictures, trace, None if points else documents.json)
-        name = deck.identification if ident is None else ident
-        made |= _records(result, part_two, restart_out, name)
-        title = file.name
-        made |= documents.page(
-            job, "absolute-orientation", folder, lambda: replace(result.document(), title=title)
-        )
-        written = list(made)
-        with job.outputs() as outputs:
-            if points and target:
-                _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
-                written = [target, *([documents.json] if documents.json else []), *written]
-            for path, content in made.items():
-                outputs.write(path, content)
-        job.conclude(
-            written,
-            summary=lambda: _summarize(result, title),
-            code=result.verdict.exit_code(strict=strict),
-        )
-
-
-def _summarize(result: Orientation, title: str) -> None:
-    """Print verdict, parameters, control and problems."""
-    from photogram.show.forms import summary
-
-    for line in summary(replace(result.document(), title=title), "parameters", "control"):
-        output.print(escape(line))
-    for problem in result.problems:
-        print_remark(problem)
+    if file is None:
+        directory = job.packaged(EXAMPLE)
+        file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
+        points = points or directory / "points.csv"
+        job.reads(file, points)
+    folder = out or default_out(file, "-oriented", example)
+    target = points_out or (folder / f"{points.stem}-transformed.csv" if points else None)
+    pictures = documents.announce(job, folder, TEXT, picture="residuals")
+    if target:
+        job.writes(target)
+    deck = _read(file, format, zero_missing, ground_unit, model_unit)
+    result = orient(
+        deck.stations,
+        method=method,
+        start=start,
+        former=_restart(restart, deck) if restart else deck.former,
+        reject=reject or (),
+        unit_variance=unit_variance,
+        trace=trace is not None,
+        scale=scale,
+    )
+    result.messages[:0] = deck.messages
+    if points and not result.usable:
+        result.messages.append(Message.of("orientation.no-points"))
+        points = None
+    made = {folder / TEXT: result.report().encode()}
+    if pictures:
+        made |= {path: result.plot().render(path.suffix[1:]) for path in pictures}
+    if trace:
+        made[trace] = trace_text(result).encode()
+    if not points:
+        made |= documents.as_json(result)
+    made |= _records(result, part_two, restart_out, deck.identification if ident is None else ident)
+    document = replace(result.document(), title=file.name)
+    made |= documents.page(job, "absolute-orientation", folder, lambda: document)
+    written = list(made)
+    with job.outputs() as outputs:
+        if points and target:
+            _stream(job, outputs, result, points, target, documents.json, point_sd, decimals)
+            written = [target, *([documents.json] if documents.json else []), *written]
+        for path, content in made.items():
+            outputs.write(path, content)
+    job.conclude(
+        written,
+        summary=lambda: print_document(document, "parameters", "control", remarks=result.problems),
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 @with_job
@@ -140,24 +132,21 @@ def transform(
     quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points with an earlier orientation (part II)."""
-    with job:
-        from photogram.absolute_orientation import read_similarity, transform_file
-        from photogram.absolute_orientation.cards import read_transformation
+    from photogram.absolute_orientation import read_similarity, transform_file
+    from photogram.absolute_orientation.cards import read_transformation
 
-        similarity = (
-            read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
+    similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
+    with job.outputs() as outputs, _progress(job, points) as progress:
+        count = transform_file(
+            similarity,
+            points,
+            out,
+            decimals=decimals,
+            point_sd=point_sd,
+            outputs=outputs,
+            progress=progress,
         )
-        with job.outputs() as outputs, _progress(job, points) as progress:
-            count = transform_file(
-                similarity,
-                points,
-                out,
-                decimals=decimals,
-                point_sd=point_sd,
-                outputs=outputs,
-                progress=progress,
-            )
-        job.conclude([out], summary=lambda: output.print(f"{count} points"))
+    job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
 @with_job
@@ -178,42 +167,39 @@ def relative(
     Exit code 3: a model did not converge. Exit code 4: a model without redundancy.
     """
     assert out is not None
-    with job:
-        import numpy as np
+    import numpy as np
 
-        from photogram.absolute_orientation.models import strip_of
-        from photogram.formats.reduced_coordinates import given_control
-        from photogram.io.csv_text import csv_text
+    from photogram.absolute_orientation.models import strip_of
+    from photogram.formats.reduced_coordinates import given_control
+    from photogram.io.csv_text import csv_text
 
-        project = read_project(job, project_path(job, path), added)
-        names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
-        strip = strip_of(project.block, names)
-        control = given_control(project)
-        unknown = np.full(3, np.nan), np.zeros(3, dtype=bool)
-        ground = [
-            np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)
-        ]
-        columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
-        columns |= dict(zip("xyz", strip.positions.T, strict=True))
-        models = [
-            f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
-            f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
-            f" {each.result.degrees_of_freedom} degrees of freedom"
-            for each in strip.models
-        ]
-        joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
-        sections = [
-            ("Models", models),
-            ("Joints, in bases of the first model", joints or ["none: one model"]),
-        ]
-        if strip.unchecked:
-            text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
-            sections.insert(0, ("Not to be used as it is", [text]))
-        job.finish(
-            {out: csv_text(columns)},
-            summary=lambda: print_sections(sections, "OUT"),
-            code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
-        )
+    project = read_project(job, project_path(job, path), added)
+    names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
+    strip = strip_of(project.block, names)
+    control = given_control(project)
+    unknown = np.full(3, np.nan), np.zeros(3, dtype=bool)
+    ground = [np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)]
+    columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
+    columns |= dict(zip("xyz", strip.positions.T, strict=True))
+    models = [
+        f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
+        f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
+        f" {each.result.degrees_of_freedom} degrees of freedom"
+        for each in strip.models
+    ]
+    joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
+    sections = [
+        ("Models", models),
+        ("Joints, in bases of the first model", joints or ["none: one model"]),
+    ]
+    if strip.unchecked:
+        text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
+        sections.insert(0, ("Not to be used as it is", [text]))
+    job.finish(
+        {out: csv_text(columns)},
+        summary=lambda: print_sections(sections, "OUT"),
+        code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
+    )
 
 
 def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
@@ -243,7 +229,7 @@ def _is_document(path: Path) -> bool:
 def _records(
     result: Orientation, part_two: Path | None, restart: Path | None, ident: str
 ) -> dict[Path, bytes]:
-    """Make the files of step 12; of an orientation that is not to be used there is none for part II."""
+    """Return the files of step 12; an unusable orientation gets only the restart."""
     from photogram.absolute_orientation.cards import restart_record, transformation_records
 
     made = {}
@@ -251,23 +237,6 @@ def _records(
         made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
     if restart:
         made[restart] = f"{restart_record(result.similarity, ident)}\n".encode()
-    return made
-
-
-def _small_files(
-    result: Orientation, folder: Path, pictures: list[Path], trace: Path | None, json: Path | None
-) -> dict[Path, bytes]:
-    """Make everything that is small, before anything is written."""
-    made = {folder / TEXT: result.report().encode()}
-    if pictures:
-        plot = result.plot()
-        made |= {path: plot.render(path.suffix[1:]) for path in pictures}
-    if trace:
-        from photogram.absolute_orientation.trace import trace_text
-
-        made[trace] = trace_text(result).encode()
-    if json:
-        made[json] = result.to_json()
     return made
 
 

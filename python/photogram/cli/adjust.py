@@ -1,4 +1,4 @@
-"""`photogram adjust`: adjust whatever lies at a path."""
+"""`photogram adjust`: adjust a project of any format."""
 
 from __future__ import annotations
 
@@ -7,25 +7,23 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-import typer
-
 from photogram.cli.choices import Choices
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark, print_sections, print_summary
-from photogram.cli.documents import Documents, Pictures, check_maps
+from photogram.cli.documents import Documents, check_maps
 from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
-from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, with_job
 from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, check_alone, default_out
-from photogram.cli.progress import adjustment_status
 from photogram.cli.projects import NOTHING, Additions, described, project_path, read_project
 from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.lazy_dataclasses import replace
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
     from photogram.adjustment.robust import Loss
     from photogram.distributed import Division
     from photogram.formats import Project
-    from photogram.messages import Message
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
     from photogram.show.page import Section as Chapter
@@ -60,7 +58,7 @@ def adjust(
     project.
     """
     path = project_path(job, path)
-    target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
+    target = out or default_out(path, "-adjusted", example)
     documents.place(target)  # refused before anything is read
     if not statement:
         wanted.check_alone()
@@ -68,58 +66,46 @@ def adjust(
         check_alone(job, "--snoop", DIVIDING)
     if ordering != "auto":
         check_alone(job, "--ordering", DIVIDING)
-    with job:
-        pictures = documents.pictures(job, target)
-        division = divided.division
-        if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices, threads):
-            return
-        project = read_project(job, path, added)
-        check_maps(documents.map)  # now that all inputs are known, which it must not be
-        project = choices.of(project)
-        asked = wanted.asked(project, added, project.block.linear_unit) if statement else None
-        sections = described(project)
-        if not quiet:
-            print_sections(sections, "`photogram info`")
-        if documents.crs is not None:
-            from photogram.formats.crs_results import check_place
+    documents.check_plots(job, target)
+    division = divided.division
+    if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices, threads):
+        return
+    project = read_project(job, path, added)
+    check_maps(documents.map)  # now that all inputs are known, which it must not be
+    project = choices.of(project)
+    asked = wanted.asked(project, added, project.block.linear_unit) if statement else None
+    sections = described(project)
+    if not quiet:
+        print_sections(sections, "`photogram info`")
+    if documents.crs is not None:
+        from photogram.formats.crs_results import check_place
 
-            check_place(project.block, documents.crs)
-        block, started = started_block(project, keep_all=keep_all)
-        if divided.plan:
-            _planned(project, block, choices, division)
-            return
-        for remark in started.messages if started is not None and not quiet else ():
-            print_remark(str(remark))
-        run = partial(
-            adjusted_block,
-            job,
-            project,
-            choices=choices,
-            ordering=ordering,
-            threads=threads,
-            division=division,
-        )
-        if snooping.snoop:
-            removed = _snooped(job, project, block, started, run, choices, threads, snooping)
-            result = cast("Result", removed.result)
-        else:
-            removed, result = None, run(started or block)
-        own = None if asked is None else _statement(job, project, result, asked, documents.crs, strict)
-        _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
+        check_place(project.block, documents.crs)
+    block, started = started_block(project, keep_all=keep_all)
+    if divided.plan:
+        from photogram.distributed import Division, plan_in_parts
 
+        datum, basis = _datum(choices.datum_of(project)), project.options.unit_variance
+        print_plan(plan_in_parts(block, division or Division(), datum=datum, unit_variance=basis))
+        return
+    for remark in started.messages if started is not None and not quiet else ():
+        print_remark(str(remark))
 
-def _planned(project: Project, block: Block, choices: Choices, division: Division | None) -> None:
-    """Print how a block would be adjusted in parts."""
-    from photogram.distributed import Division, plan_in_parts
+    def run(start: Block | FirstValues) -> Result:
+        how: dict[str, Any] = {"choices": choices, "threads": threads, "division": division}
+        return adjusted_block(job, project, start, ordering=ordering, **how)
 
-    print_plan(
-        plan_in_parts(
-            block,
-            division or Division(),
-            datum=_datum(choices.datum_of(project)),
-            unit_variance=project.options.unit_variance,
-        )
-    )
+    if snooping.snoop:
+        removed = _snooped(job, project, block, started, run, choices, threads, snooping)
+        result = cast("Result", removed.result)
+    else:
+        removed, result = None, run(started or block)
+    own = None
+    if asked is not None and result.converged:
+        with job.status("stating"):
+            given: dict[str, Any] = {"command": "adjust", "crs": documents.crs, "strict": strict}
+            own = stated(job, result, asked, assumed=project.lacks, **given)
+    _finish(job, project, result, removed, target, documents, sections, own, strict=strict)
 
 
 def _finish(
@@ -129,13 +115,12 @@ def _finish(
     removed: Snooped | None,
     target: Path,
     documents: Documents,
-    pictures: Pictures,
     sections: list[Section],
     stated: Statement | None,
     *,
     strict: bool,
 ) -> None:
-    """Write all that was found and asked for, say it in short, and end by the verdict."""
+    """Write the results, print a summary, and end by the verdict."""
     from photogram.formats.adjusted import excel_file
     from photogram.show.forms import text
 
@@ -152,7 +137,7 @@ def _finish(
     code = result.verdict.exit_code(strict=strict)
     job.finish(
         {target / name: content for name, content in files.items()}
-        | pictures.of(result)
+        | documents.plots_of(result, target)
         | page
         | sheets
         | beside,
@@ -164,29 +149,8 @@ def _finish(
     )
 
 
-def _statement(
-    job: Job, project: Project, result: Result, asked: dict[str, Any], crs: str | None, strict: bool
-) -> Statement | None:
-    """Return the accuracy statement of a result; None where the adjustment has not converged."""
-    if not result.converged:
-        return None
-    with job.status("stating"):
-        return stated(
-            job,
-            result,
-            asked,
-            command="adjust",
-            crs=crs,
-            strict=strict,
-            assumed=project.lacks,
-        )
-
-
 def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
-    """Return the tables of a result in another system, and sections of its document.
-
-    The system is the one that is asked for, or that of the control.
-    """
+    """Return tables and sections of a result in a chosen CRS, or in the CRS of the control."""
     if not (crs or of_control):
         return {}, []
     from photogram import InputError
@@ -197,14 +161,14 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
     except InputError as error:
         if crs:
             raise
-        print_remark(f"no results in {of_control}: {error}")
+        print_remark(phrase("command.no-crs-results", crs=of_control, error=error))
         return {}, []
     files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
     return files, [placed_section(found)]
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
-    """Return the block with poses for all its photos, and the first values where it needed any."""
+    """Return the block with poses for all its photos, and first values if it required some."""
     import numpy as np
 
     from photogram import first_values
@@ -214,23 +178,6 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
         return block, None
     found = first_values(block, keep_all=keep_all)
     return found.usable(), found
-
-
-def _replaced_by_snooping(job: Job, project: Project, choices: Choices) -> list[Message]:
-    """Return what a project or a user requests and `--snoop` does in another way."""
-    from photogram import adjust
-    from photogram.formats import adjusting
-    from photogram.messages import Message
-
-    messages = []
-    if choices.loss_of(project) is not None:
-        source = choices.source(job, project, "loss")
-        messages.append(
-            Message(f"{source}: --snoop starts with a robust loss, but its result is by least squares")
-        )
-    if adjusting(project, adjust) is not adjust:
-        messages.append(Message("OUTLIER_REJECTION=yes is not used: --snoop tests the observations instead"))
-    return messages
 
 
 def _snooped(
@@ -243,9 +190,11 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
 ) -> Snooped:
-    """Take gross errors out of a block, of what is kept where first values have set images aside."""
-    from photogram import Result, snoop
+    """Remove gross errors of a block, without images that initial values have excluded."""
+    from photogram import Result, adjust, snoop
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
+    from photogram.formats import adjusting
+    from photogram.messages import Message
     from photogram.results.fitting import with_features
 
     aside: tuple[Phrase | str, ...] = ()
@@ -266,8 +215,12 @@ def _snooped(
         result = diagnosed(cast("Result", found.result))
     assert isinstance(result, Result)
     _check_control(job, project, choices, result)
-    messages = [*_replaced_by_snooping(job, project, choices), *result.messages]
-    result = replace(result, set_aside=aside, messages=messages)
+    messages = []
+    if choices.loss_of(project) is not None:
+        messages.append(Message.of("command.robust-start", source=choices.source(job, project, "loss")))
+    if adjusting(project, adjust) is not adjust:
+        messages.append(Message.of("command.no-rejection"))
+    result = replace(result, set_aside=aside, messages=[*messages, *result.messages])
     return replace(found, result=with_features(result, project.features))
 
 
@@ -276,10 +229,7 @@ def _check_control(job: Job, project: Project, choices: Choices, result: Result)
     from photogram import InputError
 
     if choices.datum_of(project) == "control" and result.datum.is_chosen:
-        raise InputError(
-            f"{choices.source(job, project, 'datum')}: the control points give no datum; --control FILE adds"
-            " control points, --datum inner or --datum minimum needs none"
-        )
+        raise InputError(phrase("command.no-datum", source=choices.source(job, project, "datum")))
 
 
 def adjusted_block(
@@ -292,7 +242,7 @@ def adjusted_block(
     threads: int | None = None,
     division: Division | None = None,
 ) -> Result:
-    """Adjust a block as its project says, but for what a user chooses, with its features."""
+    """Adjust a block by the settings of its project and the choices of the user, with its features."""
     from photogram import FirstValues, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
@@ -330,31 +280,17 @@ def result_at(
     keep_all: bool = False,
     fitted: bool = True,
 ) -> tuple[Result, Project | None]:
-    """Return the result that lies at a path, or that of the project there, which is adjusted.
-
-    Parameters
-    ----------
-    choices, keep_all
-        How a project is adjusted.
-    fitted
-        Whether features that a project declares are fitted.
-
-    Returns
-    -------
-    The result, and its project; None where it was read as data.
-    """
+    """Return a saved result, or the adjusted project of a path."""
     from photogram import Result, read_result
     from photogram.formats.results import is_result
 
     if is_result(path):
         if replace(added, sd=None) != NOTHING or choices != Choices() or keep_all:
-            raise typer.BadParameter(
-                "is a saved result: options of reading and adjustment require a project", param_hint="PATH"
-            )
+            raise misuse("PATH", "saved-result")
         job.reads(path)
         result = read_result(path)
         if not isinstance(result, Result):
-            raise typer.BadParameter("is the result of a collection, not of a block", param_hint="PATH")
+            raise misuse("PATH", "collection")
         return result, None
     project = choices.of(read_project(job, path, added))
     block, started = started_block(project, keep_all=keep_all)
@@ -386,7 +322,7 @@ def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
 
 
 def _files(project: Project, result: Result, report: str, sections: list[Section]) -> dict[str, bytes]:
-    """Make everything that goes to the output directory, before anything is written."""
+    """Return all files of the output folder."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
     from photogram.network.film_reduction import is_scanned
@@ -416,5 +352,5 @@ def _in_format(project: Project, name: str) -> dict[str, bytes]:
     try:
         return dict(to_files(project, name))
     except InputError as error:
-        print_remark(f"not written as {FORMATS[name].title}: {error}")
+        print_remark(phrase("command.not-written", format=FORMATS[name].title, error=error))
         return {}

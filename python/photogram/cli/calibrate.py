@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
 
 from photogram.cli.calibration_options import (
     NOT_GOOD_ENOUGH,
@@ -18,12 +17,12 @@ from photogram.cli.calibration_options import (
     distances_of,
 )
 from photogram.cli.choices import LossName
+from photogram.cli.command_classes import misuse
 from photogram.cli.components import COMPONENTS
-from photogram.cli.console import output, print_remark, print_summary
+from photogram.cli.console import print_document, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
-from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.job import InputFile, Job, OutputFolder, adjustment_status, estimation_status, with_job
 from photogram.cli.options import Quiet, Snooping, Threads, check_alone, default_out
-from photogram.cli.progress import adjustment_status, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ EXAMPLE = ("board",)
 
 
 class CornerBasisName(StrEnum):
-    """What groups of corners are made by."""
+    """Criteria for groups of corners."""
 
     KIND = "kind"
     CAMERA = "camera"
@@ -47,7 +46,7 @@ class CornerBasisName(StrEnum):
 
 
 CORNER_SD = 0.3
-"""Pixels, where --sd says none."""
+"""Default standard deviation of corners (px)."""
 TAKEN = (
     "--plan --field --focal --away --board --spacing --unit --shape --size --model --knots --sd --distance"
     " --need --out --json --html --no-html --plots --plot-format --quiet"
@@ -57,7 +56,7 @@ TAKEN = (
 
 @dataclass(frozen=True)
 class Planned:
-    """Whether and for which camera views are planned, with the options that say it."""
+    """Options for a plan of views with a nominal camera."""
 
     plan_views: Annotated[int | None, typer.Option("--plan", min=4)] = None
     view_field: Annotated[float | None, typer.Option("--field")] = None
@@ -68,7 +67,7 @@ class Planned:
     def asked(self) -> bool:
         """Whether views are to be planned."""
         if self.plan_views is None and self != Planned():
-            raise typer.BadParameter("go with --plan", param_hint="--field, --focal, --away")
+            raise misuse("--field, --focal, --away", "requires", options="--plan")
         return self.plan_views is not None
 
     def made(self, job: Job, seen: CalibrationInput, uncertainty: Uncertainty) -> ViewPlan:
@@ -77,10 +76,10 @@ class Planned:
 
         for name in job.given:
             if name not in TAKEN.split():
-                raise typer.BadParameter("goes without --plan", param_hint=name)
+                raise misuse(name, "conflict", options="--plan")
         size = seen.size_of_pictures
         if size is None or (self.view_field is None) == (self.focal is None):
-            raise typer.BadParameter("needs --size, and --field or --focal", param_hint="--plan")
+            raise misuse("--plan", "requires", options="--size, and --field or --focal")
         more = {} if (knots := seen.knots_of_lens) is None else {"knots": knots}
         camera = nominal_camera(size, seen.model, field=self.view_field, focal=self.focal, **more)
         with job.status("planning views") as status:
@@ -104,30 +103,25 @@ class Planned:
         documents: Documents,
         out: Path | None,
     ) -> None:
-        """Plan views, and write and tell the plan."""
+        """Plan views, write and print the plan."""
         target = out or Path("planned-views")
-        pictures = documents.pictures(job, target)
+        documents.check_plots(job, target)
         plan = self.made(job, seen, uncertainty)
         from photogram.io.csv_text import csv_text
-        from photogram.show.forms import summary
         from photogram.show.quantity import frame
         from photogram.targets.page import worth_files
 
         document, worth = plan.document(), plan.calibrated.worth
         assert worth is not None
 
-        def summarize() -> None:
-            for line in summary(document, "views", "parameters"):
-                output.print(escape(line))
-
         views = csv_text(frame(document.table("views").columns))
         texts = {"report.txt": plan.report().encode(), "views.csv": views, **worth_files(worth)}
         job.finish(
             {target / name: content for name, content in texts.items()}
-            | pictures.of_drawings(document.drawings)
+            | documents.drawings(document.drawings, target)
             | documents.page(job, "calibrate", target, lambda: document),
             documents.as_json(plan),
-            summary=summarize,
+            summary=lambda: print_document(document, "views", "parameters"),
             code=0 if plan.enough else NOT_GOOD_ENOUGH,
         )
 
@@ -138,7 +132,7 @@ def _board(seen: CalibrationInput) -> Board:
 
     given = seen.given_board()
     if given is None:
-        raise typer.BadParameter("needs --board", param_hint="--plan")
+        raise misuse("--plan", "requires", options="--board")
     board = read_board(given) if isinstance(given, Path) else given
     changes = {"unit": seen.unit, "shape": seen.shape}
     return board.replace(**{name: value for name, value in changes.items() if value})
@@ -169,50 +163,49 @@ def calibrate(
     No initial values are necessary. --out receives the report, the tables of views, points, corners and
     cameras, and the adjusted project. --plan suggests views before the first photograph.
     """
-    with job:
-        if planned.asked:
-            planned.run(job, seen, uncertainty, documents, out)
-            return
-        from photogram.show.forms import text
-        from photogram.targets.page import drawings
+    if planned.asked:
+        planned.run(job, seen, uncertainty, documents, out)
+        return
+    from photogram.show.forms import text
+    from photogram.targets.page import drawings
 
-        if path is None:
-            path = job.packaged(*EXAMPLE)
-        target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
-        documents.place(target)
-        pictures = documents.pictures(job, target)
-        job.reads_inside(path)
-        with job.status("reading corners, finding first values") as status:
-            calibration = seen.read(path, None if status is None else status.update)
-        for message in calibration.messages if not quiet else ():
-            print_remark(str(message))
-        how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
-        uncertainty.asked()
-        found = uncertainty.told(
-            job,
-            _adjusted(job, calibration, how, threads, snooping),
-            lambda other: seen.read(other).adjust(**how, threads=threads),
-        )
-        weights = _weights(job, found, components or [], threads)
-        document = _document(found, weights)
-        files = _files(found, text(document)) | _cameras(found, to or [], uncertainty.need)
-        files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
-        page = documents.page(job, "calibrate", target, lambda: document)
-        drawn = pictures.of(found.result)
-        if found.worth is not None:
-            drawn |= pictures.of_drawings(partial(drawings, found.worth))
-        job.finish(
-            {target / name: content for name, content in files.items()} | drawn | page,
-            documents.as_json(found),
-            summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
-            code=found.verdict.exit_code(strict=strict),
-        )
+    if path is None:
+        path = job.packaged(*EXAMPLE)
+    target = out or default_out(path, "-calibrated", example)
+    documents.place(target)
+    documents.check_plots(job, target)
+    job.reads_inside(path)
+    with job.status("reading corners, finding first values") as status:
+        calibration = seen.read(path, None if status is None else status.update)
+    for message in calibration.messages if not quiet else ():
+        print_remark(str(message))
+    how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
+    uncertainty.asked()
+    found = uncertainty.told(
+        job,
+        _adjusted(job, calibration, how, threads, snooping),
+        lambda other: seen.read(other).adjust(**how, threads=threads),
+    )
+    weights = _weights(job, found, components or [], threads)
+    document = _document(found, weights)
+    files = _files(found, text(document)) | _cameras(found, to or [], uncertainty.need)
+    files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
+    page = documents.page(job, "calibrate", target, lambda: document)
+    drawn = documents.plots_of(found.result, target)
+    if found.worth is not None:
+        drawn |= documents.drawings(partial(drawings, found.worth), target)
+    job.finish(
+        {target / name: content for name, content in files.items()} | drawn | page,
+        documents.as_json(found),
+        summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
+        code=found.verdict.exit_code(strict=strict),
+    )
 
 
 def _adjusted(
     job: Job, calibration: Calibration, how: dict[str, Any], threads: int | None, snooping: Snooping
 ) -> Calibrated:
-    """Adjust a calibration, without gross errors where they are looked for."""
+    """Adjust a calibration, without gross errors if the user wants that."""
     if snooping.snoop:
         check_alone(job, "--snoop", ("--loss", "--outliers"))
     with adjustment_status(job) as progress:
@@ -222,7 +215,7 @@ def _adjusted(
 
 
 def _files(found: Calibrated, report: str) -> dict[str, bytes]:
-    """Make everything that goes to the directory, before anything is written."""
+    """Return all files of the output folder."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
     from photogram.formats.targets.calibrations import adjusted_project

@@ -1,4 +1,4 @@
-"""What a user of `photogram calibrate` says of board, pictures and lens, and asks of their uncertainty."""
+"""Options of `photogram calibrate`: board, images, lens, uncertainty."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.job import InputFile, Job
 from photogram.cli.options import pair
 from photogram.cli.projects import OriginName
@@ -21,11 +22,9 @@ if TYPE_CHECKING:
 
 
 ShapeName = Literal["held", "bend", "points"]
-"""What of a board is unknown."""
 
 
 ViewName = Literal["name", "time"]
-"""What tells which images are of one view."""
 
 
 SyncName = Literal["known", "none", "offset"]
@@ -42,7 +41,7 @@ PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
 
 @dataclass(frozen=True)
 class CalibrationInput:
-    """What a user says of the board, of images and of the lens, with the options that say it."""
+    """Options for board, images and lens."""
 
     board: str | None = None
     spacing: float | None = None
@@ -72,7 +71,7 @@ class CalibrationInput:
         return None if self.knots is None else pair(self.knots, "--knots")
 
     def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
-        """Read what lies at a path; `progress` is told which photograph is searched."""
+        """Read corners or photographs of a path; `progress` receives the current photograph."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -101,7 +100,7 @@ class CalibrationInput:
         )
 
     def _of_project(self, path: Path) -> Calibration:
-        """Return the calibration that a plain project is, with what a user says otherwise."""
+        """Return the calibration of a plain project with the options of the user."""
         from photogram import formats
         from photogram.formats.targets.calibrations import calibration_of
 
@@ -110,7 +109,7 @@ class CalibrationInput:
             shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
         )
         if self != said or self.sync == "none":
-            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
+            raise misuse(PLAIN_GOES, "project-views")
         changes: dict[str, Any] = {}
         if self.sync == "offset":
             changes["sync"] = self.sync
@@ -129,11 +128,11 @@ class CalibrationInput:
 
         if self.board is None or Path(self.board).is_file():
             if self.spacing is not None:
-                raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
+                raise misuse("--spacing", "requires", options="--board CxR")
             return None if self.board is None else Path(self.board)
         columns, rows = pair(self.board, "--board")
         if self.spacing is None:
-            raise typer.BadParameter("needs --spacing", param_hint="--board")
+            raise misuse("--board", "requires", options="--spacing")
         return Board(columns=columns, rows=rows, spacing=self.spacing)
 
     def sd0(self) -> float | None:
@@ -142,7 +141,7 @@ class CalibrationInput:
 
         found = deviations(self.sd or [])
         if found.keys() - {"images"} or len(found.get("images", (1.0,))) > 1:
-            raise typer.BadParameter("is images=S here: of a corner in x and y", param_hint="--sd")
+            raise misuse("--sd", "form", form="images=S for x and y of a corner", value=self.sd)
         return found["images"][0] if found else None
 
 
@@ -151,7 +150,7 @@ def _deviations(text: str) -> tuple[float, float]:
     try:
         radial, tangential = map(float, text.split(","))
     except ValueError:
-        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
+        raise misuse("--knot-sd", "form", form="two numbers, such as 1,0.1", value=text) from None
     return radial, tangential
 
 
@@ -165,7 +164,7 @@ def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
         except ValueError:
             offset = sd = math.nan
         if not (camera and math.isfinite(offset) and sd >= 0):
-            raise typer.BadParameter(f"is CAMERA=S or CAMERA=S,SD, not {each}", param_hint="--offset")
+            raise misuse("--offset", "form", form="CAMERA=S or CAMERA=S,SD", value=each)
         found[camera] = offset, sd
     return found
 
@@ -175,12 +174,11 @@ NOT_GOOD_ENOUGH = 4
 
 
 DatumName = Literal["corners", "mean-frames", "image", "axes"]
-"""What holds still while a calibration is uncertain."""
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What a user wants to know of the uncertainty of cameras, with the options that ask for it."""
+    """Options for the uncertainty of a calibration."""
 
     map_distance: Annotated[str | None, typer.Option("--distance")] = None
     map_datum: Annotated[DatumName, typer.Option("--datum")] = "corners"
@@ -191,7 +189,7 @@ class Uncertainty:
     suggest: Annotated[int, typer.Option(min=0)] = 0
 
     def asked(self) -> WorthOptions:
-        """Return what is asked of a calibration."""
+        """Return the options of the uncertainty of a calibration."""
         from photogram.targets.worth import WorthOptions
 
         return WorthOptions(
@@ -204,7 +202,7 @@ class Uncertainty:
 
     @property
     def distances(self) -> list[float]:
-        """Of maps; none: the usual ones."""
+        """Distances of maps; None: defaults."""
         return distances_of(self.map_distance, "--distance")
 
     def _split(self) -> Into | None:
@@ -213,22 +211,12 @@ class Uncertainty:
         if self.cross_validate in ("odd", "halves"):
             return cast("Into", self.cross_validate)
         if not (self.cross_validate.isdecimal() and int(self.cross_validate) > 1):
-            raise typer.BadParameter(
-                f"is odd, halves, none, or a number from 2, not {self.cross_validate}",
-                param_hint="--cross-validate",
-            )
+            form = "odd, halves, none, or a number greater than 1"
+            raise misuse("--cross-validate", "form", form=form, value=self.cross_validate)
         return int(self.cross_validate)
 
     def told(self, job: Job, found: Calibrated, calibrated: Callable[[Path], Calibrated]) -> Calibrated:
-        """Return an adjusted calibration with what it is worth.
-
-        Parameters
-        ----------
-        job, found
-            The job, and the calibration.
-        calibrated
-            Reads and adjusts another one, with the options of this.
-        """
+        """Return an adjusted calibration with its uncertainty; `calibrated` reads and adjusts another one."""
         from photogram.targets.appraisal import appraise
         from photogram.targets.findings import judged
         from photogram.targets.uncertainty import difference
@@ -253,5 +241,5 @@ def distances_of(text: str | None, option: str) -> list[float]:
     except ValueError:
         found = [math.nan]
     if not all(each > 0 for each in found):
-        raise typer.BadParameter(f"is a list of distances, 1,inf, not {text}", param_hint=option)
+        raise misuse(option, "form", form="a list of distances, such as 1,inf", value=text)
     return found

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.documents import PageAndJson
 from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
 from photogram.cli.options import Quiet, default_out
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -38,11 +40,10 @@ def certificate(
     to a table of distortion, all with covariance. Exit code 4: a distance differs from its coordinates by
     more than 0.010 mm. The report lists single changes of a figure that explain it.
     """
-    with job:
-        from photogram.film import Certificate
+    from photogram.film import Certificate
 
-        found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
-        documents.conclude(job, "certificate", found, out, text=False)
+    found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
+    documents.conclude(job, "certificate", found, out, text=False)
 
 
 @with_job
@@ -63,21 +64,20 @@ def compare_certificates(
     The command compares images of directions instead of parameters, because parameters are correlated. Exit
     code 4: a camera has changed.
     """
-    with job:
-        from photogram.film.years import compare_cameras
+    from photogram.film.years import compare_cameras
 
-        if example:
-            from photogram.film.years.example import simulated_certificates
+    if example:
+        from photogram.film.years.example import simulated_certificates
 
-            read: list[Certificate | DatedCamera] = [*simulated_certificates()]
-            folder = out or Path("camera-compared")
-        else:
-            paths = calibrations or []
-            read = _read(paths, day or [], name)
-            folder = out or default_out(paths[0], "-compared")
-        found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-        tables = ("calibrations", "series")
-        documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
+        read: list[Certificate | DatedCamera] = [*simulated_certificates()]
+        folder = out or Path("camera-compared")
+    else:
+        paths = calibrations or []
+        read = _read(paths, day or [], name)
+        folder = out or default_out(paths[0], "-compared")
+    found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
+    tables = ("calibrations", "series")
+    documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:
@@ -94,10 +94,10 @@ def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | D
             found.append(Certificate.read(path))
             continue
         if not left:
-            raise InputError("says no day: give it with --day 1983-05-11", file=path)
+            raise InputError(phrase("command.no-day"), file=path)
         found.append(DatedCamera(_day(left.pop(0)), camera_from(path, name), source=path.stem))
     if left:
-        raise typer.BadParameter(f"{left[0]} is of no file: all others say theirs", param_hint="--day")
+        raise misuse("--day", "day-without-file", day=left[0])
     return found
 
 
@@ -105,4 +105,4 @@ def _day(text: str) -> date:
     try:
         return date.fromisoformat(text)
     except ValueError:
-        raise typer.BadParameter(f"{text!r} is no day such as 1983-05-11", param_hint="--day") from None
+        raise misuse("--day", "form", form="a date such as 1983-05-11", value=text) from None

@@ -14,7 +14,7 @@ from photogram.cli.options import Quiet, Threads, default_out
 from photogram.cli.projects import Additions, described, project_path, read_project
 
 if TYPE_CHECKING:
-    from photogram.diagnosis.diagnosis import Diagnosis
+    pass
 
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
@@ -36,18 +36,17 @@ def check_project(
 
     The project is not changed. Exit code 3: a serious mistake.
     """
-    with job:
-        from photogram import diagnose
+    from photogram import diagnose
 
-        path = project_path(job, path)
-        out = out or (Path("example-checked") if example else default_out(path, "-checked"))
-        documents.place(out)  # refused before anything is read
-        project = read_project(job, path, added)
-        if not quiet:
-            print_sections(described(project), "`photogram info`")
-        with job.status("checking"):
-            found = diagnose(project.block, threads=threads)
-        documents.conclude(job, "check", found, out)
+    path = project_path(job, path)
+    out = out or default_out(path, "-checked", example)
+    documents.place(out)  # refused before anything is read
+    project = read_project(job, path, added)
+    if not quiet:
+        print_sections(described(project), "`photogram info`")
+    with job.status("checking"):
+        found = diagnose(project.block, threads=threads)
+    documents.conclude(job, "check", found, out)
 
 
 @with_job
@@ -66,25 +65,20 @@ def check(
 
     The project is not changed. Exit code 3: a serious mistake.
     """
-    with job:
-        from photogram.giant import Limits, read_project
-        from photogram.giant.checking import check as checked
+    from photogram.giant import Limits, read_project
+    from photogram.giant.checking import check as checked
 
-        if directory is None:
-            directory = job.packaged(EXAMPLE)
-            job.reads(directory)
-            out = out or Path(f"{EXAMPLE}-checked")
-        out = out or default_out(directory, "-checked")
-        documents.announce(job, out, TEXT)
-        project = read_project(directory)
-        allowed = Limits.parse(limits) if limits else None
-        with job.status("checking"):
-            found = checked(project, limits=allowed, threads=threads)
-        _shorten(found, f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}")
-        documents.conclude(job, "giant check", found, out)
-
-
-def _shorten(found: Diagnosis, inside: str, shown: str) -> None:
-    """Write in the findings where a packaged project lies as people are told."""
+    if directory is None:
+        out = out or Path(f"{EXAMPLE}-checked")
+    directory = job.input(directory, EXAMPLE)
+    out = out or default_out(directory, "-checked")
+    documents.announce(job, out, TEXT)
+    project = read_project(directory)
+    allowed = Limits.parse(limits) if limits else None
+    with job.status("checking"):
+        found = checked(project, limits=allowed, threads=threads)
+    # Paths of a packaged project are short.
+    inside, shown = f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}"
     for section in found.sections:
         section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
+    documents.conclude(job, "giant check", found, out)

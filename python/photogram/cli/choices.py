@@ -1,4 +1,4 @@
-"""What a user of `photogram adjust` chooses where a project says it otherwise, or not at all."""
+"""Options of `photogram adjust` that override the settings of a project."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.components import UnitVarianceName
 from photogram.lazy_dataclasses import dataclass, replace
 
@@ -15,12 +16,11 @@ if TYPE_CHECKING:
     from photogram.formats import Project
 
 LossName = Literal["none", "huber", "cauchy"]
-"""What is minimised."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What a user chooses where a project says it otherwise, or not at all, with the options that say it."""
+    """Options that override the settings of a project."""
 
     datum: Literal["control", "minimum", "inner"] | None = None
     hold: str | None = None
@@ -30,11 +30,11 @@ class Choices:
     self_calibrate: str | None = None
 
     def datum_of(self, project: Project) -> str | None:
-        """Return the name of the datum: what is chosen, else that of the project."""
+        """Return the name of the datum of the option, else of the project."""
         return self.datum or project.options.datum
 
     def loss_of(self, project: Project) -> Loss | None:
-        """Return the robust loss: what is chosen, else that of the project; None for least squares."""
+        """Return the robust loss of the option, else of the project; None for least squares."""
         if self.loss is None:
             return project.options.loss
         return None if self.loss == "none" else self.loss
@@ -63,7 +63,7 @@ class Choices:
         project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
         options = project.options
         if self.hold and self.datum in ("inner", "minimum"):
-            raise typer.BadParameter("cannot be combined with --hold", param_hint="--datum")
+            raise misuse("--datum", "conflict", options="--hold")
         return project.replace(
             options=replace(
                 options,

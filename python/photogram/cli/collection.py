@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Basis, Found, snooped
+from photogram.cli.command_classes import misuse
+from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, snooped
 from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
-from photogram.cli.job import InputFile, Job, OutputFolder, Without, with_job
-from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, UnitWeight, check_alone, example_out
-from photogram.cli.progress import adjustment_status
+from photogram.cli.job import InputFile, Job, OutputFolder, Without, adjustment_status, with_job
+from photogram.cli.options import OrderingName, Quiet, Snooping, Threads, UnitWeight, check_alone
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ PACKED = (".bz2", ".gz")
 
 @dataclass(frozen=True)
 class CollectionFit:
-    """What is minimised, and when that ends, with the options that say it."""
+    """Options for the loss function and its minimization."""
 
     loss: Literal["squares", "huber", "cauchy"] = "squares"
     scale: float | None = None
@@ -40,7 +41,7 @@ class CollectionFit:
         if self.loss != "squares":
             return self.loss if self.scale is None else (self.loss, self.scale)
         if self.scale is not None:
-            raise typer.BadParameter("is that of a loss: give --loss too", param_hint="--scale")
+            raise misuse("--scale", "requires", options="--loss")
         return None
 
 
@@ -63,48 +64,46 @@ def collection(
 ) -> None:
     """Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values."""
     if out is not None and out.suffix in (".txt", *PACKED) and not out.exists():
-        raise typer.BadParameter("names a directory; adjusted.txt goes there", param_hint="--out")
-    with job:
-        from photogram.collection import to_bytes
-        from photogram.collection.formats import recognised
-        from photogram.show.forms import text
+        raise misuse("--out", "folder", name="adjusted.txt")
+    from photogram.collection import to_bytes
+    from photogram.collection.formats import recognised
+    from photogram.show.forms import text
 
-        if problem is None:
-            problem = job.packaged(*EXAMPLE)
-            out = example_out(out, documents.plots, "example-adjusted")
-            job.reads(problem)
-        packing = problem.suffix if problem.suffix in PACKED else ""
-        photos, found = recognised(problem)
-        adjusted = f"adjusted{found.suffix}{packing}"
-        documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
-        pictures = documents.pictures(job, out)
-        photos = photos.replace(image_sd=fit.sd)
-        if snooping.snoop:
-            check_alone(job, "--snoop", ("--loss", "--scale"))
-        # Nothing vouches for --sd: the default is not that of blocks.
-        snooping = replace(snooping, unit_weight=unit_weight)
-        result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
-        result = result.estimated(job, photos, components, threads)
-        written = pictures.of(result.result)
-        if out is not None:
-            written[out / TEXT] = text(result.document).encode()
-            written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
-            written |= result.files(out)
-        title = problem.name
-        written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
-        written |= documents.as_json(result.told)
+    if example and documents.plots:
+        out = out or Path("example-adjusted")
+    problem = job.input(problem, *EXAMPLE)
+    packing = problem.suffix if problem.suffix in PACKED else ""
+    photos, found = recognised(problem)
+    adjusted = f"adjusted{found.suffix}{packing}"
+    documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
+    documents.check_plots(job, out)
+    photos = photos.replace(image_sd=fit.sd)
+    if snooping.snoop:
+        check_alone(job, "--snoop", ("--loss", "--scale"))
+    # Nothing vouches for --sd: the default is not that of blocks.
+    snooping = replace(snooping, unit_weight=unit_weight)
+    result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
+    result = result.estimated(job, photos, components, threads)
+    written = documents.plots_of(result.result, out)
+    if out is not None:
+        written[out / TEXT] = text(result.document).encode()
+        written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
+        written |= result.files(out)
+    title = problem.name
+    written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
+    written |= documents.as_json(result.subject)
 
-        def summarize() -> None:
-            print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
-            print_summary(result.document, "the report")
+    def summarize() -> None:
+        print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
+        print_summary(result.document, "the report")
 
-        job.finish(
-            written,
-            documents.data(result.result),
-            documents.charts(result.result),
-            summary=summarize,
-            code=result.verdict.exit_code(strict=strict),
-        )
+    job.finish(
+        written,
+        documents.data(result.result),
+        documents.charts(result.result),
+        summary=summarize,
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 def _adjusted(
@@ -115,7 +114,7 @@ def _adjusted(
     components: list[Basis] | None,
     ordering: OrderingName,
     threads: int | None,
-) -> Found[AdjustedCollection]:
+) -> AdjustmentOutcome[AdjustedCollection]:
     """Adjust a collection, or take gross errors out of it, with the progress on standard error."""
     from photogram.collection import AdjustedCollection, adjust
 
@@ -127,10 +126,10 @@ def _adjusted(
             "progress": progress,
         }
         if not snooping.snoop:
-            return Found(
+            return AdjustmentOutcome(
                 adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
             )
         log, made = snooped(photos, components, threads, options | snooping.options)
         if not isinstance(log.result, AdjustedCollection):
             raise TypeError("a collection gives the result of a collection")
-        return Found(log.result, log, made)
+        return AdjustmentOutcome(log.result, log, made)

@@ -13,6 +13,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.models import OptionInfo
 
+from photogram.words import phrase
+
 
 @cache
 def declarations() -> dict[str, tuple[str, str | None, str]]:
@@ -27,6 +29,11 @@ def declarations() -> dict[str, tuple[str, str | None, str]]:
             placeholder, text = (None, texts) if isinstance(texts, str) else texts
             table[name.strip('"')] = panel, placeholder, text
     return table
+
+
+def misuse(option: str, code: str, /, **fields: Any) -> typer.BadParameter:
+    """Return the error of an option or argument: a code of the family `usage` with fields."""
+    return typer.BadParameter(str(phrase(f"usage.{code}", **fields)), param_hint=option)
 
 
 def declared(parameter: Parameter, owner: str) -> Parameter:
@@ -47,7 +54,7 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
 
 
 class Command(TyperCommand):
-    """A command whose help has panels, and says of a switch nothing but what it does."""
+    """A command whose help has panels and switches without a type."""
 
     def __init__(self, *args: Any, **values: Any) -> None:
         super().__init__(*args, **values)
@@ -67,9 +74,9 @@ class Command(TyperCommand):
 
 
 class GroupWithMain(TyperGroup):
-    """A group whose first command is run when the first word names none.
+    """A group whose first command is the default command.
 
-    The job that people come for needs no name; a directory with the name of a side command is `./check`.
+    A folder with the name of a side command must be written as `./check`.
     """
 
     def list_commands(self, ctx: Any) -> list[str]:
@@ -77,7 +84,7 @@ class GroupWithMain(TyperGroup):
         return list(self.commands)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command; the help of the main one, which is that of the group, names the others."""
+        """Return a command; the help of the main command lists the others."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and cmd_name == self._main:
             others = [self.commands[name] for name in self.list_commands(ctx) if name != self._main]
@@ -97,7 +104,7 @@ class GroupWithMain(TyperGroup):
         return list(super().parse_args(ctx, args))
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Return the side commands, and what the main command begins with."""
+        """Return completions: the side commands and those words that complete the main command."""
         main = self.commands[self._main]
         with main.make_context(self._main, [], parent=ctx, resilient_parsing=True) as own:
             return [*super().shell_complete(ctx, incomplete), *main.shell_complete(own, incomplete)]

@@ -1,8 +1,4 @@
-"""The commands: one for each program, and what goes with blocks of any format.
-
-A command is loaded when it is called: of the others the command line knows no more than their help, so that
-each of them, and `photogram --help`, is quick.
-"""
+"""The commands of all programs. Each is loaded when it is called, so that other commands are quick."""
 
 from __future__ import annotations
 
@@ -38,11 +34,11 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
     ),
     "info": (
         "Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.",
-        "info.info",
+        "project_commands.info",
     ),
     "convert": (
         "Write a project in another format and list the data that the format cannot contain.",
-        "convert.convert",
+        "project_commands.convert",
     ),
     "convert-lens": (
         "Fit a lens of another model to a camera and report the differences.",
@@ -50,7 +46,7 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
     ),
     "metadata": (
         "List positions of photographs from their files: EXIF, XMP, .MRK, geo.txt ...; write a table.",
-        "metadata.metadata",
+        "project_commands.metadata",
     ),
     "features": (
         "Fit distances, lines, planes, circles, spheres and cylinders to adjusted points, with k and U.",
@@ -60,7 +56,7 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Write an accuracy statement of a block by published standards: page, PDF, JSON document, tables.",
         "statement.statement",
     ),
-    "new": ("Write a small real project as tables with comments on their contents.", "new.new"),
+    "new": ("Write a small real project as tables with comments on their contents.", "project_commands.new"),
     "collection": (
         "Adjust photos of unknown cameras by Levenberg-Marquardt steps from any initial values.",
         "collection.collection",
@@ -112,17 +108,11 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         },
     ),
 }
-"""What each is for, and the file and function that do it: those of side commands, the main one first."""
+"""Purpose of each command, and file and function; a group lists its commands, the main command first."""
 
 
 def application(word: str | None = None) -> typer.Typer:
-    """Return the command line.
-
-    Parameters
-    ----------
-    word
-        The first one that was given: only the command that it names is loaded. None: all are.
-    """
+    """Return the command line."""
     made = typer.Typer(
         name="photogram",
         help="Photogrammetric least-squares adjustment with the covariance of every result.",
@@ -151,7 +141,7 @@ def _function(home: str) -> Any:
 
 
 def _not_loaded() -> None:
-    """Stand for a command that was not called."""
+    """Replace a command that is not loaded."""
 
 
 def _version(asked: bool) -> None:

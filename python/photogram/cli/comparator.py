@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import output, print_remark, print_withheld
+from photogram.cli.console import print_document, print_remark, print_withheld
 from photogram.cli.documents import Documents, PageAndJson
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
 from photogram.cli.options import Quiet, default_out
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
@@ -54,54 +54,43 @@ def comparator(
     Writes listing.txt, report.html (with plots), correction.json and the corrected grid of each plate. If the
     verdict forbids their use because of outliers, correction and grid are withheld. The exit code is 4.
     """
-    with job:
-        from photogram.comparator import Options, calibrate, find_grid, read
-        from photogram.errors import InputError
-        from photogram.statistics.verdict import worst
+    from photogram.comparator import Options, calibrate, find_grid, read
+    from photogram.errors import InputError
+    from photogram.statistics.verdict import worst
 
-        if example:
-            paths = [job.packaged(*EXAMPLE)]
-            job.reads(*paths)
-            out = out or Path("comparator-calibrated")
-        left_handed = None if hand == "file" else hand == "left"
-        sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
-        options = Options.as_published() if as_published else Options()
-        options = replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
-        if each_case:
-            sessions = [replace(session, plot_each_case=True) for session in sessions]
-        calibrations = [calibrate(session, options) for session in sessions]
-        if strict:
-            for message in (message for one in calibrations for message in one.messages):
-                raise InputError(
-                    message.text, file=message.file, record=message.record, text=message.record_text
-                )
-        folder = out or default_out((paths or [])[0], "-calibrated")
-        job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
-        several = len(calibrations) > 1
-        placed = {folder / str(k) if several else folder: one for k, one in enumerate(calibrations, 1)}
-        written = _results(placed, _run_date(date), pdf=pdf and plots, quiet=quiet)
-        if documents.html is not None or (plots and not pdf):
-            written |= _pages(job, placed, documents)
-        asked = {json: _document(calibrations)} if json is not None else {}
-        job.write(written, asked)
-        _print_withheld(placed)
-        code = worst(calibration.verdict for calibration in calibrations)
-        job.conclude([*written, *asked], summary=lambda: _summarize(calibrations), code=code)
-
-
-def _print_withheld(placed: dict[Path, Calibration]) -> None:
-    """Say which corrections must not be used, and which files of earlier runs are not of this one."""
-    for place, calibration in placed.items():
-        if not calibration.usable:
-            print_withheld(
-                f"comparator {calibration.session.comparator}: the correction is withheld:"
-                f" {calibration.verdict.headline}",
-                _corrections(calibration, place),
-            )
+    if example:
+        paths = [job.input(None, *EXAMPLE)]
+        out = out or Path("comparator-calibrated")
+    left_handed = None if hand == "file" else hand == "left"
+    sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
+    options = Options.as_published() if as_published else Options()
+    options = replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
+    if each_case:
+        sessions = [replace(session, plot_each_case=True) for session in sessions]
+    calibrations = [calibrate(session, options) for session in sessions]
+    if strict:
+        for message in (message for one in calibrations for message in one.messages):
+            text = message.phrase or str(message.text)
+            raise InputError(text, file=message.file, record=message.record, text=message.record_text)
+    folder = out or default_out((paths or [])[0], "-calibrated")
+    job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
+    several = len(calibrations) > 1
+    placed = {folder / str(k) if several else folder: one for k, one in enumerate(calibrations, 1)}
+    written = _results(placed, _run_date(date), pdf=pdf and plots, quiet=quiet)
+    if documents.html is not None or (plots and not pdf):
+        written |= _pages(job, placed, documents)
+    asked = {json: _document(calibrations)} if json is not None else {}
+    job.write(written, asked)
+    for place, one in placed.items():
+        if not one.usable:
+            fields = {"comparator": one.session.comparator, "reason": one.verdict.headline}
+            print_withheld(phrase("command.correction-withheld", **fields), _corrections(one, place))
+    code = worst(calibration.verdict for calibration in calibrations)
+    job.conclude([*written, *asked], summary=lambda: _summarize(calibrations), code=code)
 
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
-    """Make what measurements are corrected by: corrections and corrected grids."""
+    """Return the files for the correction of measurements: corrections and corrected grids."""
     from photogram.comparator.calibration import adjusted_grid, corrected_grid
 
     made = {place / "correction.json": calibration.correction.to_json()}
@@ -115,10 +104,9 @@ def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
 
 
 def _run_date(date: str | None) -> str:
-    """Return the date of the run: as it is said, as the environment says, or today (UTC)."""
+    """Return the date of the run from the option, the environment, or today (UTC)."""
     from photogram.errors import InputError
     from photogram.io.numbers import whole_number
-    from photogram.messages import quoted
 
     if date is not None:
         return date if date.isprintable() else repr(date)
@@ -127,11 +115,11 @@ def _run_date(date: str | None) -> str:
         seconds = whole_number(epoch) if epoch else time.time()
         return datetime.fromtimestamp(seconds, UTC).date().isoformat()
     except (ValueError, OverflowError, OSError):
-        raise InputError(f"SOURCE_DATE_EPOCH is {quoted(epoch)}: no seconds since 1970") from None
+        raise InputError(phrase("command.epoch", value=epoch)) from None
 
 
 def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet: bool) -> dict[Path, bytes]:
-    """Make everything that goes to the output directory, before anything is written."""
+    """Return all files of the output folder except pages."""
     from photogram.comparator import listing
 
     written: dict[Path, bytes] = {}
@@ -144,7 +132,7 @@ def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet
             written |= {place / "report.pdf": _pdf(one, run_date) for place, one in placed.items()}
         except ModuleNotFoundError:
             if not quiet:
-                print_remark("no report.pdf: pip install 'photogram[pdf]'")
+                print_remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
     return written
 
 
@@ -172,13 +160,9 @@ def _document(calibrations: list[Calibration]) -> bytes:
 
 def _summarize(calibrations: list[Calibration]) -> None:
     """Print verdict, analysis of variance, linear parameters and problems of each."""
-    from photogram.show.forms import summary
-
     for calibration in calibrations:
-        for line in summary(calibration.document(), "variance", "linear"):
-            output.print(escape(line))
-        for message in calibration.messages:
-            print_remark(message.text)
+        remarks = [message.text for message in calibration.messages]
+        print_document(calibration.document(), "variance", "linear", remarks=remarks)
 
 
 @with_job
@@ -197,20 +181,19 @@ def correct(
     Adds the columns corrected_x_um, corrected_y_um, sd_x_um, sd_y_um (standard deviation of the calibration),
     and in_range (no outside the calibrated range). Points far outside are rejected.
     """
-    with job:
-        from photogram.comparator.apply import correct_table
-        from photogram.comparator.correction import Correction
-        from photogram.comparator.csvfile import read_table
+    from photogram.comparator.apply import correct_table
+    from photogram.comparator.correction import Correction
+    from photogram.comparator.csvfile import read_table
 
-        made, remarks = correct_table(
-            Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
-        )
-        if not quiet:
-            for remark in remarks:
-                print_remark(remark)
-        if corrected is None:
-            typer.echo(made.decode(), nl=False)
-        job.finish({corrected: made} if corrected else {})
+    made, remarks = correct_table(
+        Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
+    )
+    if not quiet:
+        for remark in remarks:
+            print_remark(remark)
+    if corrected is None:
+        typer.echo(made.decode(), nl=False)
+    job.finish({corrected: made} if corrected else {})
 
 
 @with_job
@@ -228,25 +211,24 @@ def compare_calibrations(
     Writes report.html and the coordinates of each plate from all calibrations. Exit code 4: a comparator or
     grid has changed. Grids that do not agree with their readings are withheld.
     """
-    with job:
-        from photogram.comparator import compare as compared
+    from photogram.comparator import compare as compared
 
-        if example:
-            from photogram.comparator.simulation import simulated_years
+    if example:
+        from photogram.comparator.simulation import simulated_years
 
-            found = compared(simulated_years())
-            folder = out or Path("comparator-compared")
-        else:
-            paths = calibrations or []
-            found = compared(paths)
-            folder = out or default_out(paths[0], "-compared")
-        grids = found.grids if found.usable_grids else {}
-        documents.conclude(
-            job,
-            "comparator compare",
-            found,
-            folder,
-            text=False,
-            more={folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
-            tables=("calibrations", "series"),
-        )
+        found = compared(simulated_years())
+        folder = out or Path("comparator-compared")
+    else:
+        paths = calibrations or []
+        found = compared(paths)
+        folder = out or default_out(paths[0], "-compared")
+    grids = found.grids if found.usable_grids else {}
+    documents.conclude(
+        job,
+        "comparator compare",
+        found,
+        folder,
+        text=False,
+        more={folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
+        tables=("calibrations", "series"),
+    )

@@ -1,4 +1,4 @@
-"""Variance components on the command line, and what the variance of unit weight is based on."""
+"""Variance components on the command line, and the basis of the variance of unit weight."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
-from photogram.cli.job import Job
-from photogram.cli.progress import estimation_status
+from photogram.cli.job import Job, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -22,15 +21,13 @@ if TYPE_CHECKING:
 
 Network = TypeVar("Network", bound="AdjustedNetwork")
 COMPONENTS = "components.txt"
-"""What goes to the output directory where variance components are asked for."""
 
 
 UnitVarianceName = Literal["constrained", "unity", "redundancy"]
-"""What the variance of unit weight is based on."""
 
 
 class Basis(StrEnum):
-    """What groups of observations are made by."""
+    """Criteria for groups of observations."""
 
     KIND = "kind"
     CAMERA = "camera"
@@ -48,7 +45,7 @@ def _groups(bases: list[Basis]) -> list[str]:
 def snooped(
     network: object, bases: list[Basis] | None, threads: int | None, options: Mapping[str, Any]
 ) -> tuple[Snooped, Cleaned | None]:
-    """Take gross errors out, with options of snooping; where weights are asked for, estimate them in turn."""
+    """Remove gross errors; estimate weights alternately if components are requested."""
     if bases:
         from photogram.adjustment.cleaning import clean
 
@@ -60,32 +57,29 @@ def snooped(
 
 
 @dataclass(frozen=True)
-class Found(Generic[Network]):
-    """What the adjustment of a network gave: the result, and of what else was asked for."""
+class AdjustmentOutcome(Generic[Network]):
+    """The outcome of an adjustment: result, removed observations, variance components."""
 
     result: Network
     log: Snooped | None = None
-    """What was taken out."""
-    made: Cleaned | None = None
-    """Weights and what was taken out, found in turn."""
-    components: VarianceComponents | None = None
-    """Of the given weights, which the result keeps."""
+    cleaned: Cleaned | None = None  # Weights and removed observations of an alternating estimation
+    components: VarianceComponents | None = None  # Of the given weights, which the result retains
 
     @property
-    def told(self) -> Snooped | Network:
-        """What reports are of."""
+    def subject(self) -> Snooped | Network:
+        """The subject of reports."""
         return self.log or self.result
 
     @property
     def verdict(self) -> Verdict:
-        """What the command ends by."""
-        return (self.components or self.told).verdict
+        """The verdict that determines the exit code."""
+        return (self.components or self.subject).verdict
 
     def estimated(
         self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
-    ) -> Found[Network]:
-        """Return it with the components that are asked for, where they are not found already."""
-        if self.made is not None or not bases:
+    ) -> AdjustmentOutcome[Network]:
+        """Return the outcome with requested components if it lacks them."""
+        if self.cleaned is not None or not bases:
             return self
         from photogram.adjustment.components import variance_components
 
@@ -94,8 +88,8 @@ class Found(Generic[Network]):
         return replace(self, components=found)
 
     def files(self, out: Path) -> dict[Path, bytes]:
-        """Return what goes to the output directory of variance components."""
-        weights = self.made or self.components
+        """Return the file of variance components in the output folder."""
+        weights = self.cleaned or self.components
         return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
 
     @cached_property
@@ -103,7 +97,7 @@ class Found(Generic[Network]):
         """The document of the report, with weights and removed observations."""
         from photogram.results.components_document import weighed_document
 
-        if self.made is not None:
-            return self.made.document()
-        network = self.told.document()
+        if self.cleaned is not None:
+            return self.cleaned.document()
+        network = self.subject.document()
         return network if self.components is None else weighed_document(self.components, network)

@@ -1,4 +1,4 @@
-"""What all commands share: where and what they print, and how they fail."""
+"""Output and errors of all commands."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from photogram.cli.streams import stream_fault
+from photogram.cli.process import stream_fault
 from photogram.messages import printable
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
@@ -52,7 +53,7 @@ output = Console(highlight=False, soft_wrap=True)
 
 
 def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
-    """Print titled sections with lines, of each at most `most`; `whole` says where the others are."""
+    """Print titled sections with at most `most` lines each; `whole` names the file with all lines."""
     for title, lines in summary:
         if not lines:
             continue
@@ -70,8 +71,18 @@ def print_summary(document: Document, whole: str, *keys: str) -> None:
     print_sections(titled_lines(document, *SUMMARY, *keys), whole)
 
 
+def print_document(document: Document, *tables: str, remarks: Iterable[object] = ()) -> None:
+    """Print the summary of a document with some tables, then remarks."""
+    from photogram.show.forms import summary
+
+    for line in summary(document, *tables):
+        output.print(escape(line))
+    for remark in remarks:
+        print_remark(remark)
+
+
 def print_written(paths: Iterable[Path], to: Console = output) -> None:
-    """Say which files were written, if any."""
+    """Print the names of written files."""
     if names := ", ".join(str(path) for path in paths):
         to.print(f"written: {escape(printable(names))}")
 
@@ -83,28 +94,28 @@ def print_report(paths: Iterable[Path], to: Console = output) -> None:
         to.print(f"open in a browser: {escape(printable(', '.join(map(str, pages))))}")
 
 
-def print_withheld(what: str, paths: Iterable[Path]) -> None:
-    """Say what is withheld and why, and which of its files are there from an earlier run."""
-    errors.print(f"[bold red]error:[/] {escape(what)}")
+def print_withheld(message: Phrase, paths: Iterable[Path]) -> None:
+    """Print why files are withheld, and which of them are from an earlier run."""
+    errors.print(f"[bold red]error:[/] {escape(str(message))}")
     for path in paths:
         if path.exists():
-            print_remark(f"{path} is from an earlier run")
+            print_remark(phrase("command.earlier-run", file=path))
 
 
 def print_remark(text: object) -> None:
-    """Print a remark beside the results."""
+    """Print a remark on standard error."""
     errors.print(f"[yellow]remark:[/] {escape(str(text))}")
 
 
 @contextmanager
 def failures() -> Iterator[None]:
-    """Turn errors of the input and of the adjustment into a message and an exit code."""
+    """Convert errors of the input and of the adjustment to a message and an exit code."""
     from photogram.errors import AdjustmentError, ContradictionError, PhotogramError
 
     try:
         yield
     except MemoryError as error:
-        _fail(str(error) or "there is not enough memory", INPUT_ERROR)
+        _fail(str(error) or str(phrase("command.memory")), INPUT_ERROR)
     except AdjustmentError as error:
         _fail(str(error), NOT_CONVERGED)
     except ContradictionError as error:
@@ -115,7 +126,7 @@ def failures() -> Iterator[None]:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        _fail(f"{package} is needed: pip install 'photogram[{EXTRAS[package]}]'", INPUT_ERROR)
+        _fail(str(phrase("command.missing-package", package=package, extra=EXTRAS[package])), INPUT_ERROR)
     except OSError as error:
         # Files are named where they are read and written; what is left are the standard streams.
         if error.filename is None:

@@ -1,4 +1,4 @@
-"""`photogram convert-lens`: the lens of another model that shows what a camera shows."""
+"""`photogram convert-lens`: fit a lens of another model to a camera."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import output
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
 from photogram.cli.options import Quiet, pair
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.network.cameras import Camera
@@ -23,7 +25,7 @@ BEYOND_TOLERANCE = 4
 
 @dataclass(frozen=True)
 class LensFit:
-    """How a lens is fitted, with the options that say it."""
+    """Options for the fit of a lens."""
 
     radius: Annotated[float, typer.Option(min=1.0, show_default=False)] = math.inf
     distances: Annotated[str, typer.Option("--distance")] = "inf"
@@ -37,7 +39,8 @@ class LensFit:
         try:
             distances = [float(each) for each in self.distances.split(",")]
         except ValueError:
-            raise typer.BadParameter("is numbers with commas between them", param_hint="--distance") from None
+            form = "numbers separated by commas"
+            raise misuse("--distance", "form", form=form, value=self.distances) from None
         return convert_lens(
             camera,
             to,
@@ -72,24 +75,23 @@ def convert_lens(
     from photogram.show.forms import summary
 
     if plots and out is None:
-        raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
-    with job:
-        source, known = _camera(job, path, camera)
-        extent = known if size is None else pair(size, "--size")
-        if extent is None:
-            raise typer.BadParameter(f"is needed: {path} does not say it", param_hint="--size")
-        with job.status("fitting the lens"):
-            found = fit.converted(source, to, extent)
-        job.finish(
-            {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
-            {} if json is None else {json: found.to_json()},
-            summary=lambda: output.print("\n".join(summary(found.document())), markup=False),
-            code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
-        )
+        raise misuse("--plots", "requires", options="--out DIR")
+    source, known = _camera(job, path, camera)
+    extent = known if size is None else pair(size, "--size")
+    if extent is None:
+        raise misuse("--size", "no-size", file=path)
+    with job.status("fitting the lens"):
+        found = fit.converted(source, to, extent)
+    job.finish(
+        {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
+        {} if json is None else {json: found.to_json()},
+        summary=lambda: output.print("\n".join(summary(found.document())), markup=False),
+        code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
+    )
 
 
 def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, int] | None]:
-    """Read a camera whose pixels count from the centre of the first, and the size of its pictures."""
+    """Return a camera with coordinates from the center of the first pixel, and its image size."""
     from photogram.errors import InputError
     from photogram.formats import read
     from photogram.formats.targets.calibrations import MIDDLE, shifted
@@ -101,15 +103,15 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
     project = read(path)
     names = project.block.camera_names
     if name is None and len(names) != 1:
-        raise typer.BadParameter(f"is one of {', '.join(names)}", param_hint="--camera")
+        raise misuse("--camera", "several", names=names)
     if name is not None and name not in names:
-        raise InputError(f"there is no camera {name}, but {', '.join(names)}", file=path)
+        raise InputError(phrase("command.no-camera", camera=name, names=names), file=path)
     row = 0 if name is None else names.index(name)
     return shifted(project.block.cameras[row], -MIDDLE), project.sizes[row]
 
 
 def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
-    """Make what goes to the directory: the camera in each format that can hold it."""
+    """Return the files of the output folder: the camera in each format that can contain it."""
     from photogram.errors import InputError
     from photogram.targets.drawing import plot_difference
     from photogram.targets.output.formats import CAMERA_FORMATS

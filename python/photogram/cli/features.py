@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photogram.cli.adjust import result_at
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_sections
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, with_job
 from photogram.cli.options import Quiet, Threads
@@ -17,13 +18,9 @@ if TYPE_CHECKING:
     from photogram.results.features import Definition
 
 
-def _option(kind: str, what: str) -> Any:
-    return typer.Option(f"--{kind}", metavar="NAME=POINT,..", help=what)
-
-
 @dataclass(frozen=True)
 class FeatureOptions:
-    """Features, with the options that say what they go through; all may be given more than once."""
+    """Definitions of features; all options can be repeated."""
 
     distance: list[str] | None = None
     line: list[str] | None = None
@@ -33,15 +30,15 @@ class FeatureOptions:
     cylinder: list[str] | None = None
 
     def definitions(self) -> dict[str, Definition]:
-        """Return what is asked for, by its name."""
+        """Return the requested features by name."""
         found: dict[str, Definition] = {}
         for each in fields(self):
             for given in getattr(self, each.name) or ():
                 name, equals, points = (part.strip() for part in given.partition("="))
                 if not (name and equals and points):
-                    raise typer.BadParameter(f"{given} is not NAME=POINT,...", param_hint=f"--{each.name}")
+                    raise misuse(f"--{each.name}", "form", form="NAME=POINT,...", value=given)
                 if name in found:
-                    raise typer.BadParameter(f"two features are called {name}", param_hint=f"--{each.name}")
+                    raise misuse(f"--{each.name}", "feature-repeated", name=name)
                 found[name] = (each.name, [point.strip() for point in points.split(",")])
         return found
 
@@ -69,29 +66,28 @@ def features(
     metrology`.
     """
     path = job.packaged("flange") if path is None else path
-    with job:
-        from photogram import features as fitted
-        from photogram.formats.adjusted import feature_files
-        from photogram.io.json import to_json
-        from photogram.results.features_report import features_document, features_section
-        from photogram.show.forms import titled_lines
-        from photogram.show.judgement import judged
-        from photogram.show.page import Document
+    from photogram import features as fitted
+    from photogram.formats.adjusted import feature_files
+    from photogram.io.json import to_json
+    from photogram.results.features_report import features_document, features_section
+    from photogram.show.forms import titled_lines
+    from photogram.show.judgement import judged
+    from photogram.show.page import Document
 
-        definitions = wanted.definitions()
-        result, project = result_at(job, path, added, threads, fitted=False)
-        if project is not None:
-            declared = dict(project.features)
-        else:
-            declared = {} if result.features is None else result.features.definitions
-        if not (definitions or declared):
-            raise typer.BadParameter("name what to fit: --circle bore=p1,p2,p3 ...", param_hint="PATH")
-        found = fitted(result, definitions or declared, k=k, coverage=coverage)
-        verdict = result.verdict
-        document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
-        job.finish(
-            {} if out is None else {out / name: each for name, each in feature_files(found).items()},
-            {} if json is None else {json: to_json(features_document(found))},
-            summary=lambda: print_sections(titled_lines(document), "--json FILE"),
-            code=verdict.exit_code(strict=strict),
-        )
+    definitions = wanted.definitions()
+    result, project = result_at(job, path, added, threads, fitted=False)
+    if project is not None:
+        declared = dict(project.features)
+    else:
+        declared = {} if result.features is None else result.features.definitions
+    if not (definitions or declared):
+        raise misuse("PATH", "no-features")
+    found = fitted(result, definitions or declared, k=k, coverage=coverage)
+    verdict = result.verdict
+    document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
+    job.finish(
+        {} if out is None else {out / name: each for name, each in feature_files(found).items()},
+        {} if json is None else {json: to_json(features_document(found))},
+        summary=lambda: print_sections(titled_lines(document), "--json FILE"),
+        code=verdict.exit_code(strict=strict),
+    )

@@ -13,6 +13,7 @@ from photogram.cli.options import Quiet, Threads, default_out
 from photogram.cli.projects import NOTHING, Additions, read_project
 from photogram.lazy_dataclasses import replace
 from photogram.messages import counted
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -39,18 +40,17 @@ def film(
 
     PATH is a plain project with films. One adjustment contains the films. The other one uses films that were
     fitted to their marks before, without errors. The report lists the differences of points and standard
-    deviations. Verdict and exit code are those of one step.
+    deviations. Verdict and exit code are of one step.
 
     --example is the project of `photogram new --kind archive`.
     """
     source = job.packaged(*EXAMPLE) if path is None else path
-    target = out or (Path("example-film") if example else default_out(source, "-film"))
-    with job:
-        from photogram.film import compare_steps
+    target = out or default_out(source, "-film", example)
+    from photogram.film import compare_steps
 
-        found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
-        code = found.inside.verdict.exit_code(strict=strict)
-        documents.conclude(job, "film", found, target, code=code)
+    found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
+    code = found.inside.verdict.exit_code(strict=strict)
+    documents.conclude(job, "film", found, target, code=code)
 
 
 def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: int | None) -> Result:
@@ -60,7 +60,7 @@ def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: in
     settings = [*(added.settings or []), f"film.interior={interior}"]
     project = read_project(job, path, replace(added, settings=settings))
     if not project.block.passages:
-        raise InputError("has no photo on film: a column `film` of its photos says which are", file=path)
+        raise InputError(phrase("command.no-film"), file=path)
     block, started = started_block(project, keep_all=False)
     return adjusted_block(job, project, started or block, threads=threads)
 
@@ -80,20 +80,19 @@ def marks(
     `fiducials.csv` and `fiducial_images.csv` of a plain project. From a project it writes the same files of
     MicMac.
     """
-    with job:
-        from photogram.formats.micmac import has_marks, write_marks
+    from photogram.formats.micmac import has_marks, write_marks
 
-        if has_marks(path):
-            files, told = _tables(job, path, name)
-        else:
-            files = write_marks(read_project(job, path, NOTHING))
-            told = [("For MicMac", [counted(len(files), "file")])]
-        written = {} if out is None else {out / file: content for file, content in files.items()}
-        job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
+    if has_marks(path):
+        files, told = _tables(job, path, name)
+    else:
+        files = write_marks(read_project(job, path, NOTHING))
+        told = [("For MicMac", [counted(len(files), "file")])]
+    written = {} if out is None else {out / file: content for file, content in files.items()}
+    job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
 
 
 def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], list[Section]]:
-    """Return the tables of the marks of MicMac by their files, and what is told of them."""
+    """Return tables of the marks of MicMac from its files, and remarks."""
     from photogram.formats.micmac import read_marks
     from photogram.io.csv_text import csv_text
 

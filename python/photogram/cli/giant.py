@@ -10,10 +10,11 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
-from photogram.cli.components import COMPONENTS, Basis, Found, UnitVarianceName, snooped
+from photogram.cli.command_classes import misuse
+from photogram.cli.components import COMPONENTS, AdjustmentOutcome, Basis, UnitVarianceName, snooped
 from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
-from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
+from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, adjustment_status, with_job
 from photogram.cli.options import (
     AirModel,
     OrderingName,
@@ -24,8 +25,8 @@ from photogram.cli.options import (
     check_alone,
     default_out,
 )
-from photogram.cli.progress import adjustment_status
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Block, Progress, Result
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from photogram.giant.common import Common
 
 RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
-"""What goes to the output directory."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class GiantOptions:
     water_index: Annotated[float | None, typer.Option(min=1)] = None
 
     def basis(self, common: Common) -> UnitVariance:
-        """Return what the variance of unit weight is based on."""
+        """Return the basis of the variance of unit weight."""
         said = common.unit_variance if self.as_published else common.unbiased_variance
         return self.unit_variance or said
 
@@ -77,49 +77,43 @@ def giant(
     Writes FRAMES and GROUND (adjusted, if converged), RESTART (stations of the last iteration), report.html
     and report.txt.
     """
-    with job:
-        from photogram.show.forms import text
+    from photogram.show.forms import text
 
-        check_maps(documents.map)
-        if directory is None:
-            directory = job.packaged(EXAMPLE)
-            job.reads(directory)
-            out = out or Path(f"{EXAMPLE}-adjusted")
-        out = _output_directory(directory, out, overwrite)
-        documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
-        pictures = documents.pictures(job, out)
-        project, block, allowed = _project_and_block(job, directory, limits, how)
-        if snooping.snoop:
-            check_alone(job, "--snoop", ("--as-published",))
-            if project.common.intersection_only:
-                raise typer.BadParameter(
-                    "needs photos that are adjusted: column 10 of the second record of COMMON requests an"
-                    " intersection only; leave it blank",
-                    param_hint="--snoop",
-                )
-        found = _adjusted_project(job, project, block, how, threads, snooping)
-        written = _result_files(project, block, found, out, how.as_published)
-        found = found.estimated(job, block, how.components, threads)
-        written |= found.files(out) | pictures.of(found.result)
-        written[out / "report.txt"] = text(found.document).encode()
-        asked = documents.page(job, "giant", out, lambda: found.document) | documents.as_json(found.told)
-        if listing is not None:
-            from photogram.giant import listing as printout
+    check_maps(documents.map)
+    if directory is None:
+        out = out or Path(f"{EXAMPLE}-adjusted")
+    directory = job.input(directory, EXAMPLE)
+    out = _output_directory(directory, out, overwrite)
+    documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
+    documents.check_plots(job, out)
+    project, block, allowed = _project_and_block(job, directory, limits, how)
+    if snooping.snoop:
+        check_alone(job, "--snoop", ("--as-published",))
+        if project.common.intersection_only:
+            raise misuse("--snoop", "intersection-only")
+    found = _adjusted_project(job, project, block, how, threads, snooping)
+    written = _result_files(project, block, found, out, how.as_published)
+    found = found.estimated(job, block, how.components, threads)
+    written |= found.files(out) | documents.plots_of(found.result, out)
+    written[out / "report.txt"] = text(found.document).encode()
+    asked = documents.page(job, "giant", out, lambda: found.document) | documents.as_json(found.subject)
+    if listing is not None:
+        from photogram.giant import listing as printout
 
-            pages = printout(project, block, found.result, as_published=how.as_published, limits=allowed)
-            asked[listing] = pages.encode()
-        job.finish(
-            written,
-            asked,
-            documents.data(found.result),
-            documents.charts(found.result, quiet=quiet),
-            summary=lambda: print_summary(found.document, "report.txt"),
-            code=found.verdict.exit_code(strict=strict),
-        )
+        pages = printout(project, block, found.result, as_published=how.as_published, limits=allowed)
+        asked[listing] = pages.encode()
+    job.finish(
+        written,
+        asked,
+        documents.data(found.result),
+        documents.charts(found.result, quiet=quiet),
+        summary=lambda: print_summary(found.document, "report.txt"),
+        code=found.verdict.exit_code(strict=strict),
+    )
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Choose where results go: not over another project unless told, and then not beside its files."""
+    """Return the output folder; reject the folder of another project without --overwrite."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
@@ -130,18 +124,18 @@ def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Pat
     present = present_files(out)
     inputs = [path.name for name in ("COMMON", "CAMERAS", "IMAGES") for path in present[name]]
     if inputs and not overwrite:
-        raise InputError(f"holds another project ({', '.join(inputs)}); --overwrite allows it", file=out)
+        raise InputError(phrase("command.other-project", names=inputs), file=out)
     for name in set(RESULTS) & set(present):
         others = [path for path in present[name] if path.name != name]
         if inputs and others:
-            raise InputError(f"the project there would have a second {name}", file=others[0])
+            raise InputError(phrase("command.second-file", name=name), file=others[0])
     return out
 
 
 def _result_files(
-    project: Project, block: Block, found: Found[Result], out: Path, as_published: bool
+    project: Project, block: Block, found: AdjustmentOutcome[Result], out: Path, as_published: bool
 ) -> dict[Path, bytes]:
-    """Make everything that goes to the output directory, before anything is written."""
+    """Return all files of the output folder."""
     from photogram.giant.export import adjusted_records
     from photogram.giant.files import to_bytes
     from photogram.messages import Message
@@ -157,16 +151,14 @@ def _result_files(
         as_published=as_published,
     )
     if "RESTART" not in records:
-        result.messages.append(
-            Message("RESTART is not written: the stations are beyond what its columns hold")
-        )
+        result.messages.append(Message.of("giant.no-restart"))
     return {out / name: to_bytes(lines) for name, lines in records.items()}
 
 
 def _project_and_block(
     job: Job, directory: Path, limits: str | None, how: GiantOptions
 ) -> tuple[Project, Block, Limits | None]:
-    """Read a project, with what is remarked on it, its block as it is adjusted, and the limits of 1987."""
+    """Read a project with its remarks, its block, and the limits of 1987."""
     from photogram.formats.planes import plane_remarks
     from photogram.giant import Limits, read_project
 
@@ -184,13 +176,13 @@ def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
     air, water, index = how.air_refraction, how.water_refraction, how.water_index
     refraction = job_refraction(common, air=air, water=water, index=index)
     if index is not None and (refraction is None or refraction.water is None):
-        raise typer.BadParameter("there is no refraction in water", param_hint="--water-index")
+        raise misuse("--water-index", "requires", options="--water-refraction")
     return block.replace(refraction=refraction)
 
 
 def _adjusted_project(
     job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
-) -> Found[Result]:
+) -> AdjustmentOutcome[Result]:
     """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
     from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.errors import AdjustmentError
@@ -219,7 +211,7 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
     progress: Callable[[Progress], None] | None,
-) -> Found[Result]:
+) -> AdjustmentOutcome[Result]:
     """Take gross errors out of the block, with its weights where components are asked for."""
     from photogram import Result
     from photogram.diagnosis.after_adjustment import diagnosed
@@ -228,7 +220,7 @@ def _snooped(
     log, made = snooped(block, how.components, threads, options)
     if not isinstance(log.result, Result):
         raise TypeError("a block gives the result of a block")
-    return Found(diagnosed(log.result), log, made)
+    return AdjustmentOutcome(diagnosed(log.result), log, made)
 
 
 def _adjusted(
@@ -237,8 +229,8 @@ def _adjusted(
     how: GiantOptions,
     threads: int | None,
     progress: Callable[[Progress], None] | None,
-) -> Found[Result]:
-    """Adjust the block by the rules of today, or those of 1987."""
+) -> AdjustmentOutcome[Result]:
+    """Adjust the block by present rules or by the rules of 1987."""
     from photogram import AsPublished, adjust
     from photogram.diagnosis.after_adjustment import diagnosed
 
@@ -256,4 +248,4 @@ def _adjusted(
         covariance="verdict",
         **rules,
     )
-    return Found(diagnosed(result))
+    return AdjustmentOutcome(diagnosed(result))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import NOT_CONVERGED, output, print_sections
-from photogram.cli.job import Job, OutputFolder
-from photogram.cli.progress import adjustment_status
+from photogram.cli.job import Job, OutputFolder, adjustment_status
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.cli.choices import Choices
@@ -30,7 +29,7 @@ TAKEN = frozenset(
 
 @dataclass(frozen=True)
 class Parts:
-    """How a user divides an adjustment, with the options that say it."""
+    """Options for an adjustment in parts."""
 
     cluster: str | None = None
     workers: int | None = None
@@ -41,7 +40,7 @@ class Parts:
 
     @property
     def division(self) -> Division | None:
-        """As :func:`photogram.adjust_in_parts` takes it; None where nothing is asked for."""
+        """Options of :func:`photogram.adjust_in_parts`; None without an option."""
         if replace(self, plan=False) == Parts():
             return None
         from photogram.distributed import Division
@@ -60,7 +59,7 @@ def print_plan(plan: PartsPlan) -> None:
 def adjusted_on_disk(
     job: Job, path: Path, target: Path, divided: Parts, choices: Choices, threads: int | None
 ) -> bool:
-    """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
+    """Plan or adjust a project batch by batch; return False if it must be read completely."""
     division = divided.division
     if division is None:
         return False
@@ -71,12 +70,8 @@ def adjusted_on_disk(
         return False
     for name in job.given:
         if name not in TAKEN:
-            typed = ", ".join(each for each in job.given if each in DIVIDING)
-            raise typer.BadParameter(
-                f"cannot be combined with {typed} if images are in Parquet, which are then read in batches;"
-                " images in CSV are read whole",
-                param_hint=name,
-            )
+            typed = [option for option in job.given if option in DIVIDING]
+            raise misuse(name, "parquet-in-parts", options=typed)
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
@@ -92,7 +87,7 @@ def adjusted_on_disk(
         found = in_parts.adjusted_on_disk(
             path, wishes, folder, division, **chosen, threads=threads, progress=progress
         )
-    lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
+    lines = [*found.lines(), str(phrase("command.node-results", folder=folder / "results"))]
     job.finish(
         {target / "report.txt": ("\n".join(lines) + "\n").encode()},
         summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"),

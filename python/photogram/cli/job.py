@@ -1,4 +1,4 @@
-"""One job behind every command: read, compute, spare the input, write, summarise, end with an exit code."""
+"""The common part of all commands: protect inputs, write outputs, print a summary, end with an exit code."""
 
 from __future__ import annotations
 
@@ -20,37 +20,39 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.command_classes import declared
+from photogram.cli.command_classes import declared, misuse
 from photogram.cli.console import errors, failures, print_remark, print_report, print_written
 from photogram.messages import Message, printable
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rich.status import Status
 
+    from photogram import Progress
     from photogram.io.writing import Content, OutputSet
     from photogram.show.run import Run
 
 STANDS = {"example": "--example", "plan_views": "--plan"}
-"""Options that stand for the first argument of a command, by their parameters."""
+"""Options that replace the first argument of a command, by parameter."""
 LARGEST = 2**53
-"""What integers of options may be at most: beyond it numbers are not counts."""
+"""Largest integer of an option; larger doubles are not exact counts."""
 
 
 class Reads(Enum):
-    """What an option or argument names that a command reads."""
+    """Input of a command that an option or argument names."""
 
     FILE = "file"
     PROJECT = "directory of a GIANT project"
 
 
 class Writes(Enum):
-    """What an option or argument names that a command writes."""
+    """Output of a command that an option or argument names."""
 
     FILE = "file"
     DIRECTORY = "directory of results"
-    EITHER = "file or directory, which the command finds out"
+    EITHER = "file or directory"
 
 
 InputFile = Annotated[Path | None, Reads.FILE]
@@ -61,20 +63,9 @@ OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 class Job:
     """The inputs and outputs of a run of a command; a context manager around its work.
 
-    On entry, before anything is computed, outputs that would harm an input or one another are refused, and
-    remarks are made on inputs that an interrupted run may have left in disorder. What is known only later is
-    told by :meth:`reads` and :meth:`writes`. Errors become messages and exit codes.
-
-    Parameters
-    ----------
-    files, projects
-        Files, and directories of GIANT projects, that are read.
-    outputs, directories
-        Files, and directories for results, that are written.
-    quiet
-        Whether nothing but errors is shown.
-    options
-        What was given on the command line, by the names of options: for the report.
+    On entry it rejects outputs that would damage an input or another output, and prints remarks on inputs of
+    an interrupted run. Methods :meth:`reads` and :meth:`writes` add inputs and outputs later. Errors become
+    messages and exit codes.
     """
 
     def __init__(
@@ -116,7 +107,7 @@ class Job:
 
     @property
     def given(self) -> Mapping[str, Any]:
-        """What was given on the command line and is not the default, by the names of options."""
+        """Values of the command line that are not defaults, by names of options."""
         return self._options
 
     def packaged(self, *example: str) -> Path:
@@ -125,61 +116,47 @@ class Job:
         self._examples.append(found if found.is_dir() else found.parent)
         return found
 
+    def input(self, path: Path | None, *example: str) -> Path:
+        """Return an input, or a packaged example if none was specified."""
+        if path is None:
+            path = self.packaged(*example)
+            self.reads(path)
+        return path
+
     def shown(self, path: Path) -> Path:
-        """Return a path as people are told: one of the package's without where the package lies."""
+        """Return a path for messages; a path of the package is relative."""
         for folder in [each.parent for each in self._examples] + [Path(str(files("photogram")))]:
             if folder in path.parents:
                 return path.relative_to(folder)
         return path
 
     def told(self, messages: Iterable[Message]) -> list[Message]:
-        """Return messages with their paths as people are told; see :meth:`shown`."""
+        """Return messages with paths of :meth:`shown`."""
         return [each if each.file is None else replace(each, file=self.shown(each.file)) for each in messages]
 
     def reads(self, *paths: Path) -> None:
-        """Name further files, or directories of projects, that are read: no result goes over them.
-
-        Raises
-        ------
-        InputError
-            A result was to do so.
-        """
+        """Protect further inputs, files or directories of projects, against results."""
         for path in paths:
             (self._projects if path.is_dir() else self._files).append(path)
         self._check()
 
     def reads_inside(self, folder: Path) -> None:
-        """Name the files of a folder, where it is one; see :meth:`reads`."""
+        """Protect the files in a folder against results; see :meth:`reads`."""
         if folder.is_dir():
             self.reads(*(each for each in sorted(folder.iterdir()) if each.is_file()))
 
     def spares(self, *paths: Path) -> None:
-        """Name further files of which little is read: no result goes over them, and reports do not list them.
-
-        Raises
-        ------
-        InputError
-            A result was to do so.
-        """
+        """Protect further files against results; reports do not list them as inputs."""
         self._spared += paths
         self._check()
 
     def writes(self, *files: Path) -> None:
-        """Name further files that are going to be written: they are looked at now.
-
-        Raises
-        ------
-        InputError
-            One of them would harm an input or another result.
-        """
+        """Declare further outputs, and check them now."""
         self._outputs += [path for path in files if path not in self._outputs]
         self._check()
 
     def write(self, *results: Mapping[Path, Content]) -> None:
-        """Write results: all of them or none, none over an input, and no two to one place.
-
-        Those whose names a user chose are given apart from those that have names of their own.
-        """
+        """Write results, all or none: none over an input, no two to one path."""
         with self.outputs() as outputs:
             for files in results:
                 for path, content in files.items():
@@ -189,24 +166,14 @@ class Job:
     def finish(
         self, *results: Mapping[Path, Content], summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
-        """Write the results, as :meth:`write` does, then show what they are, and end.
-
-        Parameters
-        ----------
-        results
-            Contents of files.
-        summary
-            Prints what a reader wants first.
-        code
-            The exit code with which the job ends.
-        """
+        """Write the results, print a summary, and end with an exit code."""
         self.write(*results)
         self.conclude([path for each in results for path in each], summary=summary, code=code)
 
     def conclude(
         self, written: Iterable[Path], *, summary: Callable[[], None] | None = None, code: int = 0
     ) -> None:
-        """Show what was found and written, and end; see :meth:`finish`."""
+        """Print a summary and the names of written files, and end with an exit code."""
         if not self.quiet:
             if summary is not None:
                 summary()
@@ -217,7 +184,7 @@ class Job:
             raise typer.Exit(code)
 
     def run(self, command: str) -> Run:
-        """Return what the report says of the run of a command: options, inputs, times up to now."""
+        """Return options, inputs and times of the run of a command for its report."""
         from photogram.show.run import Run, input_files
 
         found, others = input_files(self._inputs())
@@ -227,7 +194,7 @@ class Job:
 
     @contextmanager
     def status(self, text: str) -> Iterator[Status | None]:
-        """Show on standard error what is going on, if anything is to be shown."""
+        """Show a status line on standard error unless the job is quiet."""
         if self.quiet:
             yield None
             return
@@ -235,7 +202,7 @@ class Job:
             yield status
 
     def outputs(self) -> OutputSet:
-        """Return a set of files, for results that are written piece by piece."""
+        """Return a set of files for results that are written in several pieces."""
         from photogram.io.writing import OutputSet
 
         return OutputSet([*self._inputs(), *self._spared])
@@ -260,25 +227,24 @@ class Job:
         for path in self._directories:
             _check_name(path)
             if path.exists() and not path.is_dir():
-                raise InputError("is not a directory", file=path)
+                raise InputError(phrase("command.no-folder"), file=path)
             sources = [each for each in (*self._projects, *self._files) if each.is_dir()]
             if path.exists() and any(path.samefile(each) for each in sources):
-                raise InputError("the results would be written over the input", file=path)
+                raise InputError(phrase("command.over-input"), file=path)
         inputs = self._inputs()
         check_outputs(self._outputs, [*inputs, *self._spared], self._directories)
         for path in self._outputs:
             self._check_projects(path)
 
     def _remark(self) -> None:
-        """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
+        """Print a remark if an interrupted run may have left a set of inputs incomplete."""
         from photogram.io.writing.staging import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
-            told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
-            print_remark(printable(told))
+            print_remark(printable(str(phrase("command.interrupted", file=path, mark=mark))))
 
     def _check_projects(self, path: Path) -> None:
-        """Refuse an output by which a project that is read would have two files of one name."""
+        """Reject an output that would be a second file of one name in an input project."""
         if not self._projects:
             return
         from photogram.errors import InputError
@@ -287,11 +253,51 @@ class Job:
         name = project_name(path)
         place = os.path.dirname(os.path.realpath(path))
         if name and any(os.path.realpath(project) == place for project in self._projects):
-            raise InputError(f"would be taken for the {name} of the project", file=path)
+            raise InputError(phrase("command.project-file", name=name), file=path)
+
+
+_PHASES = {"form": "normal equations", "solve": "solution", "invert": "standard deviations"}
+
+
+@contextmanager
+def adjustment_status(
+    job: Job, text: str = "adjusting", name: str = "weighted sum of squares", factor: float = 1.0
+) -> Iterator[Callable[[Progress], None] | None]:
+    """Show the progress of an adjustment; see :func:`shown`."""
+    with job.status(text) as status:
+        yield None if status is None else shown(status, name, factor)
+
+
+@contextmanager
+def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
+    """Show how many adjustments the estimation of variance components has taken."""
+    with job.status("variance components") as status:
+
+        def show(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        yield show
+
+
+def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:
+    """Return a function that shows phase and last iteration; the sum has this name and factor."""
+    last = ""
+
+    def show(progress: Progress) -> None:
+        nonlocal last
+        if progress.iteration is not None:
+            size = factor * progress.iteration.weighted_sum_of_squares
+            last = f"iteration {progress.iteration.number}: {name} {size:.6g}; "
+        elif progress.total:
+            phase = _PHASES.get(progress.phase, progress.phase)
+            status.update(f"{last}{phase} {100 * progress.done // progress.total} %")
+
+    return show
 
 
 def _check_name(path: Path) -> None:
-    """Refuse what no call of the system can look at; that nothing is there is said by who reads it."""
+    """Reject a path that the system cannot access; readers report a missing file."""
     try:
         os.stat(path)
     except OSError as error:
@@ -300,20 +306,14 @@ def _check_name(path: Path) -> None:
 
 
 class Without:
-    """Stands beside a class of options in an annotation: a command does without those of these names."""
+    """Mark in an annotation: a command has a class of options without the options of these names."""
 
     def __init__(self, *names: str) -> None:
         self.names = names
 
 
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
-    """Return the roles of options and arguments of a command that are paths.
-
-    Raises
-    ------
-    TypeError
-        A path has no role, or several.
-    """
+    """Return the roles of options and arguments of a command that are paths."""
     found: dict[str, Reads | Writes] = {}
     for parameter in _options(command)[0]:
         kind, *metadata = get_args(parameter.annotation)
@@ -347,16 +347,10 @@ def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tu
 
 
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
+    """Run a command inside a :class:`Job` with its inputs and outputs; the job is its parameter `job`.
 
-    A parameter that is a dataclass stands for options, its fields (but those :class:`Without` which the
-    command does). Where there is an option `--example`, that stands for the first argument, as `--plan` of
-    views does.
-
-    Raises
-    ------
-    TypeError
-        A path among the parameters is marked neither as read nor as written.
+    The fields of a parameter that is a dataclass are options, except fields in a mark :class:`Without`. The
+    option `--example`, or `--plan` of views, replaces the first argument.
     """
     own, grouped = _options(command)
     marked = roles(command)
@@ -364,7 +358,9 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def with_one(**values: Any) -> None:
         for parameter in own:
-            _check_value(parameter, values)
+            value = values.get(parameter.name, parameter.default)
+            if isinstance(value, int) and abs(value) > LARGEST:
+                raise misuse(_option(parameter), "large", limit=LARGEST)
         if "example" in values:
             _arrange(own, values)
         found: dict[Reads | Writes, list[Path]] = {each: [] for each in (*Reads, *Writes)}
@@ -382,7 +378,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
         )
         for name, (kind, names) in grouped.items():
             values[name] = kind(**{each: values.pop(each) for each in names if each in values})
-        command(job=job, **values)
+        with job:
+            command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)
     with_one.__annotations__ = {parameter.name: parameter.annotation for parameter in own}
@@ -405,15 +402,8 @@ def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[s
     return found
 
 
-def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
-    """Refuse a value that says nothing."""
-    value = values.get(parameter.name, parameter.default)
-    if isinstance(value, int) and abs(value) > LARGEST:
-        raise typer.BadParameter("is too large", param_hint=_option(parameter))
-
-
 def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
-    """Give arguments their values: with what stands for the first one, that goes without."""
+    """Assign values to arguments; an option of STANDS replaces the first argument."""
     arguments = {
         parameter.name: mark.metavar
         for parameter in parameters
@@ -425,9 +415,9 @@ def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
     instead = sum(bool(values.get(name)) for name in STANDS)
     first, *others = arguments.values()
     if len(given) + instead > len(arguments) or not (given or instead):
-        raise typer.BadParameter(f"give {first}, or {', or '.join(stands)}", param_hint=first)
+        raise misuse(str(first), "alternatives", names=[first, *stands])
     if len(given) + instead < len(arguments):
-        raise typer.BadParameter("is missing", param_hint=others[-1])
+        raise misuse(str(others[-1]), "missing")
     if instead:
         values.update(zip(arguments, [None, *given], strict=True))
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.job import Job
 from photogram.lazy_dataclasses import dataclass
 
@@ -24,7 +25,7 @@ Threads = Annotated[int | None, typer.Option(min=1)]
 
 @dataclass(frozen=True)
 class Snooping:
-    """Whether and how gross errors are taken out, with the options that say it."""
+    """Options for the removal of gross errors."""
 
     snoop: bool = False
     level: Annotated[float, typer.Option(min=1e-09, max=0.5)] = 0.05
@@ -38,26 +39,18 @@ class Snooping:
 
 
 def check_alone(job: Job, option: str, others: Collection[str]) -> None:
-    """Reject an option beside others; the message names those of them that the user typed."""
+    """Reject an option in combination with others; the message names them."""
     if typed := [name for name in job.given if name in others]:
-        raise typer.BadParameter(f"cannot be combined with {', '.join(typed)}", param_hint=option)
+        raise misuse(option, "conflict", options=typed)
 
 
-def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it
-    """Return the option `--out DIR`; `help` says what goes there, and what the default is."""
-    return typer.Option("--out", metavar="DIR", help=help)
+def default_out(source: Path, ending: str, is_example: bool = False) -> Path:
+    """Return the default folder for results: the name of the input, or `example`, with an ending.
 
-
-def example_out(out: Path | None, plots: bool, name: str) -> Path | None:
-    """Return the directory for results of a packaged example: one of its own where pictures need one."""
-    return out or (Path(name) if plots else None)
-
-
-def default_out(source: Path, ending: str) -> Path:
-    """Return the directory for the results where no option names one: the name of the input with an ending.
-
-    It is beside the input, or, as published data are often read-only, else where the command is given.
+    It is in the folder of the input, or in the current folder if that is read-only or the input is packaged.
     """
+    if is_example:
+        return Path(f"example{ending}")
     place = Path(os.path.realpath(source))
     parent = place.parent if os.access(place.parent, os.W_OK) else Path()
     return parent / f"{place.name if place.is_dir() else place.stem}{ending}"
@@ -67,10 +60,6 @@ def pair(text: str, option: str) -> tuple[int, int]:
     """Return two numbers with an x between them."""
     first, x, second = text.lower().partition("x")
     if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
-        raise typer.BadParameter(
-            f"is two numbers, 10x7, or a file that is there, not {text}"
-            if option == "--board"
-            else f"is two numbers, 10x7, not {text}",
-            param_hint=option,
-        )
+        form = "two numbers such as 10x7" + (", or an existing file" if option == "--board" else "")
+        raise misuse(option, "form", form=form, value=text)
     return int(first), int(second)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.markup import escape
-
-from photogram.cli.console import output, print_remark
+from photogram.cli.console import print_document, print_remark
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, default_out
@@ -38,32 +36,29 @@ def perspective_center(
 
     The run stops at the first set that cannot be read or solved. The sets before it are written to --out.
     """
-    with job:
-        from photogram.perspective_center import run_deck
-        from photogram.statistics.verdict import worst
+    from photogram.perspective_center import run_deck
+    from photogram.statistics.verdict import worst
 
-        if deck is None:
-            deck = job.packaged(*EXAMPLE)
-            job.reads(deck)
-        folder = out or (Path("example-resected") if example else default_out(deck, "-resected"))
-        pictures = documents.announce(job, folder, "listing.txt", picture="residuals")
-        unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
-        run = run_deck(
-            deck,
-            as_published=as_published,
-            weights=weights,
-            together=together or bool(unknown),
-            unknown=unknown,
-        )
-        stopped = run.stop is not None
-        job.finish(
-            _files(run, documents.json, folder, pictures),
-            documents.page(job, "perspective-center", folder, run.document) if run.results else {},
-            summary=lambda: _summarize(run),
-            code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
-        )
-        if run.stop is not None:
-            raise run.stop.error
+    deck = job.input(deck, *EXAMPLE)
+    folder = out or default_out(deck, "-resected", example)
+    pictures = documents.announce(job, folder, "listing.txt", picture="residuals")
+    unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
+    run = run_deck(
+        deck,
+        as_published=as_published,
+        weights=weights,
+        together=together or bool(unknown),
+        unknown=unknown,
+    )
+    stopped = run.stop is not None
+    job.finish(
+        _files(run, documents.json, folder, pictures),
+        documents.page(job, "perspective-center", folder, run.document) if run.results else {},
+        summary=lambda: _summarize(run),
+        code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
+    )
+    if run.stop is not None:
+        raise run.stop.error
 
 
 def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> dict[Path, bytes]:
@@ -85,10 +80,8 @@ def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> d
 
 def _summarize(run: Run) -> None:
     from photogram.perspective_center.document import set_document
-    from photogram.show.forms import summary
 
     for result in run.results:
-        for line in summary(set_document(result), "parameters"):
-            output.print(escape(line))
+        print_document(set_document(result), "parameters")
     for message in run.messages:
         print_remark(message)

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.check import EXAMPLE as GALVESTON
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Job, OutputFolder, Reads, with_job
-from photogram.cli.options import Quiet, example_out
-from photogram.cli.simulation_options import Control, MotionOptions, NetworkOptions
+from photogram.cli.options import Quiet
+from photogram.cli.simulate import Control, MotionOptions, NetworkOptions
 from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
@@ -41,34 +42,33 @@ def plan(
     No measurements are necessary. The report contains expected standard deviations of points by number of
     rays and by location, of photographs, and the detectable gross errors.
     """
-    with job:
-        from photogram.planning.networks import plan as predict
+    from photogram.planning.networks import plan as predict
 
-        if packaged:
-            if projects:
-                raise typer.BadParameter("goes without DIR", param_hint="--example")
-            projects = [job.packaged(GALVESTON)]
-            out = example_out(out, documents.plots, "example-planned")
-        pictures = documents.announce(job, out, TEXT, picture="plan")
+    if packaged:
         if projects:
-            _check_alone(network, moves, against, against_spacing, against_position_sd)
-            patterns = _adjusted(projects)
-        else:
-            second = replace(
-                network,
-                control=against,
-                control_spacing=network.control_spacing if against_spacing is None else against_spacing,
-                position_sd=network.position_sd if against_position_sd is None else against_position_sd,
-            )
-            patterns = _simulated(moves, network, second)
-        made = predict(patterns)
-        texts = {} if out is None else {out / TEXT: made.report().encode()}
-        page = documents.page(job, "plan", out, made.document)
-        drawn = {path: made.plot().render(path.suffix[1:]) for path in pictures}
-        job.finish(
-            {**texts, **page, **documents.as_json(made), **drawn},
-            summary=lambda: output.print(made.report(), markup=False, end=""),
+            raise misuse("--example", "conflict", options="DIR")
+        projects = [job.packaged(GALVESTON)]
+        out = out or (Path("example-planned") if documents.plots else None)
+    pictures = documents.announce(job, out, TEXT, picture="plan")
+    if projects:
+        _check_alone(network, moves, against, against_spacing, against_position_sd)
+        patterns = _adjusted(projects)
+    else:
+        second = replace(
+            network,
+            control=against,
+            control_spacing=network.control_spacing if against_spacing is None else against_spacing,
+            position_sd=network.position_sd if against_position_sd is None else against_position_sd,
         )
+        patterns = _simulated(moves, network, second)
+    made = predict(patterns)
+    texts = {} if out is None else {out / TEXT: made.report().encode()}
+    page = documents.page(job, "plan", out, made.document)
+    drawn = {path: made.plot().render(path.suffix[1:]) for path in pictures}
+    job.finish(
+        {**texts, **page, **documents.as_json(made), **drawn},
+        summary=lambda: output.print(made.report(), markup=False, end=""),
+    )
 
 
 def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Block]:
@@ -79,14 +79,12 @@ def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Blo
         _name(network): simulate(check_points=0, **network.arguments(moves)).truth for network in networks
     }
     if len(patterns) < len(networks):
-        raise typer.BadParameter(
-            f"both patterns are: {next(iter(patterns))}; choose another one", param_hint="--against"
-        )
+        raise misuse("--against", "same-pattern", pattern=next(iter(patterns)))
     return patterns
 
 
 def _name(network: NetworkOptions) -> str:
-    """Name a pattern by what two of them may differ in."""
+    """Return a name of a pattern from the properties in which two patterns can differ."""
     spacing = network.control_spacing
     names = {
         "perimeter": f"perimeter, {spacing} base{'s' * (spacing != 1)}",
@@ -100,14 +98,14 @@ def _name(network: NetworkOptions) -> str:
 def _check_alone(
     network: NetworkOptions, moves: MotionOptions, against: Control, *others: float | None
 ) -> None:
-    """Refuse options of simulated networks beside projects, where they would be without effect."""
+    """Reject options of simulated networks in combination with projects."""
     simulated = network != NetworkOptions() or moves != MotionOptions()
     if simulated or against != "corners" or any(each is not None for each in others):
-        raise typer.BadParameter("a project takes no options of simulated networks", param_hint="DIR")
+        raise misuse("DIR", "simulation")
 
 
 def _adjusted(projects: list[Path]) -> dict[str, Block]:
-    """Read projects; what stands in their files is adjusted first, so that all points have positions."""
+    """Read and adjust projects, so that all points have positions."""
     from photogram import adjust
     from photogram.adjustment.prediction import at_adjusted
     from photogram.giant import read_project
@@ -128,6 +126,6 @@ def _names(projects: list[Path]) -> dict[str, Path]:
     """Name projects by the last part of their paths, or the whole where two have the same."""
     places = [Path(os.path.realpath(directory)) for directory in projects]
     if len(set(places)) < len(places):
-        raise typer.BadParameter("the same project twice", param_hint="DIR")
+        raise misuse("DIR", "project-repeated")
     short = len({place.name for place in places}) == len(places)
     return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}

@@ -1,4 +1,4 @@
-"""What the commands on projects of any format share: options, reading, telling what was found."""
+"""Common parts of commands on projects of any format: options, reading, description."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.job import InputFile, Job
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
@@ -22,12 +23,11 @@ EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
 
 OriginName = Literal["corner", "center"]
-"""Which place of the first pixel is 0, 0."""
 
 
 @dataclass(frozen=True)
 class Additions:
-    """What a user adds to a project, with the options that say it."""
+    """Options for additional data of a project."""
 
     file_format: Annotated[str | None, typer.Option("--format")] = None
     control: InputFile = None
@@ -57,26 +57,26 @@ NOTHING = Additions()
 
 
 def project_path(job: Job, path: Path | None) -> Path:
-    """Return the path that a user gives, or that of the packaged example."""
+    """Return the path of the user, or of the packaged example."""
     return job.packaged(*EXAMPLE) if path is None else path
 
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:
-    """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
+    """Read a project with additional data; its files become inputs of the job."""
     from photogram.formats import GnssFile, PhotoFiles, Wishes, read
     from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
     from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
 
     if added.photos_dir is None and added.photos_crs:
-        raise typer.BadParameter("requires --photos-dir DIR", param_hint="--photos-crs")
+        raise misuse("--photos-crs", "requires", options="--photos-dir DIR")
     if added.photos_dir is None and added.gnss is None and added.mrk_antenna:
-        raise typer.BadParameter("requires --photos-dir DIR or --gnss FILE", param_hint="--mrk-antenna")
+        raise misuse("--mrk-antenna", "requires", options="--photos-dir DIR or --gnss FILE")
     if added.gnss is None and (added.gnss_crs or added.gnss_antenna):
         option = "--gnss-crs" if added.gnss_crs else "--gnss-antenna"
-        raise typer.BadParameter("requires --gnss FILE", param_hint=option)
+        raise misuse(option, "requires", options="--gnss FILE")
     if added.cubes is None and added.jigsaw is not None:
-        raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
+        raise misuse("--jigsaw", "requires", options="--cubes LIST")
     job.reads_inside(path)
     sd = deviations(added.sd or [])
     columns = columns_given(added.columns, added.roles)
@@ -121,15 +121,13 @@ def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
     except ValueError:
         sd = x = y = z = math.nan
     if not (math.isfinite(x + y + z) and sd >= 0):
-        raise typer.BadParameter(
-            f"must be 3 or 4 numbers in metres, as 0.0,0.08,0.1,0.01, got {text!r}",
-            param_hint="--gnss-antenna",
-        )
+        form = "3 or 4 numbers in metres, such as 0.0,0.08,0.1,0.01"
+        raise misuse("--gnss-antenna", "form", form=form, value=text)
     return x, y, z, sd
 
 
 def described(project: Project) -> list[Section]:
-    """Return what was read, as titled sections."""
+    """Return a description of a project as titled sections."""
     import numpy as np
 
     from photogram.formats.block_contents import motions
@@ -192,7 +190,7 @@ def described(project: Project) -> list[Section]:
 
 
 def _control_line(block: Block, rays: Indices) -> str:
-    """Count control and check points that take part, and name the others."""
+    """Return the numbers of control and check points with observations, and names of the others."""
     import numpy as np
 
     from photogram.network.observations import Control

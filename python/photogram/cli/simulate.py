@@ -1,17 +1,20 @@
-"""`photogram simulate`: write a simulated block as a GIANT project, or as tables where it moves."""
+"""`photogram simulate`: write a simulated block as a GIANT project, or as tables if it moves."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import typer
 from rich.markup import escape
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.options import Quiet
-from photogram.cli.simulation_options import MotionOptions, NetworkOptions
+from photogram.cli.options import AirModel, Quiet, WaterModel
+from photogram.lazy_dataclasses import dataclass, fields
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +22,113 @@ if TYPE_CHECKING:
     from photogram.giant.common import Common
     from photogram.messages import Message
     from photogram.network.block import Block
+    from photogram.network.simulated_motion import LineScanner, RollingShutter
     from photogram.network.simulation import Simulation
+
+
+Control = Literal["perimeter", "corners", "none"]
+
+
+@dataclass(frozen=True)
+class NetworkOptions:
+    """The network of a simulated block, with names and defaults of :func:`photogram.simulate`."""
+
+    strips: int = 4
+    photos_per_strip: int = 10
+    forward_overlap: float = 0.6
+    side_overlap: float = 0.3
+    principal_distance: float = -152.74
+    frame_size: float = 230.0
+    flying_height: float = 4500.0
+    relief: float = 150.0
+    points_per_photo: float = 100.0
+    crab: float = 0.03
+    tilt: float = 0.01
+    control: Control = "perimeter"
+    control_spacing: int = 4
+    control_sd: float = 0.05
+    image_sd: float = 0.010
+    position_sd: float = math.inf
+    attitude_sd: float = math.inf
+    position_error: float = 30.0
+    attitude_error: float = 0.01
+    spheroid: Literal["none", "clarke1866", "wgs84"] = "none"
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    photo_to_ground: bool = False
+    air_refraction: AirModel | None = None
+    water_refraction: WaterModel | None = None
+    water_level: float = 0.0
+    water_index: Annotated[float, typer.Option(min=1)] = 1.340
+    seed: Annotated[int, typer.Option(min=0)] = 0
+
+    def arguments(self, moves: MotionOptions) -> dict[str, Any]:
+        """Return the arguments of :func:`photogram.simulate`, of a network that moves so."""
+        from photogram.network.geometry import Spheroid
+        from photogram.network.refraction import Refraction
+
+        arguments: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        spheroids = {"clarke1866": Spheroid.clarke_1866, "wgs84": Spheroid.wgs84}
+        arguments["spheroid"] = spheroids[self.spheroid]() if self.spheroid in spheroids else None
+        if arguments["spheroid"]:
+            longitude, latitude, height = self.origin
+            arguments["origin"] = (math.radians(longitude), math.radians(latitude), height)
+        asked = arguments.pop("air_refraction"), arguments.pop("water_refraction")
+        air, water = (None if model == "none" else model for model in asked)
+        level, index = arguments.pop("water_level"), arguments.pop("water_index")
+        if moving := moves.motion():
+            arguments["motion"] = moving
+        if air or water:
+            arguments["refraction"] = Refraction(air, water, level, index)
+        return arguments
+
+
+@dataclass(frozen=True)
+class MotionOptions:
+    """The motion of cameras, with names and defaults of :class:`RollingShutter` and :class:`LineScanner`."""
+
+    readout: float | None = None
+    readout_sd: float | None = None
+    readout_direction: Literal["down", "up", "right", "left"] | None = None
+    speed: float | None = None
+    speed_sd: float | None = None
+    rate: float | None = None
+    rate_sd: float | None = None
+    scanner: Annotated[int | None, typer.Option(min=1, max=3)] = None
+    view_angle: float | None = None
+    pitch: float | None = None
+    every: float | None = None
+    knots: float | None = None
+    scenes: bool = False
+
+    def motion(self) -> RollingShutter | LineScanner | None:
+        """Return the motion of these options, if any."""
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        given = {name: value for name, value in given.items() if value is not None and value is not False}
+        if not given:
+            return None
+        if ("readout" in given) == ("scanner" in given):
+            raise misuse(_hint(given), "requires", options="either --readout or --scanner")
+        from photogram.network.simulated_motion import LineScanner, RollingShutter
+        from photogram.network.trajectories import Spline
+
+        rolling = "readout" in given
+        strange = given.keys() & (_OF_SCANNERS if rolling else _OF_SHUTTERS)
+        if strange:
+            raise misuse(_hint(strange), "conflict", options="--readout" if rolling else "--scanner")
+        if rolling:
+            direction = given.pop("readout_direction", "down")
+            return RollingShutter(direction=direction, **given)
+        if "knots" in given:
+            given["position"] = given["rotation"] = Spline(every=given.pop("knots"))
+        return LineScanner(lines=given.pop("scanner"), **given)
+
+
+_OF_SHUTTERS = {"readout_sd", "readout_direction", "speed_sd", "rate", "rate_sd"}
+_OF_SCANNERS = {"view_angle", "pitch", "every", "knots", "scenes"}
+
+
+def _hint(names: set[str] | dict[str, Any]) -> str:
+    return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(names))
 
 
 @with_job
@@ -37,44 +146,43 @@ def simulate(
 ) -> None:
     """Write a simulated block as a GIANT project, or as tables if cameras move, with its truth.
 
-    The GIANT files contain simulated measurements. truth.json contains true positions and attitudes (rad) of
-    photographs, true positions of points, and gross errors. FRAMES has one set of stations. With --position-
-    sd or --attitude-sd these are the observed values; components that are not observed have initial values
-    with their errors as standard deviations. Every weight counts in the unit variance (COMMON column 12).
-    Otherwise FRAMES has initial values with the weak default standard deviations.
+    The GIANT files contain simulated measurements. truth.json contains true positions and attitudes (rad)
+    of photographs, true positions of points, and gross errors. FRAMES has one set of stations. With
+    --position-sd or --attitude-sd these are the observed values; components that are not observed have
+    initial values with their errors as standard deviations. Every weight counts in the unit variance
+    (COMMON column 12). Otherwise FRAMES has initial values with the weak default standard deviations.
 
     With --readout or --scanner the cameras move during the exposure. GIANT files cannot contain motion, so
     the command writes tables for `photogram adjust DIR`; truth.json contains true motions and trajectories.
     """
-    with job:
-        from photogram.giant import Project
-        from photogram.giant.project import project_files
-        from photogram.network.simulation import simulate as make
+    from photogram.giant import Project
+    from photogram.giant.project import project_files
+    from photogram.network.simulation import simulate as make
 
-        simulation = make(
-            check_points=check_points,
-            blunders=blunders,
-            blunder_size=blunder_size,
-            **network.arguments(moves),
-        )
-        block = simulation.block
-        remarks: Sequence[Message] = ()
-        if block.timed:
-            files = _tables(simulation, out, overwrite=overwrite)
-        else:
-            block, common = _filed(block, network.position_error, network.attitude_error)
-            project = Project.from_block(block, common)
-            files = project_files(project, out, overwrite=overwrite)
-            remarks = project.messages
-        written = {**files, out / "truth.json": _truth(simulation)}
-        size = (
-            f"{out}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
-            f" {len(block.image_xy)} image points"
-        )
-        if not quiet:
-            for message in remarks:
-                print_remark(message)
-        job.finish(written, summary=lambda: output.print(escape(size)))
+    simulation = make(
+        check_points=check_points,
+        blunders=blunders,
+        blunder_size=blunder_size,
+        **network.arguments(moves),
+    )
+    block = simulation.block
+    remarks: Sequence[Message] = ()
+    if block.timed:
+        files = _tables(simulation, out, overwrite=overwrite)
+    else:
+        block, common = _filed(block, network.position_error, network.attitude_error)
+        project = Project.from_block(block, common)
+        files = project_files(project, out, overwrite=overwrite)
+        remarks = project.messages
+    written = {**files, out / "truth.json": _truth(simulation)}
+    size = (
+        f"{out}: {len(block.photo_ids)} photographs, {len(block.point_ids)} points,"
+        f" {len(block.image_xy)} image points"
+    )
+    if not quiet:
+        for message in remarks:
+            print_remark(message)
+    job.finish(written, summary=lambda: output.print(escape(size)))
 
 
 def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:
@@ -102,7 +210,7 @@ def _tables(simulation: Simulation, out: Path, *, overwrite: bool) -> dict[Path,
     from photogram.formats.project import Project
 
     if (out / "project.toml").exists() and not overwrite:
-        raise InputError("holds a project; --overwrite allows it to be replaced", file=out)
+        raise InputError(phrase("command.project-exists"), file=out)
     block = simulation.block
     unknown = (None,) * max(1, len(block.cameras))
     project = Project(
@@ -117,7 +225,7 @@ def _tables(simulation: Simulation, out: Path, *, overwrite: bool) -> dict[Path,
 
 
 def _truth(simulation: Simulation) -> bytes:
-    """Make the document of what is true in a simulated block."""
+    """Return the JSON document of the truth of a simulated block."""
     import numpy as np
 
     from photogram.io import json
@@ -163,7 +271,7 @@ def _truth(simulation: Simulation) -> bytes:
 
 
 def _true_motion(truth: Block) -> dict[str, object]:
-    """Return readout times, motions and trajectories of a simulated block; nothing where nothing moves."""
+    """Return readout times, motions and trajectories of a simulated block, if it moves."""
     import numpy as np
 
     from photogram.network.motion import given_poses

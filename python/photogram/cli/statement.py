@@ -12,6 +12,7 @@ from photogram.cli.job import InputFile, Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, Threads, default_out
 from photogram.cli.projects import Additions
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -44,20 +45,19 @@ def statement(
     survey`.
     """
     source = job.packaged("survey") if path is None else path
-    target = out or (Path("example-statement") if example else default_out(source, "-statement"))
-    with job:
-        result, project = result_at(job, source, added, threads, choices=choices, keep_all=keep_all)
-        project = project or _project_beside(job, source, result)
-        asked = wanted.asked(project, added, result.block.linear_unit)
-        assumed = () if project is None else project.lacks
-        with job.status("stating"):
-            found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
-            files = statement_files(job, found, target)
-        job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
+    target = out or default_out(source, "-statement", example)
+    result, project = result_at(job, source, added, threads, choices=choices, keep_all=keep_all)
+    project = project or _project_beside(job, source, result)
+    asked = wanted.asked(project, added, result.block.linear_unit)
+    assumed = () if project is None else project.lacks
+    with job.status("stating"):
+        found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
+        files = statement_files(job, found, target)
+    job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
 
 
 def _summary(found: Statement) -> list[Section]:
-    """Return what is told on the screen: what the page says first."""
+    """Return the lines for the screen: the first lines of the page."""
     return [
         (found.texts("page.what"), [found.headline]),
         (found.texts("page.figures"), [text for _, text in found.judged.sentences]),
@@ -66,10 +66,7 @@ def _summary(found: Statement) -> list[Section]:
 
 
 def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
-    """Return the plain project in whose folder a result lies that was read as data; None where there is none.
-
-    One of another block is told, and not taken.
-    """
+    """Return the plain project in the folder of a saved result, unless it has another block."""
     from photogram.formats import read
 
     settings = folder.resolve().with_name("project.toml")
@@ -81,5 +78,5 @@ def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
     own, block = result.block, project.block
     if set(own.photo_ids) == set(block.photo_ids) and set(own.point_ids) == set(block.point_ids):
         return project
-    print_remark(f"{settings} is of another block than {folder}: what it asks for is not taken")
+    print_remark(phrase("command.other-block", settings=settings, folder=folder))
     return None

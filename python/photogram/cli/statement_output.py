@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from photogram.cli.command_classes import misuse
 from photogram.cli.console import print_remark
 from photogram.cli.job import InputFile, Job, Without
 from photogram.cli.projects import Additions
 from photogram.lazy_dataclasses import dataclass, fields
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -21,13 +23,9 @@ if TYPE_CHECKING:
     from photogram.words import Phrase
 
 
-def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
-    return typer.Option(f"--{name}", metavar=metavar, help=what)
-
-
 @dataclass(frozen=True)
 class StatementOptions:
-    """What is asked of a statement, with the options that say it; a project may say it too."""
+    """Options of an accuracy statement; a project can define them, too."""
 
     standard: str | None = None
     class_h: str | None = None
@@ -50,10 +48,10 @@ class StatementOptions:
         """Refuse these options of a command that makes no statement."""
         given = [each.name for each in fields(self) if getattr(self, each.name) is not None]
         if given:
-            raise typer.BadParameter("requires --statement", param_hint=f"--{given[0].replace('_', '-')}")
+            raise misuse(f"--{given[0].replace('_', '-')}", "requires", options="--statement")
 
     def asked(self, project: Project | None, added: Additions, unit: str) -> dict[str, Any]:
-        """Return what a statement is asked for: by these options, else by the project; checked."""
+        """Return checked settings of a statement from these options, else from the project."""
         from photogram.formats.supplements import deviations
         from photogram.results.statement.request import Asked
 
@@ -67,7 +65,7 @@ class StatementOptions:
         return asked
 
     def options(self, unit: str) -> dict[str, Any]:
-        """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
+        """Return the arguments of :meth:`photogram.Result.statement` for a unit of length."""
         from photogram.formats.plain.statement_settings import read_sentences
         from photogram.results.statement.request import length_of
 
@@ -95,13 +93,13 @@ OfHead = Annotated[
         "standard", "class_3d", "area", "without", "independent", "language", "text", "budget", "coverage"
     ),
 ]
-"""The head of the page and the classes: what a project of another program has no place for."""
+"""Options for the head of the page and the classes, for projects of other programs."""
 
 
 def _reason(given: str) -> tuple[str, str]:
     point, equals, reason = given.partition("=")
     if not (equals and point.strip() and reason.strip()):
-        raise typer.BadParameter(f'{given!r} is not POINT="reason"', param_hint="--without")
+        raise misuse("--without", "form", form='POINT="reason"', value=given)
     return point.strip(), reason.strip()
 
 
@@ -115,7 +113,7 @@ def stated(
     strict: bool = False,
     assumed: Sequence[Phrase | str] = (),
 ) -> Statement:
-    """Return the statement of a result, with the files it was made of; dated today where no date is given."""
+    """Return the statement of a result with its input files and a date (default: today)."""
     from datetime import date
 
     from photogram import statement as made
@@ -141,7 +139,7 @@ def stated(
 
 
 def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
-    """Return all files of a statement; where what makes page or PDF is absent, that is told."""
+    """Return all files of a statement, with a remark on each missing package."""
     from photogram.results.statement.sheets import files_of_statement
 
     files = {folder / name: content for name, content in files_of_statement(found).items()}
@@ -153,5 +151,5 @@ def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, byte
         if find_spec(library):
             files[folder / name] = make()
         elif not job.quiet:
-            print_remark(f"no {name}: pip install 'photogram[{extra}]'")
+            print_remark(phrase("command.no-file", name=name, extra=extra))
     return files

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import output, print_remark, print_withheld
+from photogram.cli.console import output, print_document, print_withheld
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
 from photogram.cli.options import Quiet, Threads
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.stellar.night_calibration import CalibratedNight
@@ -27,7 +27,7 @@ Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "ka
 
 
 class Effect(StrEnum):
-    """What places of stars have; the fields of `photogram.stellar.sky.Effects`."""
+    """Effects on star positions."""
 
     ANNUAL_ABERRATION = "annual-aberration"
     LIGHT_DEFLECTION = "light-deflection"
@@ -52,38 +52,37 @@ def stellar_camera(
     If the verdict forbids the use of the result, camera.json is withheld. `photogram stellar-camera
     exposures` calibrates a digital camera by exposures of the sky.
     """
-    with job:
-        from photogram.statistics.verdict import worst
-        from photogram.stellar import calibrate
-        from photogram.stellar.cameras import camera_document
+    from photogram.statistics.verdict import worst
+    from photogram.stellar import calibrate
+    from photogram.stellar.cameras import camera_document
 
-        if deck is None:
-            deck = job.packaged("stellar") / "plate.toml"
-        problems, inputs = _read(deck)
-        job.reads(*inputs)
-        pictures = documents.plot_format if documents.plots else ""
-        target = out or Path(f"{deck.stem}-calibrated")
-        documents.place(target)  # refused before anything is computed
-        written: dict[Path, bytes] = {}
-        asked: dict[Path, bytes] = {}
-        results = []
-        for number, problem in enumerate(problems, 1):
-            if as_published:
-                problem = replace(problem, options=replace(problem.options, as_published=True))
-            result = calibrate(problem)
-            results.append(result)
-            mark = f"-{number}" if len(problems) > 1 else ""
-            written |= _files(result, target, mark, pictures)
-            written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
-            written |= documents.page(job, "stellar-camera", target, result.document, mark)
-            if documents.json is not None:
-                asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
-        job.finish(
-            written,
-            asked,
-            summary=lambda: _summarize(results),
-            code=worst((result.verdict for result in results), strict=strict),
-        )
+    if deck is None:
+        deck = job.packaged("stellar") / "plate.toml"
+    problems, inputs = _read(deck)
+    job.reads(*inputs)
+    pictures = documents.plot_format if documents.plots else ""
+    target = out or Path(f"{deck.stem}-calibrated")
+    documents.place(target)  # refused before anything is computed
+    written: dict[Path, bytes] = {}
+    asked: dict[Path, bytes] = {}
+    results = []
+    for number, problem in enumerate(problems, 1):
+        if as_published:
+            problem = replace(problem, options=replace(problem.options, as_published=True))
+        result = calibrate(problem)
+        results.append(result)
+        mark = f"-{number}" if len(problems) > 1 else ""
+        written |= _files(result, target, mark, pictures)
+        written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
+        written |= documents.page(job, "stellar-camera", target, result.document, mark)
+        if documents.json is not None:
+            asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
+    job.finish(
+        written,
+        asked,
+        summary=lambda: _summarize(results),
+        code=worst((result.verdict for result in results), strict=strict),
+    )
 
 
 @with_job
@@ -104,29 +103,28 @@ def exposures(
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
-    with job:
-        from photogram.errors import InputError
-        from photogram.stellar.night_calibration import calibrate_night
-        from photogram.stellar.night_file import inputs, read_night
+    from photogram.errors import InputError
+    from photogram.stellar.night_calibration import calibrate_night
+    from photogram.stellar.night_file import inputs, read_night
 
-        if night is None:
-            night = job.packaged("exposures") / "night.toml"
-        job.reads(*inputs(night))
-        pictures = documents.plot_format if documents.plots else ""
-        said = _said(lens, common_scale, without or [], any_roll, blind)
-        try:
-            result = calibrate_night(read_night(night, said), threads)
-        except InputError as error:
-            raise error if error.file else InputError(error.message, file=night) from None
-        target = out or Path(f"{night.stem}-calibrated")
-        written = _night_files(result, target, pictures)
-        written |= documents.page(job, "stellar-camera exposures", target, result.document)
-        job.finish(
-            written,
-            documents.as_json(result),
-            summary=lambda: _summarize([result], "parameters"),
-            code=result.verdict.exit_code(strict=strict),
-        )
+    if night is None:
+        night = job.packaged("exposures") / "night.toml"
+    job.reads(*inputs(night))
+    pictures = documents.plot_format if documents.plots else ""
+    said = _said(lens, common_scale, without or [], any_roll, blind)
+    try:
+        result = calibrate_night(read_night(night, said), threads)
+    except InputError as error:
+        raise error if error.file else InputError(error.phrase or error.message, file=night) from None
+    target = out or Path(f"{night.stem}-calibrated")
+    written = _night_files(result, target, pictures)
+    written |= documents.page(job, "stellar-camera exposures", target, result.document)
+    job.finish(
+        written,
+        documents.as_json(result),
+        summary=lambda: _summarize([result], "parameters"),
+        code=result.verdict.exit_code(strict=strict),
+    )
 
 
 @with_job
@@ -144,21 +142,20 @@ def places(
     Positions are geocentric, true equator and equinox of date: proper motion, parallax, light deflection,
     annual aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
     """
-    with job:
-        from photogram.io.csv_text import csv_text
-        from photogram.stellar.catalogue import Catalogue
-        from photogram.stellar.places import apparent_places
+    from photogram.io.csv_text import csv_text
+    from photogram.stellar.catalogue import Catalogue
+    from photogram.stellar.places import apparent_places
 
-        found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
-        stars = found.brighter(faintest)
-        right, declination = apparent_places(stars, utc).T
-        columns = {
-            "star": list(stars.ids),
-            "ra_rad": right,
-            "dec_rad": declination,
-            "magnitude": stars.magnitudes,
-        }
-        job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
+    found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
+    stars = found.brighter(faintest)
+    right, declination = apparent_places(stars, utc).T
+    columns = {
+        "star": list(stars.ids),
+        "ra_rad": right,
+        "dec_rad": declination,
+        "magnitude": stars.magnitudes,
+    }
+    job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
 
 
 def _said(
@@ -168,7 +165,7 @@ def _said(
     any_roll: bool,
     blind: tuple[float, float] | None,
 ) -> dict[str, dict[str, Any]]:
-    """Return what options say, by the tables and keys of the file."""
+    """Return the settings of the options by tables and keys of the file."""
     said: dict[str, dict[str, Any]] = {
         "camera": {"lens": lens, "common_scale": common_scale},
         "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
@@ -181,13 +178,9 @@ def _said(
 
 
 def _summarize(results: Sequence[Result | CalibratedNight], *tables: str) -> None:
-    from photogram.show.forms import summary
 
     for result in results:
-        for line in summary(result.document(), *tables):
-            output.print(escape(line))
-        for message in result.messages:
-            print_remark(message)
+        print_document(result.document(), *tables, remarks=result.messages)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
@@ -199,11 +192,10 @@ def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
 
 
 def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict[Path, bytes]:
-    """Return the files of a camera, or none, and say so, where it must not be used."""
+    """Return the files of a camera; print a message if the verdict withholds them."""
     if result.verdict.usable:
         return files
-    names = ", ".join(path.name for path in files)
-    print_withheld(f"{names} withheld: the calibration must not be used as it is", files)
+    print_withheld(phrase("command.camera-withheld", names=[path.name for path in files]), files)
     return {}
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import (
@@ -20,8 +20,9 @@ from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.collection import Collection
 from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
-from photogram.messages import Message, Undetermined, listed
+from photogram.messages import Message, Undetermined
 from photogram.network.core_arrays import CoreOptions
+from photogram.words import phrase
 
 __all__ = ["adjust", "adjusted"]
 
@@ -140,7 +141,7 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
     messages: list[Message] = []
     if solution.undetermined is not None:
         error = named(*solution.undetermined)
-        messages.append(Undetermined(f"there are no covariances: {error}", what=str(error)))
+        messages.append(Undetermined(phrase("collection.no-covariances", error=str(error)), what=str(error)))
     # A point far off on parallel rays creeps alone, and is named itself.
     if solution.weak and not solution.weak_points:
         messages.append(hardly_determined(solution.status, _unknowns(solution.weak, collection)))
@@ -149,30 +150,33 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
     messages += harmful_points(solution.weak_points, numbers) + _hardly_held(solution)
     alone = solution.photo_images == 0
     given = np.bincount(collection.image_photos, minlength=len(alone)) > 0
-    for which, what in (
-        (alone & ~given, "without image points"),
-        (alone & given, "that their image points do not determine"),
-    ):
-        if which.any():
-            messages.append(Message(f"left as they are, photos {what}: {_numbers(which)}"))
-    out = solution.point_rays == 0
-    for points, why in (
-        (solution.collapsed, "that ran into the station of a photo"),
-        (solution.beside_stations, "given beside a station that sees them, and images do not fit"),
-        (solution.not_determined, "that their rays do not determine"),
-    ):
-        if points:
-            names = listed([str(point) for point in points])
-            messages.append(Message(f"left out, points {why}: {names}"))
-            out[points] = False
-    if out.any():
-        messages.append(Message(f"left out, points with images on fewer than two photos: {_numbers(out)}"))
+    single = solution.point_rays == 0
+    excluded = {
+        "points-collapsed": solution.collapsed,
+        "points-at-stations": solution.beside_stations,
+        "points-not-determined": solution.not_determined,
+    }
+    for points in excluded.values():
+        single[points] = False
+    numbers_of: dict[str, Any] = {
+        "photos-without-images": np.flatnonzero(alone & ~given),
+        "photos-undetermined": np.flatnonzero(alone & given),
+        **excluded,
+        "points-with-one-ray": np.flatnonzero(single),
+    }
+    messages += [
+        Message.of(f"collection.{code}", names=list(map(str, numbers)))
+        for code, numbers in numbers_of.items()
+        if len(numbers)
+    ]
     behind = solution.point_rays_behind
     messages += hidden(int(behind.sum()), [str(point) for point in np.flatnonzero(behind)], [])
     if solution.datum:
-        parameters = collection.parameters
-        held = ", ".join(f"{parameters[parameter]} of photo {photo}" for photo, parameter in solution.datum)
-        messages.append(Message(f"nothing gives a datum; covariances hold for fixed {held}"))
+        fixed = [
+            phrase("collection.parameter", parameter=collection.parameters[parameter], photo=photo)
+            for photo, parameter in solution.datum
+        ]
+        messages.append(Message.of("collection.datum", parameters=fixed))
     return messages
 
 
@@ -185,26 +189,17 @@ def _hardly_held(solution: _photocore.CollectionSolution) -> list[Message]:
     if not free.any():
         return []
     ratio = np.nan_to_num(sd[:, free] / np.nanmedian(sd[:, free], axis=0)).max(axis=1)
-    worse = ratio > WORSE
-    if not worse.any():
-        return []
-    return [
-        Message(
-            f"hardly determined by their images, photos {_numbers(worse)}: standard deviations are up to"
-            f" {ratio.max():.1g} times those of the others; their points are few, or lie near a line"
-        )
-    ]
+    names = [str(photo) for photo in np.flatnonzero(ratio > WORSE)]
+    return [Message.of("collection.weak-photos", names=names, ratio=float(ratio.max()))] if names else []
 
 
 def _unknowns(of_photos: list[tuple[int, int]], collection: Collection) -> str:
-    """Name unknowns and the photos that have them."""
-    names = [
-        f"{collection.parameters[unknown]} of"
-        f" {listed([str(photo) for photo, other in of_photos if other == unknown])}"
-        for unknown in sorted({unknown for _, unknown in of_photos})
-    ]
-    return f"{'; '.join(names)} (photos)"
-
-
-def _numbers(which: NDArray[np.bool_]) -> str:
-    return listed([str(index) for index in np.flatnonzero(which)])
+    """Return names of unknowns and of their photos."""
+    photos: dict[int, list[str]] = {}
+    for photo, unknown in sorted(of_photos, key=lambda pair: pair[1]):
+        photos.setdefault(unknown, []).append(str(photo))
+    names = collection.parameters
+    return "; ".join(
+        str(phrase("collection.weak-unknowns", parameter=names[unknown], names=numbers))
+        for unknown, numbers in photos.items()
+    )

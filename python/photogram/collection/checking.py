@@ -9,6 +9,7 @@ from photogram.diagnosis.diagnose import Manner, check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
+from photogram.words import phrase
 
 
 def check(network: Collection, threads: int | None) -> Diagnosis:
@@ -21,6 +22,6 @@ def check(network: Collection, threads: int | None) -> Diagnosis:
         )
         section.figure("robust adjustment", adjusted.status)
     except AdjustmentError as error:
-        section.remark(f"no robust adjustment: {error}")
+        section.remark(str(phrase("collection.no-robust-start", error=error)))
     sections, result = check_block(as_block(network), Manner({"threads": threads}))
     return Diagnosis("", [section, *sections], result)

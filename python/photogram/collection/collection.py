@@ -18,6 +18,7 @@ from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation
 from photogram.network.tables import numbered
 from photogram.show.summary import Brief, Rows
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Snooped
@@ -94,7 +95,7 @@ class Collection(Valued, Brief):
         # What has knots is more than its parameters.
         known = [name for name in _photocore.CAMERAS if name != KNOTTED]
         if self.camera not in known:
-            raise InputError(f"camera is one of {', '.join(known)}, not {self.camera!r}")
+            raise InputError(phrase("collection.camera", names=known, value=self.camera))
         photos, points, images = (
             len(np.atleast_1d(rows)) for rows in (self.photo_parameters, self.point_positions, self.image_xy)
         )
@@ -241,4 +242,4 @@ def _check(name: str, good: NDArray[np.bool_], what: str) -> None:
     bad = np.argwhere(~good)
     if len(bad):
         place = ", ".join(str(index) for index in bad[0])
-        raise InputError(f"{name}[{place}] is not {what}")
+        raise InputError(phrase("collection.element", name=name, row=place, form=what))

@@ -12,10 +12,9 @@ from photogram.arguments.types import Indices
 from photogram.collection.collection import POSE, Collection
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
-from photogram.messages import listed
 from photogram.network.core_arrays import CoreOptions
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 ROUGH, EXACT = 1e-7, 1e-12
 """A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
@@ -52,17 +51,16 @@ def named(
     """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
     if kind == "undetermined points":
         names = [str(point) for point in points]
-        return RankError(f"their rays do not determine {len(names)} points: {listed(names)}", [], names)
+        text = phrase("collection.undetermined-points", n=len(names), names=names)
+        return RankError(text, [], names)
     if kind == "undetermined photos":
         names = [str(photo) for photo in sorted({photo for each in combinations for photo in each[0]})]
-        text = (
-            f"the observations leave {len(combinations)} combinations of unknowns undetermined, moving photos"
-        )
-        return RankError(f"{text} {listed(names)}", names, [])
+        text = phrase("collection.undetermined-photos", n=len(combinations), names=names)
+        return RankError(text, names, [])
     if kind == "coarse":
         return too_coarse([str(photo) for photo in combinations[0][0]], [str(point) for point in points])
     if kind == "left out":
-        return InputError(f"the point {points[0]} was left out of the adjustment")
+        return InputError(phrase("collection.point-excluded", point=points[0]))
     if kind == "memory":
         return OutOfMemoryError(message)
     return AdjustmentError(message)

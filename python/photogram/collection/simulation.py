@@ -10,6 +10,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 __all__ = ["Simulation", "simulate", "simulate_turntable"]
 
@@ -77,11 +78,11 @@ def simulate(
         Fewer than two photos, shares outside 0 to 1, what is negative.
     """
     if photos < 2 or points < 1:
-        raise InputError(f"there must be two photos and a point at least, not {photos} and {points}")
+        raise InputError(phrase("collection.few-photos", photos=2, rays=2))
     if not (0 <= seen <= 1 and 0 <= outlier_share <= 1):
-        raise InputError("shares lie between 0 and 1")
+        raise InputError(phrase("collection.share"))
     if not (noise >= 0 and outlier_size >= 0 and seed >= 0):
-        raise InputError("noise, size of outliers and seed are not negative")
+        raise InputError(phrase("collection.negative", names=["noise", "outlier_size", "seed"]))
     random = np.random.default_rng(seed)
     parameters = _cameras(photos, random)
     positions = random.uniform(-SIZE / 2, SIZE / 2, (points, 3))
@@ -142,12 +143,11 @@ def simulate_turntable(
         Fewer than two photos or rays, no points, what is negative.
     """
     if photos < 2 or points < 1 or not 2 <= rays <= photos:
-        raise InputError(
-            "there must be two photos, two rays and a point at least, and no more rays than photos; "
-            f"not {photos}, {rays} and {points}"
-        )
-    if not (noise >= 0 and coarseness >= 0 and seed >= 0 and distance > 2):
-        raise InputError("noise, coarseness and seed are not negative; the distance exceeds 2")
+        raise InputError(phrase("collection.few-photos", photos=2, rays=2))
+    if not (noise >= 0 and coarseness >= 0 and seed >= 0):
+        raise InputError(phrase("collection.negative", names=["noise", "coarseness", "seed"]))
+    if not distance > 2:
+        raise InputError(phrase("collection.distance"))
     random = np.random.default_rng(seed)
     parameters = _on_turntable(photos, distance, random)
     positions, angle = _pillar(points, random)

@@ -30,6 +30,7 @@ from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.starts import MEDIAN_OF_TWO
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
+from photogram.words import phrase
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0
@@ -76,7 +77,7 @@ def snoop_collection(
         try:
             first, trial, outcome = tried(True)
         except (LostSupportError, _photocore.CollectionError) as error:
-            raise AdjustmentError(f"the collection cannot be tested: {error.args[0]}") from error
+            raise AdjustmentError(phrase("collection.no-trial", error=error.args[0])) from error
     cleaned = _without(first, trial, outcome.out)
     result = adjust(cleaned, threads=threads, progress=progress, **options)
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))

@@ -124,8 +124,14 @@ def _by_location(
         places = _means(at, np.vstack([residuals[k].xy_um for k in members]), len(grid.points))
         values = _means(at, np.vstack([residuals[k].comparator_um for k in members]), len(grid.points))
         measured = np.isfinite(values[:, 0])
-        averaged = tuple(cases[k].number for k in members)
-        averages.append(LocationAverages(averaged, grid.points[measured], places[measured], values[measured]))
+        averages.append(
+            LocationAverages(
+                cases=tuple(cases[k].number for k in members),
+                locations=grid.points[measured],
+                xy_um=places[measured],
+                residuals_um=values[measured],
+            )
+        )
     return tuple(averages)
 
 

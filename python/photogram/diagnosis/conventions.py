@@ -156,15 +156,11 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
         meant = hypothesis.change(looked)
         left = control_misfit(meant)
         fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
-        if fits and _most_come_nearer(looked, meant) and np.median(misfits(meant, photos)) < SUSPICION:
+        # Most images must be nearer, not only those of a few points that are far off.
+        before, after = (float(np.median(control_residuals(each))) for each in (looked, meant))
+        if fits and after < EACH * before and np.median(misfits(meant, photos)) < SUSPICION:
             fitting.append((left, hypothesis))
     return [Verdict(fitting, given)] if fitting else []
-
-
-def _most_come_nearer(given: Block, meant: Block) -> bool:
-    """Whether a hypothesis on control brings most images nearer, not only those of a few that are far off."""
-    before, after = (float(np.median(control_residuals(each))) for each in (given, meant))
-    return after < EACH * before
 
 
 def _single(block: Block, photos: Indices) -> Iterator[Verdict]:

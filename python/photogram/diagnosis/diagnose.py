@@ -15,6 +15,7 @@ import numpy as np
 
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
+from photogram.arguments.arrays import argument_error
 from photogram.arguments.objects import kind_error
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
@@ -124,7 +125,7 @@ def diagnose(
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
     if not len(block.image_xy):
-        raise InputError(phrase("check.no-images"))
+        raise argument_error("block", "missing", name="image observations")
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):

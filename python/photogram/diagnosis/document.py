@@ -81,13 +81,11 @@ def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
     """Return the table of findings with the titles of their parts, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
     columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
-    rows: list[Row] = [_row(finding, title) for finding, title in ordered[:MAX_FINDINGS]]
+    rows: list[Row] = []
+    for finding, title in ordered[:MAX_FINDINGS]:
+        level, tone = LEVELS[finding.level]
+        names = listed([*finding.photos, *finding.points], MAX_NAMES)
+        rows.append([Cell(level, tone=tone), finding.text, names, title])
     rest = len(ordered) - len(rows)
     note = f"The JSON document has {rest} more." if rest else ""
     return Table("Findings", columns, rows, note)
-
-
-def _row(finding: Finding, title: str) -> Row:
-    level, tone = LEVELS[finding.level]
-    names = listed([*finding.photos, *finding.points], MAX_NAMES)
-    return [Cell(level, tone=tone), finding.text, names, title]

@@ -140,7 +140,11 @@ class _Axis:
 
 def axis_hints(result: Result) -> list[Message]:
     """Name photos whose marks say that their films have changed along one axis, and whose model cannot."""
-    held = {row: film for row, film in result.films if _is_conformal(film)}
+    held = {
+        row: film
+        for row, film in result.films
+        if not film.placement.is_held and (film.size.deviations[1:] == 0).all()
+    }
     found = list(_axes(result, held))
     if not found:
         return []
@@ -155,10 +159,6 @@ def axis_hints(result: Result) -> list[Message]:
         at_marks=1e3 * most.far,
     )
     return [Message(message)]
-
-
-def _is_conformal(film: Film) -> bool:
-    return not film.placement.is_held and bool((film.size.deviations[1:] == 0).all())
 
 
 def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:

@@ -173,12 +173,6 @@ def _turned(block: Block, photos: Bools, turn: int) -> Block:
     return block.replace(photo_attitudes=attitudes)
 
 
-def _sign_changed(block: Block, photos: Bools) -> Block:
-    distances = block.known_distances("checks")
-    changed = np.where(photos, -distances, distances)
-    return block.replace(principal_distances=changed, cameras=(), photo_cameras=None)
-
-
 def _whole_block(block: Block, before: float, words: Words, explanations: list[Finding]) -> Block:
     """Look for one explanation for all photos, or for all of one principal distance."""
     trials = _trials(block, words)
@@ -221,7 +215,9 @@ def _trials(block: Block, words: Words) -> list[_Trial]:
     for group, photos in groups.items():
         names = [photo for photo, of in zip(block.photo_ids, photos.tolist(), strict=True) if of]
         sign = phrase("check.sign-of-principal-distance", group=group)
-        trials.append(_Trial(sign, names, _sign_changed(block, photos)))
+        changed = np.where(photos, -of_photos, of_photos)
+        other_sign = block.replace(principal_distances=changed, cameras=(), photo_cameras=None)
+        trials.append(_Trial(sign, names, other_sign))
         for turn in TURNS[1:]:
             message = phrase("check.kappa.group", group=group, turn=turn)
             trials.append(_Trial(message, names, _turned(block, photos, turn)))

@@ -15,8 +15,7 @@ from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.results.result import Result
-from photogram.statistics.exchanges import are_exchanged
-from photogram.statistics.likelihood import judged
+from photogram.statistics.likelihood import are_exchanged, judged
 
 FEWEST = 3  # Control points that tell which two of them are exchanged
 

@@ -26,7 +26,7 @@ from photogram.diagnosis.findings import likely
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.motion import timed_photos
-from photogram.network.moving_photos import Direction, Shutter, Timed
+from photogram.network.moving_photos import Direction, Shutter
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.trajectories import Readout
@@ -91,10 +91,11 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
     rows = any(own.shutter.direction in ("down", "up") for own in block.timed if own.shutter is not None)
     code = f"mistake.shutter.{'columns' if rows else 'rows'}"
     yield phrase(f"{code}.first"), _changed(block, across)
-    if not all(_is_free(each) for each in block.timed if each.shutter is not None):
+    readouts = [own.readout for own in block.timed if own.shutter is not None]
+    if not all(each is not None and np.isinf(each.sd).all() for each in readouts):
         # A free readout time has the sign that fits.
         yield phrase(f"{code}.last"), _changed(block, across_back)
-    if any(_seconds(each) > LONGEST for each in block.timed):
+    if any(each is not None and abs(float(each.position[0])) > LONGEST for each in readouts):
         known: dict[int, Readout] = {}
 
         def thousandth(own: Shutter) -> Shutter:
@@ -107,17 +108,6 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
             return replace(own, readout=known.setdefault(id(readout), meant))
 
         yield phrase("mistake.shutter.milliseconds"), _changed(block, thousandth)
-
-
-def _is_free(own: Timed) -> bool:
-    return own.readout is not None and bool(np.isinf(own.readout.sd).all())
-
-
-def _seconds(own: Timed) -> float:
-    """Return the readout time of a photo, 0 without a shutter."""
-    if own.shutter is None or own.readout is None:
-        return 0.0
-    return abs(float(own.readout.position[0]))
 
 
 def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:
@@ -190,7 +180,8 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Ph
     if not own.any():
         return None
     residuals = np.where(result.used_images[:, np.newaxis], result.residuals / block.image_sd, 0.0)
-    factor, down = factored(result), _down(block, camera)
+    factor = factored(result)
+    down = bool(block.cameras) and block.cameras[camera].image_y == "down"
     columns = {axis: _column(block, motion, own, axis, down) for axis in (1, 0)}
     tried = {axis: Scores.of(factor, each[np.newaxis], residuals) for axis, each in columns.items()}
     axis = max(tried, key=lambda each: tried[each].fall())
@@ -211,10 +202,6 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Ph
         sd=100 * sd,
         times=math.sqrt(omega / (omega - alone)),
     )
-
-
-def _down(block: Block, camera: int) -> bool:
-    return bool(block.cameras) and block.cameras[camera].image_y == "down"
 
 
 def _column(block: Block, motion: Floats, own: Bools, axis: int, down: bool) -> Floats:

@@ -7,8 +7,7 @@ import numpy as np
 from photogram.arguments.types import Indices
 from photogram.diagnosis.findings import Section, Words, note
 from photogram.network.block import Block
-from photogram.network.structuring import structure
-from photogram.network.ties import FEWEST_TIES, ties
+from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.results.document import bandwidths
 from photogram.results.result import Result
 from photogram.words import phrase

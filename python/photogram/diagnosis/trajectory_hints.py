@@ -32,7 +32,7 @@ from photogram.network.motion import given_poses, timed_images, timed_photos
 from photogram.network.moving_photos import Lines, Moment, Timed
 from photogram.network.observations import Position
 from photogram.network.projecting import camera_of, projected
-from photogram.network.rays import meet
+from photogram.network.rays import meet_rays
 from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
 from photogram.network.unknowns import LeverArm
@@ -292,18 +292,9 @@ def _places(block: Block) -> Floats:
     if given.all():
         return places
     centres, directions = _rays(block)
-    own = np.isfinite(directions).all(axis=1)
-    origin = np.median(centres[own], axis=0) if own.any() else np.zeros(3)
-    across = np.eye(3) - directions[own, :, np.newaxis] * directions[own, np.newaxis]
-    points, count = block.image_points[own], len(places)
-    normal, constant = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    np.add.at(normal, points, across)
-    np.add.at(constant, points, np.einsum("mij,mj->mi", across, centres[own] - origin))
-    return np.where(given[:, np.newaxis], places, meet(normal, constant, _counts(points, count)) + origin)
-
-
-def _counts(points: Indices, count: int) -> Floats:
-    return np.bincount(points, minlength=count).astype(np.float64)
+    seen = np.isfinite(directions).all(axis=1)
+    met = meet_rays(block.image_points[seen], len(places), centres[seen], directions[seen])
+    return np.where(given[:, np.newaxis], places, met)
 
 
 def _rays(block: Block) -> tuple[Floats, Floats]:

@@ -35,9 +35,8 @@ def weight_hints(result: Result) -> list[Message]:
     """
     found = []
     for kind in _kinds(result):
-        if not kind.redundancy >= LEAST_REDUNDANCY:
-            continue
-        test = global_test(kind.sum_of_squares, round(kind.redundancy))
+        enough = kind.redundancy >= LEAST_REDUNDANCY
+        test = global_test(kind.sum_of_squares, round(kind.redundancy)) if enough else None
         if test is None:
             continue
         factor = math.sqrt(kind.sum_of_squares / kind.redundancy)

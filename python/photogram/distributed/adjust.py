@@ -56,6 +56,7 @@ from photogram.network.datum import (
 from photogram.network.films import Scan
 from photogram.results.block_files import STANDS
 from photogram.results.result import Result
+from photogram.words import phrase
 
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 
@@ -186,7 +187,7 @@ def _run(
     block: Block, options: CoreOptions, row: DatumRow | None, division: Division, threads: int | None
 ) -> Iterator[Run]:
     if not math.isfinite(options.limit):  # which documents of a run have no way to write
-        raise InputError("in parts the tolerance must be finite")
+        raise InputError(phrase("parts.tolerance"))
     with ExitStack() as stack:
         if division.folder is None:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="photogram-")))
@@ -313,10 +314,7 @@ def opened(
         if (folder / MANIFEST).exists():
             manifest = read_manifest(folder)
             if manifest.source != source:
-                raise InputError(
-                    "is the folder of a run of another block, or with other options: give another one",
-                    file=folder,
-                )
+                raise InputError(phrase("parts.other-run"), file=folder)
         else:
             room = None if memory is None else int(SHARE * memory) - held
             manifest = divided(division.parts_of(photos) or _parts_for(counted, photos, workers, room))

@@ -10,6 +10,7 @@ from photogram.arguments.annotations import path
 from photogram.arguments.arrays import shown, whole_number
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 __all__ = ["Division", "bytes_of"]
 
@@ -24,14 +25,12 @@ def bytes_of(memory: int | str) -> int:
     if isinstance(memory, str):
         match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kmgt]?i?)b?\s*", memory.lower(), re.ASCII)
         if match is None or match[2] not in UNITS:
-            raise InputError(
-                f"memory is a number of bytes, or such as '4GB' or '1.5GiB', not {shown(memory)}"
-            )
+            raise InputError(phrase("parts.memory", value=shown(memory)))
         size = float(match[1]) * UNITS[match[2]]
     else:
         size = whole_number("memory", memory)
     if not 1 <= size < MOST_BYTES:
-        raise InputError(f"memory must be one byte at least, and less than 2^63, not {shown(memory)}")
+        raise InputError(phrase("parts.memory-range", value=shown(memory)))
     return int(size)
 
 
@@ -72,7 +71,7 @@ class Division:
         for name in ("parts", "workers"):
             given = getattr(self, name)
             if given is not None and not 1 <= whole_number(name, given) <= MOST:
-                raise InputError(f"{name} must be 1 to {MOST}, not {shown(given)}")
+                raise InputError(phrase("parts.range", name=name, most=MOST, value=shown(given)))
         if self.memory is not None:
             bytes_of(self.memory)
         if self.folder is not None:
@@ -92,5 +91,5 @@ class Division:
             There are fewer photos.
         """
         if self.parts is not None and self.parts > photos:
-            raise InputError(f"{self.parts} parts of {photos} photos: a part needs a photo, better twenty")
+            raise InputError(phrase("parts.too-many", parts=self.parts, photos=photos))
         return self.parts

@@ -39,6 +39,7 @@ from photogram.distributed.walks import Up, Walks
 from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
+from photogram.words import phrase
 
 RULES = _photocore.step_rules()  # The constants of the rules of steps, which are those of one process
 
@@ -114,7 +115,7 @@ class Driver:
             return self._finish(None)
         up = self._up(Point(course.state, course.damping, course.curved))
         if not math.isfinite(up.sum_of_squares):
-            raise AdjustmentError("the initial values give no finite image coordinates")
+            raise AdjustmentError(phrase("parts.not-finite"))
         if not course.iterations:
             course.initial = course.best = up.sum_of_squares
             if self._mover is not None:

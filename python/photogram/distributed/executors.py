@@ -21,6 +21,7 @@ from photogram.arguments.arrays import shown
 from photogram.distributed.shelf import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
+from photogram.words import phrase
 
 Handle = Any  # Stands for what a task will give
 Client = Any
@@ -119,8 +120,7 @@ class Serial:
                 pickle.dump(found, file, protocol=5)
         except OSError as error:
             raise AdjustmentError(
-                f"{self._folder}: what the parts leave cannot be kept there ({error.strerror or error}); the"
-                " run can be taken up again"
+                phrase("parts.not-written", file=self._folder, error=error.strerror or str(error))
             ) from None
 
     def _path(self, number: int) -> Path:
@@ -184,12 +184,9 @@ class Workers:
         try:
             return handle.result()
         except KilledWorker as error:
-            raise AdjustmentError(
-                f"workers died again and again at one task, mostly for want of memory ({error}); the run can"
-                " be taken up again, with more parts or larger workers"
-            ) from None
+            raise AdjustmentError(phrase("parts.workers-died", error=error)) from None
         except (FutureCancelledError, OSError) as error:
-            raise AdjustmentError(f"the scheduler is lost ({error}); the run can be taken up again") from None
+            raise AdjustmentError(phrase("parts.scheduler-lost", error=error)) from None
 
     def forget(self, handles: Collection[Future]) -> None:
         """Let go of what tasks have given."""
@@ -239,14 +236,11 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
         try:
             client = library.Client(cluster, timeout="10s")
         except (OSError, ValueError) as error:
-            raise InputError(f"no scheduler answers at {cluster}: {error}") from None
+            raise InputError(phrase("parts.no-scheduler", address=cluster, error=error)) from None
         with client:
             yield client
     else:
-        raise InputError(
-            "cluster is a client of dask.distributed, an address such as 'tcp://host:8786' or 'local', not"
-            f" {shown(cluster)}"
-        )
+        raise InputError(phrase("parts.cluster", value=shown(cluster)))
 
 
 def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
@@ -257,17 +251,14 @@ def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
     """
     versions: dict[str, str] = client.run(_version)
     if not versions:
-        raise InputError("the cluster has no workers")
+        raise InputError(phrase("parts.no-workers"))
     own = _photocore.__version__
-    others = sorted({f"{address} has {each or 'none'}" for address, each in versions.items() if each != own})
+    others = sorted(address for address, version in versions.items() if version != own)
     if others:
-        raise InputError(f"all workers must have photogram {own}, as here: {'; '.join(others)}")
+        raise InputError(phrase("parts.versions", version=own, workers=others))
     blind = [address for address, seen in client.run(os.path.isdir, str(folder)).items() if not seen]
     if blind:
-        raise InputError(
-            f"the workers at {', '.join(sorted(blind))} do not see {folder}: parts and results lie on a disk"
-            " that all workers share"
-        )
+        raise InputError(phrase("parts.no-shared-disk", workers=sorted(blind), folder=folder))
     limits = [each for each in client.run(_limit).values() if each]
     held = max(client.run(_held).values())
     return len(versions), min(limits, default=None), held

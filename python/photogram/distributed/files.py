@@ -18,6 +18,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.io.files import reading
 from photogram.io.seals import SEAL, check_sealed, seal
 from photogram.io.writing.staging import try_lock
+from photogram.words import phrase
 
 LOCK = "lock"
 
@@ -37,9 +38,7 @@ def alone(folder: Path) -> Iterator[None]:
         if try_lock(file.fileno()) is False:
             file.seek(0)
             by = file.readline().decode("utf-8", "replace").strip()
-            raise InputError(
-                f"another run works here ({by}): wait for its end, or give another folder", file=folder
-            )
+            raise InputError(phrase("parts.busy", process=by), file=folder)
         # For that message alone: a disk that is full does no harm.
         with suppress(OSError):
             file.truncate(0)
@@ -66,8 +65,7 @@ def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
             raise
     except OSError as error:
         raise AdjustmentError(
-            f"{path}: cannot be written ({error.strerror or error}); what was finished before stays, and the"
-            " run can be taken up again"
+            phrase("parts.not-written", file=path, error=error.strerror or str(error))
         ) from None
 
 
@@ -84,9 +82,9 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         document = orjson.loads(path.read_bytes())
     except (OSError, orjson.JSONDecodeError) as error:
-        raise InputError(f"cannot be read ({error})", file=path) from None
+        raise InputError(phrase("parts.not-read", error=error), file=path) from None
     if not isinstance(document, dict):
-        raise InputError("is no document of a run", file=path)
+        raise InputError(phrase("parts.no-document"), file=path)
     check_sealed(document, path)
     del document[SEAL]
     return document
@@ -103,4 +101,4 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"cannot be read ({error})", file=path) from None
+        raise InputError(phrase("parts.not-read", error=error), file=path) from None

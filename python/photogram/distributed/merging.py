@@ -23,6 +23,7 @@ from photogram.results.datum import datum_of
 from photogram.results.result import Result
 from photogram.results.result_files import read_summary
 from photogram.results.saved_block import read_block_result
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution
@@ -65,10 +66,7 @@ class InParts(Result):
         self._refuse()
 
     def _refuse(self) -> NoReturn:
-        raise AdjustmentError(
-            "the block was adjusted in parts, whose normal equations are not kept together: adjust it in one"
-            " process for covariances between photos or points, reliability, and other datums"
-        )
+        raise AdjustmentError(phrase("parts.one-process"))
 
 
 def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InParts:

@@ -28,6 +28,7 @@ from photogram.network.rigs import Mount
 from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import CLASSES, STANDS
+from photogram.words import phrase
 
 TABLES: dict[str, tuple[str, ...]] = {
     "photos": PHOTOS,
@@ -248,7 +249,7 @@ def read_part(folder: Path, sealed: str) -> Part:
     """Read what :func:`write_part` has written and sealed; InputError of another part, or damage."""
     document = read_json(folder / SETTINGS)
     if seal(document) != sealed:
-        raise InputError("is not what was written of this node of this run", file=folder / SETTINGS)
+        raise InputError(phrase("parts.other-node"), file=folder / SETTINGS)
     for table in TABLES:
         check_seal(folder / f"{table}.parquet", document["tables"][table], SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}

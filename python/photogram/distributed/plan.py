@@ -15,6 +15,7 @@ from photogram.distributed.cut import Tree
 from photogram.errors import OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import gibibytes
+from photogram.words import Phrase, phrase
 
 __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
 
@@ -100,36 +101,32 @@ class PartsPlan:
         return scheduled(self.tree, up, down, inversion, traffic, self.workers, self.rates.bandwidth)
 
     def check(self) -> None:
-        """Refuse what does not fit.
+        """Reject a plan that exceeds the memory of a worker.
 
         Raises
         ------
         OutOfMemoryError
-            A node takes more than a worker has; says how many parts would do, where any number does.
+            A node requires more memory than a worker has; the message proposes a number of parts.
         """
         if self.memory is None or self.largest <= self.room:
             return
-        taken = f", of which {gibibytes(self.held)} GiB are taken before it begins," if self.held else ""
-        raise OutOfMemoryError(
-            f"the largest node takes {gibibytes(self.largest)} GiB, and a worker of"
-            f" {gibibytes(self.memory)} GiB may hold {gibibytes(SHARE * self.memory)}{taken} and no more:"
-            f" {self._advice()}"
-        )
+        sizes = {"node": self.largest, "memory": self.memory, "share": SHARE * self.memory}
+        fields = {name: gibibytes(size) for name, size in sizes.items()}
+        busy = phrase("parts.busy-memory", memory=gibibytes(self.held)) if self.held else ""
+        raise OutOfMemoryError(phrase("parts.node-too-large", **fields, busy=busy, advice=self._advice()))
 
-    def _advice(self) -> str:
-        """Say what would do: a part halves with their number, a separator stays as it is."""
+    def _advice(self) -> Phrase:
+        """Return advice: the size of a part is halved by twice as many parts, a separator does not change."""
         memory = self.of("memory_bytes")
         leaf = np.array([not below for below in self.tree.children])
         top = float(memory[~leaf].max(initial=0.0))
         if top > self.room:
-            return (
-                f"a separator alone takes {gibibytes(top)} GiB, which more parts do not change; give workers"
-                f" of {gibibytes((top + self.held) / SHARE)} GiB"
-            )
+            size = gibibytes((top + self.held) / SHARE)
+            return phrase("parts.large-separator", separator=gibibytes(top), memory=size)
         parts = int(leaf.sum())
         # What a part takes falls with its photos, but for the contributions of its borders.
         fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / self.room)))
-        return f"about {fit} parts would fit, in place of {parts}"
+        return phrase("parts.more-parts", parts=fit, given=parts)
 
     def lines(self) -> list[str]:
         """Return the plan as lines of text."""

@@ -35,6 +35,7 @@ from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import KeptTrajectory
 from photogram.results.iteration import Iteration
+from photogram.words import phrase
 
 MANIFEST = "run.json"
 _PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
@@ -101,7 +102,7 @@ def partition(
     """
     held = held_for_datum(block, options)
     if datum is not None and not held:
-        raise AdjustmentError("the block is not free: control, weights or observations give its datum")
+        raise AdjustmentError(phrase("parts.not-free"))
     block = with_flights(block)
     # A node has some of the observations of a drift only.
     block = block.replace(observations=with_epochs(block.observations))
@@ -227,10 +228,7 @@ def read_manifest(run: Path) -> Manifest:
     """Read what :func:`write_manifest` has written; InputError of another version, or of damage."""
     document = read_json(run / MANIFEST)
     if document.get("version") != _photocore.__version__:
-        raise InputError(
-            f"is no run of photogram {_photocore.__version__}: a run ends with the version that began it",
-            file=run / MANIFEST,
-        )
+        raise InputError(phrase("parts.other-version", version=_photocore.__version__), file=run / MANIFEST)
     options = document["options"]
     for name in ("loss", "minimum"):
         options[name] = _as_tuple(options[name])
@@ -336,7 +334,7 @@ class Course:
             return cls()
         document = read_json(run / PROGRESS)
         if document.pop("source", None) != source:
-            raise InputError("is the progress of another run", file=run / PROGRESS)
+            raise InputError(phrase("parts.other-progress"), file=run / PROGRESS)
         rows: Iterable[dict[str, Any]] = document.pop("iterations")
         ending = document.pop("ending")
         iterations = [Iteration(**row) for row in rows]

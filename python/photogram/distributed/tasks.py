@@ -8,6 +8,7 @@ ask for: a task that misses one says so (:class:`Lost`).
 from __future__ import annotations
 
 import hashlib
+import platform
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +24,7 @@ from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import give_back
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram._photocore import ContributionRow, FormedNode, Node
@@ -360,10 +362,7 @@ def _place() -> str:
 
 def _node(job: Job, number: int) -> Node:
     if job.version != _photocore.__version__:
-        raise InputError(
-            f"a worker has photogram {_photocore.__version__}, and the run is one of {job.version}: all"
-            " must have the same version"
-        )
+        raise InputError(phrase("parts.versions", version=job.version, workers=[platform.node()]))
     key = "node", job.folder, number
     found: Node | None = shelf.get(key)
     if found is None:
@@ -391,7 +390,7 @@ def _arrays(job: Job, node: Node, number: int, state: str) -> dict[str, np.ndarr
     found = read_arrays(path)
     sealed = found.pop("seal", None)
     if "values" not in found or str(sealed) != _seal(job, number, state, found):
-        raise InputError("was changed, or is a state of another node, step or run", file=path)
+        raise InputError(phrase("parts.other-state"), file=path)
     return found
 
 

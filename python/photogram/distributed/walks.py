@@ -20,6 +20,7 @@ from photogram.distributed.tasks import Formed, Job, Lost, Point, about, formed,
 from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
+from photogram.words import phrase
 
 ATTEMPTS = 20  # So often is a node formed again that a worker has taken with it
 
@@ -173,9 +174,7 @@ class Walks:
             except LostFactorError as missed:
                 failures += 1
                 if failures > ATTEMPTS * len(self.tree):
-                    raise AdjustmentError(
-                        "workers were lost too often; the run can be taken up again"
-                    ) from None
+                    raise AdjustmentError(phrase("parts.workers-lost")) from None
                 if missed.number == node:
                     reforming.begin(node)
                 elif parent in again:

@@ -29,7 +29,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.observations import Distance
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 TITLE = "AICON block"
 IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
@@ -58,13 +58,13 @@ def read(path: Path, wishes: Wishes) -> Project:
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
     if images is None:
-        raise InputError(f"has no file *{IMAGES} that can be read", file=folder)
+        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=folder)
     beside = {
         suffix: each if (each := images.with_suffix(suffix)).is_file() else one_file(folder, suffix)
         for suffix in (CAMERAS, POSES, POINTS, BARS)
     }
     if beside[CAMERAS] is None:
-        raise InputError(f"has no file *{CAMERAS} beside it: the cameras", file=images)
+        raise InputError(phrase("format.files", name=f"*{CAMERAS}"), file=images)
     found = _Found()
     beside[IMAGES] = images
     readers = {CAMERAS: _cameras, POSES: _poses, POINTS: _points, IMAGES: _images, BARS: _bars}
@@ -87,27 +87,27 @@ def _cameras(path: Path, found: _Found) -> None:
         for names in ("A3", "B1 B2", "C1 C2", "width height columns rows"):
             card = next(lines, None)
             if card is None:
-                raise head.place.error(f"ends before {names} of the camera {name}")
+                raise head.place.error(phrase("format.end", name=names))
             values |= zip(names.split(), card.numbers(0, names).tolist(), strict=True)
         width, height, columns, rows = (values.pop(each) for each in names.split())
         size = int(columns), int(rows)
         if name in found.cameras or min(*size, width, height) <= 0 or size != (columns, rows):
-            raise head.place.error(f"the camera {name} is there twice, or its pictures have no size")
+            raise head.place.error(phrase("aicon.camera", name=name))
         with at_place(head.place):
             found.cameras[name] = Camera("brown_forward", values, name=f"camera {name}")
         found.sizes[name] = size, width / columns
-        told = "as such files have it" if c < 0 else "where such files have the negative of it"
-        text = f"camera {name}: c stands there as {c:g}, {told}; the principal distance is {abs(c):g} mm"
-        found.messages.append(Message(text, path))
+        found.messages.append(
+            Message(phrase("aicon.principal-distance", camera=name, value=c, distance=abs(c)), path)
+        )
     if not found.cameras:
-        raise InputError("holds no camera", file=path)
+        raise InputError(phrase("format.missing", what="a camera"), file=path)
 
 
 def _once(card: Card, names: Collection[str], what: str) -> str:
     """Return the name that a line begins with, which no line before had."""
     name = card.words[0]
     if name in names:
-        raise card.place.error(f"the {what} {name} is there twice")
+        raise card.place.error(phrase("format.repeated", what=what, name=name))
     return name
 
 
@@ -120,12 +120,12 @@ def _poses(path: Path, found: _Found) -> None:
             continue
         camera = card.words[1]
         if camera not in found.cameras:
-            raise card.place.error(f"there is no camera {camera}")
+            raise card.place.error(phrase("format.undefined", what="camera", name=camera))
         found.photos[name] = camera
         if state == _NOT_ORIENTED:
             continue
         if order != 0:
-            raise card.place.error(f"rotations in the order {order:g}: only 0, omega phi kappa, is known")
+            raise card.place.error(phrase("aicon.order", order=order))
         found.poses[name] = card.numbers(2, "X Y Z omega phi kappa")
 
 
@@ -139,7 +139,7 @@ def _points(path: Path, found: _Found) -> None:
         if len(card.words) >= 10 and not card.number(9, "new"):
             found.held[name] = card.numbers(4, "sX sY sZ")
             if (found.held[name] < 0).any():
-                raise card.place.error("a standard deviation is negative")
+                raise card.place.error(phrase("format.negative"))
 
 
 def _images(path: Path, found: _Found) -> None:
@@ -154,15 +154,15 @@ def _images(path: Path, found: _Found) -> None:
             continue
         if photo not in found.photos:
             if only is None:
-                raise card.place.error(f"nothing says which camera the photo {photo} has")
+                raise card.place.error(phrase("format.no-camera", photo=photo))
             found.photos[photo] = only
         found.images.append((photo, point))
         values[2:] = np.where(values[2:] > 0, values[2:], np.nan)
         found.values.append(values)
     if not found.images:
-        raise InputError("has no photo coordinates that are active", file=path)
+        raise InputError(phrase("format.missing", what="active image observations"), file=path)
     if lost:
-        found.messages.append(Message(f"{lost} photo coordinates are not active and are left out", path))
+        found.messages.append(Message(phrase("aicon.inactive", n=lost, what="image observations"), path))
 
 
 def _bars(path: Path, found: _Found) -> None:
@@ -176,10 +176,10 @@ def _bars(path: Path, found: _Found) -> None:
             continue
         first, second = own.words[:2]
         if not {first, second} <= seen:
-            found.messages.append(Message(f"scale bar {first} to {second}: an end has no image", path))
+            found.messages.append(Message(phrase("aicon.bar", first=first, second=second), path))
             continue
         if not (length > 0 and sd > 0) or first == second:
-            raise card.place.error("is no length with its standard deviation between two points")
+            raise card.place.error(phrase("aicon.length"))
         found.bars.append(Distance(first, second, length, sd))
 
 
@@ -201,7 +201,7 @@ def _project(path: Path, found: _Found, wishes: Wishes) -> Project:
     values = np.array(found.values)
     for kind, names in found.left.items():
         if names:
-            found.messages.append(Message(f"{len(names)} {kind} are not active and are left out"))
+            found.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
     return assembled(
         path=path,
         title=TITLE,

@@ -26,8 +26,9 @@ from photogram.formats.reduced_coordinates import (
     with_fitting_rotations,
 )
 from photogram.io.csv_text import csv_text
-from photogram.messages import Message, quoted
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
+from photogram.words import Phrase, phrase
 
 TITLE = "BINGO block"
 IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
@@ -40,8 +41,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     table = wishes.cameras or folder / CAMERAS
     if wishes.cameras is None and not table.is_file():
         raise InputError(
-            f"has no principal distances: --camera FILE, or {CAMERAS} beside it, gives them, columns camera"
-            " and c in mm",
+            phrase("format.cameras"),
             file=images,
         )
     given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
@@ -54,23 +54,22 @@ def read(path: Path, wishes: Wishes) -> Project:
         elif photo is None:
             photo, camera = card.words[0], card.words[1] if len(card.words) > 1 else ""
             if photo in found.photos:
-                raise card.place.error(f"the photo {photo} is there twice")
+                raise card.place.error(phrase("format.repeated", what="photo", name=photo))
             if camera not in known:
-                raise card.place.error(f"there is no camera {quoted(camera)} in the table")
+                raise card.place.error(phrase("format.undefined", what="camera", name=camera))
             found.photos[photo] = camera
         else:
             x, y = card.numbers(1, "x y").tolist()
             found.images.append((photo, card.words[0], x, y))
     if not found.images:
-        raise InputError("has no images", file=images)
+        raise InputError(phrase("format.missing", what="image observations"), file=images)
     used = set(found.photos.values())
     found.cameras = {name: each for name, each in known.items() if name in used}
     if (folder / ORIENTATION).is_file():
         _orientation(folder / ORIENTATION, found, wishes)
     first = found.images[0]
     message = Message(
-        f"millimetres; first record: point {first[1]} on photo {first[0]}, x {first[2]:.4f}, y"
-        f" {first[3]:.4f}",
+        phrase("format.first-record", unit="mm", point=first[1], photo=first[0], x=first[2], y=first[3]),
         images,
     )
     return with_fitting_rotations(project_of(found, images, TITLE, wishes, [message]))
@@ -82,25 +81,27 @@ def _orientation(path: Path, found: Reduced, wishes: Wishes) -> None:
         if not card.words or card.ends:
             continue
         if card.words[0] != "ORIA":
-            raise card.place.error(f"{quoted(card.words[0])} is no keyword that is read: ORIA is")
+            raise card.place.error(
+                phrase("format.unknown", what="keyword", value=card.words[0], names=["ORIA"])
+            )
         if len(card.words) < 9:
-            raise card.place.error("has not all of photo, camera, X, Y, Z, omega, phi, kappa")
+            raise card.place.error(phrase("format.member", name="photo, camera, X, Y, Z, omega, phi, kappa"))
         photo = card.words[1]
         if photo in found.poses:
-            raise card.place.error(f"the photo {photo} is there twice")
+            raise card.place.error(phrase("format.repeated", what="photo", name=photo))
         angles = to_radians(card.numbers(6, "omega phi kappa"), unit)
         if abs(angles).max() > 1e4:
-            raise card.place.error("angles beyond all turns")
+            raise card.place.error(phrase("format.angles"))
         found.poses[photo] = card.numbers(3, "X Y Z"), Attitudes.of("omega_phi_kappa", [angles]).matrices[0]
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the files have no place for."""
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the files cannot contain."""
     found = lost_of_reduced(project, reduced_images(project))
-    if any(name != own for name, own in _words(project).items()):
-        found.append("blanks in names: underscores stand for them")
+    if any(name != word for name, word in _words(project).items()):
+        found.append(phrase("lost.blanks"))
     if given_control(project):
-        found.append("control: control.csv beside the block is a table for --control")
+        found.append(phrase("lost.control-table"))
     return found
 
 
@@ -111,10 +112,10 @@ def _words(project: Project) -> dict[str, str]:
     for names in (project.block.photo_ids, project.block.point_ids, cameras):
         own = {name: "_".join(name.split()) for name in names}
         if len(set(own.values())) < len(own):
-            raise InputError("names differ by blanks alone, which have no place in words")
+            raise InputError(phrase("bingo.blanks"))
         found |= own
     if bad := [name for name, word in found.items() if word in (END, "C", "#")]:
-        raise InputError(f"the name {bad[0]} means something else there")
+        raise InputError(phrase("bingo.reserved", name=bad[0]))
     return found
 
 

@@ -14,11 +14,11 @@ from photogram.formats.project import Project
 from photogram.messages import counted
 from photogram.network.block import Block
 from photogram.network.films import Scan
-from photogram.network.observations import Control, Position
+from photogram.network.observations import Control
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
+from photogram.words import phrase
 
-MOST_TOLD = 12
-"""Trajectories that are told one by one."""
+MOST_TOLD = 12  # Trajectories that are told one by one
 
 
 def posed(block: Block) -> Bools:
@@ -32,34 +32,14 @@ def correlated_control(block: Block) -> dict[str, Control]:
     return {each.point: each for each in block.observations if isinstance(each, Control)}
 
 
-def lost_observations(block: Block, gnss: str) -> list[str]:
-    """Return what a format with control and GNSS loses, in sentences; `gnss` says what of GNSS itself."""
-    found = []
-    if correlated_control(block):
-        found.append("correlations between coordinates of control")
-    others = sum(not isinstance(each, Position | Control) for each in block.observations)
-    if others:
-        found.append(f"{others} observations beside images, control and GNSS")
-    if any(isinstance(each, Position) for each in block.observations):
-        found.append(f"{gnss} of GNSS, lever arms, shifts and drifts")
-    if block.mounts:
-        found.append("rigs: photos have their poses")
-    if block.passages:
-        found.append("what images pass: boards are flat")
-    return found
-
-
 def check_images(block: Block, title: str) -> None:
     """Refuse to write what a file would have for images in the frame of a camera, and is something else."""
     scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
     if scanned:
-        raise InputError(
-            f"{title}: the images of the photo {scanned[0]} are readings of a scanned film, which are not"
-            " written; `photogram adjust` writes refined.csv, images in mm in the frame of the camera"
-        )
+        raise InputError(phrase("format.film", title=title, photo=scanned[0]))
     lines = [each.photo for each in block.timed if each.lines is not None]
     if lines:
-        raise InputError(f"{title}: the photo {lines[0]} is of a line scanner, and takes no pictures")
+        raise InputError(phrase("format.scanner", photo=lines[0]))
 
 
 def motions(project: Project) -> list[str]:
@@ -121,14 +101,3 @@ def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
     held = all(each.is_held for each in coefficients)
     known = ", known" if held else ""
     return f"{kind} of degree {basis.degree}, {counted(len(coefficients), 'coefficient')}{known}"
-
-
-def lost_motions(block: Block) -> list[str]:
-    """Return what a format without trajectories has no place for, in sentences."""
-    found = []
-    if block.timed:
-        found.append(f"trajectories: {counted(len(block.timed), 'photo')} with the poses that they are about")
-    records = sum(each.moment is not None for each in block.observations)
-    if records:
-        found.append(counted(records, "observation") + " of trajectories")
-    return found

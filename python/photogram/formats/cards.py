@@ -12,10 +12,9 @@ from photogram.errors import InputError
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_lines
 from photogram.io.places import Place
-from photogram.messages import quoted
+from photogram.words import phrase
 
-END = "-99"
-"""What ends a photo, or a file."""
+END = "-99"  # What ends a photo, or a file
 _UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
 
 
@@ -29,7 +28,7 @@ class Card:
     def number(self, index: int, what: str) -> float:
         """Return a word as a number."""
         if index >= len(self.words):
-            raise self.place.error(f"ends before {what}")
+            raise self.place.error(phrase("format.end", name=what))
         return self.place.number(self.words[index], what)
 
     def numbers(self, first: int, names: str) -> Floats:
@@ -72,7 +71,7 @@ def names_beside(path: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for row, (number, name) in enumerate(zip(table.texts("number"), table.texts("name"), strict=True)):
         if number in found or not name:
-            raise table.error(row, f"the number {quoted(number)} is there twice, or has no name")
+            raise table.error(row, phrase("format.name", what="number", name=number))
         found[number] = name
     return found
 
@@ -86,7 +85,9 @@ def one_file(path: Path, suffix: str) -> Path | None:
     """Return the file of an ending in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
     if len(found) > 1:
-        raise InputError(f"has several files {suffix}: {', '.join(each.name for each in found)}", file=path)
+        raise InputError(
+            phrase("format.several", name=suffix, names=[file.name for file in found]), file=path
+        )
     return found[0] if found else None
 
 
@@ -94,7 +95,7 @@ def angle_unit(wished: str | None, default: str | None, path: Path) -> str:
     """Return the unit of angles: as wished, as the format has it, or an error where neither says."""
     unit = wished or default
     if unit is None:
-        raise InputError("has angles, and does not say in which unit: --angles deg, gon or rad", file=path)
+        raise InputError(phrase("format.angle-unit"), file=path)
     return unit
 
 

@@ -18,15 +18,16 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.format import Format, Wishes
+from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size, assembled
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.collection.collection import Collection
@@ -64,9 +65,9 @@ def _read_bundler(path: Path, wishes: Wishes) -> Project:
     if beside.is_file():
         lines = [line.rsplit(" 0 ", 1)[0].strip() for line in read_lines(beside) if line.strip()]
         if len(lines) != count:
-            raise InputError(f"names {len(lines)} photos, but {place.name} has {count}", file=beside)
+            raise InputError(phrase("bundler.count", n=len(lines), file=place.name, count=count), file=beside)
         if len(set(lines)) < count or not all(line.isprintable() for line in lines):
-            raise InputError("names a photo twice, or with characters that do not print", file=beside)
+            raise InputError(phrase("bundler.names"), file=beside)
         names = lines
     return project_of(found, place, BUNDLER.title, names)
 
@@ -102,14 +103,12 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) 
     remarks = []
     if len(rows) < len(registered):
         lost = [names[row] for row in np.flatnonzero(~registered).tolist()]
-        remarks.append(Message(f"{len(lost)} photos were not registered and are left out: {listed(lost, 4)}"))
+        remarks.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
     parameters = found.photo_parameters[rows]
     to_photo = _photocore.vector_rotations(np.ascontiguousarray(parameters[:, :3]))
     places = np.full(len(registered), -1, dtype=np.int64)
     places[rows] = np.arange(len(rows))
-    remarks.append(
-        Message("each photo has a camera of its own: f, k1, k2 are held; --self-calibrate f,k1,k2 frees them")
-    )
+    remarks.append(Message(phrase("bundler.cameras")))
     return assembled(
         path=path,
         title=title,
@@ -132,24 +131,12 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) 
     )
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project a collection has no place for."""
-    block = project.block
-    found = [
-        "names of points, standard deviations, the frame and its unit",
-        "that photos share a camera: each has f, k1, k2 of its own",
-    ]
-    if any(_reduced(each, size) is None for each, size in zip(block.cameras, project.sizes, strict=True)):
-        found.append(
-            "principal points and lens terms beside k1, k2: image coordinates are moved to where a camera"
-            " without"
-            " distortion would have seen them, which is exact for the geometry"
-        )
-    if np.isfinite(block.point_sd).any() or project.checks:
-        found.append("what control is")
-    if block.observations or block.mounts:
-        found.append("observations beside images, and rigs")
-    return found
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that a collection cannot contain."""
+    cameras = zip(project.block.cameras, project.sizes, strict=True)
+    moved = ["moved-images"] if any(_reduced(camera, size) is None for camera, size in cameras) else []
+    kinds = ("names", "deviations", "frame", "shared-cameras", *moved, "control", "all-observations", "rigs")
+    return losses(project, *kinds)
 
 
 def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
@@ -180,7 +167,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     oriented = posed(block)
     rows = np.flatnonzero(oriented[block.image_photos] & placed[block.image_points])
     if not len(rows):
-        raise InputError("no photo with a pose shows a point with a position")
+        raise InputError(phrase("format.no-images"))
     xy = _moved(project, cameras, sizes, np.asarray(photo_cameras)[block.image_photos])
     rows = rows[np.isfinite(xy[rows]).all(axis=1)]
     photos, points = np.flatnonzero(oriented), np.flatnonzero(placed)

@@ -20,8 +20,7 @@ PIXEL_WORDS: Mapping[str, str] = {
     **dict.fromkeys(("y", "v"), "row"),
 }
 """Headings of image coordinates, in tables that have columns and rows."""
-ROLE = "use"
-"""The column that says who is check and who is control."""
+ROLE = "use"  # The column that says who is check and who is control
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "point": {
         "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"

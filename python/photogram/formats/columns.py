@@ -29,7 +29,8 @@ from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number
 from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, listed, quoted
+from photogram.messages import Message, quoted
+from photogram.words import Phrase, phrase
 
 ROLES = ("control", "check", "off")
 OURS = (
@@ -37,8 +38,7 @@ OURS = (
     *("cov_xy", "cov_xz", "cov_yz", "use", "time", "group"),
 )
 """Columns that a user may name."""
-STRICT = ("control", "gnss")
-"""Tables of which no number may go unread."""
+STRICT = ("control", "gnss")  # Tables of which no number may go unread
 SHORT = {"p": "point", "n": "y", "e": "x", "z": "z", "d": "d", "x": "x", "y": "y", "h": "z"}
 """Letters of orders of columns, as PNEZD."""
 _PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})
@@ -147,7 +147,7 @@ def columns_given(columns: str | None, roles: str | None) -> Columns:
         name, equals, heading = (each.strip() for each in word.partition("="))
         if name.lower() != "-" and name.lower() not in OURS:
             raise InputError(
-                f"--columns {word}: there is no column {quoted(name)}, but {listed(list(OURS), 40)}"
+                phrase("format.unknown", what="column in --columns", value=name, names=list(OURS))
             )
         if not equals:
             order.append(name.lower())
@@ -156,12 +156,12 @@ def columns_given(columns: str | None, roles: str | None) -> Columns:
         else:
             headings[name.lower()] = heading
     if order and (headings or ignored):
-        raise InputError("--columns: either all columns in their order, or COLUMN=HEADING for some")
+        raise InputError(phrase("columns.order"))
     meanings = dict[str, str]()
     for word in (each.strip() for each in (roles or "").split(",") if each.strip()):
         own, _, role = (each.strip() for each in word.rpartition("="))
         if role not in ROLES or not own:
-            raise InputError(f"--roles {word}: WORD=control, WORD=check or WORD=off")
+            raise InputError(phrase("columns.roles", value=word))
         meanings[own.casefold()] = role
     return Columns(headings, tuple(order), tuple(ignored), meanings)
 
@@ -182,13 +182,13 @@ def settled(
     ]
     if missing and not columns.order:
         raise table.head.error(
-            f"--columns: there is no column {quoted(missing[0])}, but {listed(list(table.own))}"
+            phrase("format.unknown", what="heading in --columns", value=missing[0], names=list(table.own))
         )
     if "point" in required:
         table = _with_points(table, names, messages)
     if lacking := [each for each in required if each not in table]:
         raise table.head.error(
-            f"the column {lacking[0]} is missing; there are {listed(list(table.own))}: {guess(table, known)}"
+            phrase("columns.missing", name=lacking[0], names=list(table.own), option=guess(table, known))
         )
     if name == "control":
         table = _with_roles(table, columns, messages)
@@ -221,35 +221,38 @@ def in_units(
     headings: Mapping[str, str] = MappingProxyType({}),
 ) -> ColumnTable:
     """Return a table with its numbers in our units, by the units and coverage factors of its headings."""
-    ready, remarks = dict(table.ready), list[str]()
+    ready, remarks = dict(table.ready), list[Phrase]()
     for column, own in table.headings:
         heading = headings.get(column, own)
         heading = heading if units_of(heading) else own
         kind, size = units.get("sd_x" if column == "sd_xy" else column, (None, 1.0))
         if kind is None or heading == column:
             continue
-        factor, parts = 1.0, list[str]()
+        factor, parts = 1.0, list[Phrase]()
         known = KINDS_OF_UNITS.get(kind, {})
         words = [word for word in units_of(heading) if word in known or not _has_notes(column, own, word)]
         for word in words[:1]:
             if word not in known:
-                required = f"one of {', '.join(known)}" if known else "no unit"
-                raise table.head.error(f"column {quoted(own)}: {quoted(word)} must be {required}")
+                raise table.head.error(
+                    phrase(
+                        "columns.unit" if known else "columns.no-unit",
+                        column=own,
+                        unit=word,
+                        names=list(known),
+                    )
+                )
             factor = known[word] / size
-            parts.append(f"in {word}")
+            parts.append(phrase("columns.in", unit=word))
         if (coverage := coverage_of(own)) is not None:
             if not column.startswith("sd") or not coverage > 0:
-                raise table.head.error(
-                    f"column {quoted(own)}: only an uncertainty has a coverage factor, which is positive;"
-                    " name the column U (k=2), or remove the factor"
-                )
+                raise table.head.error(phrase("columns.coverage", column=own))
             factor /= coverage
-            parts.append(f"divided by k = {coverage:g}")
+            parts.append(phrase("columns.divided", k=coverage))
         if factor != 1.0:
             ready[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
         if parts:
-            remarks.append(f"{own} is {column} {', '.join(parts)}")
-    remark = Message(f"columns of the table {name} with units: {'; '.join(remarks)}", table.path)
+            remarks.append(phrase("columns.converted", heading=own, column=column, parts=parts))
+    remark = Message(phrase("columns.units", table=name, parts=remarks), table.path)
     if remarks and remark not in messages:
         messages.append(remark)
     return replace(table, ready=ready)
@@ -294,10 +297,7 @@ def _with_points(table: ColumnTable, names: Collection[str], messages: list[Mess
         return table
     headings = dict(table.headings)
     if "point" in table:
-        heading = headings[best] or "without a heading"
-        messages.append(
-            Message(f"names of points are those of the column {heading}, which have images", table.path)
-        )
+        messages.append(Message(phrase("columns.names", heading=headings[best]), table.path))
     return table.renamed({"point": headings.get("point", ""), best: "point"})
 
 
@@ -317,21 +317,15 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
             del words[column]  # types of something else
     if len(words) > 1:
         several = [headings[column] for column in words]
-        raise table.head.error(
-            f"the columns {listed(several)} may all say who is check and who is control:"
-            f" --columns use={several[0]}, or -={several[0]} for one that is not read"
-        )
+        raise table.head.error(phrase("columns.several-roles", names=several))
     if not words:
         return table.renamed({ROLE: headings[ROLE]}) if ROLE in table and headings[ROLE] != ROLE else table
     ((column, found),) = words.items()
     uses = _settled_roles(table, column, found)
     if headings[column] != ROLE:
-        counts = ", ".join(f"{uses.count(role)} {role}" for role in ROLES if role in uses)
-        messages.append(
-            Message(
-                f"the column {headings[column]} says who is check and who is control: {counts}", table.path
-            )
-        )
+        counts = [f"{uses.count(role)} {role}" for role in ROLES if role in uses]
+        roles = phrase("columns.roles-read", heading=headings[column], counts=counts)
+        messages.append(Message(roles, table.path))
     return table.renamed({column: ROLE}).with_texts(ROLE, uses)
 
 
@@ -364,27 +358,20 @@ def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:
         return "check" if meaning == "check" else "control"
     if word in FALSE or not word:
         return "control" if meaning == "check" or not word else "check"
-    raise table.error(row, f"{quoted(word)} is neither true nor false")
+    raise table.error(row, phrase("format.unknown", what="value", value=word, names=["true", "false"]))
 
 
 def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None]) -> list[str]:
     texts = table.texts(column)
     sure = set(found) & {"control", "check"}
-    rest = "" if column == ROLE else f", --columns -={column} that the column is something else"
+    code = "columns.role" if column == ROLE else "columns.role-or-other"
     uses = []
     for row, role in enumerate(found):
         if role is None:
-            raise table.error(
-                row,
-                f"column {column}: {quoted(texts[row])} is none of {', '.join(ROLES)};"
-                f' --roles "{texts[row]}=check" says what it is{rest}',
-            )
+            raise table.error(row, phrase(code, column=column, value=texts[row], names=list(ROLES)))
         if role == "?" and len(sure) != 1:
-            raise table.error(
-                row,
-                f"column {column}: {quoted(texts[row])} may be control or check:"
-                f' --roles "{texts[row]}=check" or "{texts[row]}=control"',
-            )
+            names = ["control", "check"]
+            raise table.error(row, phrase("columns.role", column=column, value=texts[row], names=names))
         other = "check" if "control" in sure else "control"
         uses.append(other if role == "?" else role or "control")
     return uses
@@ -393,7 +380,7 @@ def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None])
 def check_unread(
     table: ColumnTable, columns: Columns, known: Collection[str], name: str, messages: list[Message]
 ) -> None:
-    """Refuse columns of numbers that nobody reads, where points are known by them; tell of others."""
+    """Reject unknown columns of numbers of strict tables; report other unknown columns."""
     others = _unread(table, known)
     numbers = [
         own
@@ -403,17 +390,12 @@ def check_unread(
         and _is_numeric(table, column)
     ]
     if numbers and name in STRICT:
-        raise table.head.error(
-            f"numbers under {listed([quoted(own) for own in numbers])}, perhaps coordinates or standard"
-            f" deviations, and nothing says of what: {guess(table, known)},"
-            f" or --columns {','.join(f'-={own}' for own in numbers)} to leave them out"
-        )
-    if others:
-        text = (
-            f"columns that the table {name} does not have are not read: {listed([own for _, own in others])}"
-        )
-        if (remark := Message(text, table.path)) not in messages:
-            messages.append(remark)
+        ignored = ",".join(f"-={own}" for own in numbers)
+        unread = phrase("columns.numbers", names=numbers, option=guess(table, known), ignored=ignored)
+        raise table.head.error(unread)
+    unread = phrase("columns.unread", table=name, names=[own for _, own in others])
+    if others and (remark := Message(unread, table.path)) not in messages:
+        messages.append(remark)
 
 
 def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]:
@@ -455,17 +437,10 @@ def guess(table: ColumnTable, known: Collection[str]) -> str:
     return f"--columns {','.join(found) or 'point=...,x=...,y=...,z=...'} (a guess)"
 
 
-def nameless(cells: Sequence[str]) -> str:
-    """Return what is said of a record that should name columns, and names none that is known."""
+def nameless(cells: Sequence[str]) -> Phrase:
+    """Return what is wrong with a record that should name columns, and names none that is known."""
     numbers = [k for k, cell in enumerate(cells) if _is_number(cell)]
     if len(numbers) < 2:
-        guessed = ",".join(
-            f"{column}={own}" for column, own in zip(("point", "x", "y", "z"), cells, strict=False)
-        )
-        return f"names no column that is known: --columns {guessed} (a guess) says what they are"
-    rest = "D" * (len(cells) > 4)
-    return (
-        f"is no header: --columns PNEZ{rest} says that its cells are point, northing, easting, height"
-        f"{' and a description' if rest else ''}; PENZ{rest} has the easting first; or point,x,y,z,sd ...;"
-        " --sd control=0.01 where there are no standard deviations"
-    )
+        guesses = zip(("point", "x", "y", "z"), cells, strict=False)
+        return phrase("columns.headings", guess=",".join(f"{column}={cell}" for column, cell in guesses))
+    return phrase("columns.header", rest="D" * (len(cells) > 4))

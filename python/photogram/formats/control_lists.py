@@ -15,10 +15,10 @@ from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.words import phrase
 
 WGS84 = "EPSG:4979"
-SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")
-"""How the first line of a list begins, in capital letters."""
+SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")  # How the first line of a list begins, in capital letters
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
 _IMAGES = ("photo", "point", "column", "row")
@@ -52,7 +52,7 @@ def system_of(line: str, place: Place) -> str:
         return line
     match = _UTM.fullmatch(line)
     if match is None or not 1 <= int(match[1]) <= 60:
-        raise place.error("is no system of coordinates: WGS84, WGS84 UTM 32N, EPSG:n or +proj=...")
+        raise place.error(phrase("format.crs"))
     return f"EPSG:{32600 + int(match[1]) + (100 if match[2].upper() == 'S' else 0)}"
 
 
@@ -67,7 +67,7 @@ def _of_text(path: Path) -> ControlList:
     for place in rest:
         words = (place.text or "").split()
         if len(words) < 6:
-            raise place.error(f"has {len(words)} words: x y z column row image [name]")
+            raise place.error(phrase("format.words", n=len(words), required="x y z column row image [name]"))
         for word in (*words[:2], *words[3:5], *(() if words[2].lower() == "nan" else words[2:3])):
             place.number(word)
         position = (words[0], words[1], "" if words[2].lower() == "nan" else words[2])
@@ -77,14 +77,14 @@ def _of_text(path: Path) -> ControlList:
             else by_position.setdefault(position, f"control {len(by_position) + 1}")
         )
         if points.setdefault(name, position) != position and _apart(points[name], position):
-            raise place.error(f"the point {name} has another position in record {places[name]}")
+            raise place.error(phrase("control-list.position", point=name, record=places[name]))
         places.setdefault(name, place.record or 0)
         # Pixels count from the middle of the first pixel.
         corner = (repr(finite_number(word) + 0.5) for word in words[3:5])
         images.append((words[5], name, *corner))
         records.append(place.record or 0)
     if not points:
-        raise head.error("is followed by no points")
+        raise head.error(phrase("format.missing", what="points"))
     control = _table(
         head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [*places.values()]
     )
@@ -116,21 +116,19 @@ def _of_json(path: Path, project: Project) -> ControlList:
             height = repr(position["altitude"].number()) if "altitude" in position else ""
             own = (repr(position["longitude"].number()), repr(position["latitude"].number()), height)
             if points.setdefault(name, own) != own:
-                raise each.error(f"two control points have the id {name}; each point must have its own id")
+                raise each.error(phrase("format.repeated", what="control point", name=name))
         for image in each.get("observations", []):
             shot = image["shot_id"].text()
             size = sizes.get(shot)
             if "projection" not in image or size is None:
-                messages.append(
-                    Message(f"{name} on {shot} is left out: no such photo, or no place in it", path)
-                )
+                messages.append(Message(phrase("control-list.omitted", point=name, photo=shot), path))
                 continue
             x, y = image["projection"].numbers(2).tolist()
             scale = max(size)
             images.append((shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y)))
     head = Place(path)
     if not points:
-        raise head.error("has no points with a position")
+        raise head.error(phrase("format.missing", what="points with a position"))
     control = _table(
         head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [1] * len(points)
     )

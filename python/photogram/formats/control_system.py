@@ -20,19 +20,17 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project
 from photogram.io.column_table import ColumnTable
-from photogram.messages import Message, quoted
+from photogram.messages import Message
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
+from photogram.words import Phrase, phrase
 
-BETTER = 10.0
-"""How much better control must fit after an exchange for it to be named."""
-FITS = 0.2
-"""Part of the extent of control: what misfits by less is in its place, as far as first values tell."""
-FAR = 100.0
-"""Extents of photos and control that their middles are apart where they are in different systems."""
+BETTER = 10.0  # How much better control must fit after an exchange for it to be named
+FITS = 0.2  # Part of the extent of control: what misfits by less is in its place, as far as first values tell
+FAR = 100.0  # Extents of photos and control that their middles are apart where they are in different systems
 ZONE = 1e6
 
-Exchange = tuple[str, str, Callable[[Floats], Floats]]
+Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]
 
 
 def check_systems(
@@ -80,28 +78,26 @@ def check_systems(
                 _from_below(stations, model[seen], own[seen]) for own in (values, _swapped(values))
             )
             if below and not above:
-                text = "photos look from below as x and y of control are, from above if they are exchanged"
-                return [Message(f"{text}: {_swap(table)}, if so", table.path)]
+                return [Message(phrase("control-system.below", option=_swap(table)), table.path)]
         return []
     tried = [
         (misfit(settings, change(values))[0], what, option)
         for what, option, change in (_exchanges(table, values, free=free) if firm else ())
     ]
     tried += [
-        (misfit(own, values)[0], f"its coordinates are of {crs}", f"--control-crs {crs}")
+        (misfit(own, values)[0], phrase("control-system.crs", crs=crs), f"--control-crs {crs}")
         for crs, own in _systems(project, settings)
     ]
-    best, what, option = min(tried, default=(np.inf, "", ""))
+    best, what, option = min(tried, key=lambda trial: trial[0], default=(np.inf, Phrase(""), ""))
     if firm:
         extent = max(extent, float(np.std(model[seen], axis=0).max()))
     if best < as_is / BETTER and (not firm or best < extent):
         raise table.head.error(
-            f"control fits the photos {as_is / best:.3g} times as well if {what}: {option}"
+            phrase("control-system.exchange", factor=as_is / best, what=what, option=option)
         )
     if not free and as_is > FAR * reach:
         raise table.head.error(
-            f"control lies {as_is:.3g} {block.linear_unit} from the photos, which with it extend over"
-            f" {reach:.3g}: it is in another system; --control-crs CRS names it (EPSG:25832 ...)"
+            phrase("control-system.far", distance=as_is, unit=block.linear_unit, extent=reach)
         )
     return []
 
@@ -126,27 +122,24 @@ def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
 
 
 def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Exchange]:
-    """Yield what people exchange, in words, with what mends it; a similarity sees no scale, and one sign."""
+    """Yield mistakes of control with their remedies; a similarity cannot see scales and signs."""
     x, y, z = (heading_of(table, axis) for axis in "xyz")
-    yield "x and y (east and north) are exchanged", _swap(table), _swapped
-    yield (f"{quoted(z)} is in feet", f"--columns z={z}[ft]", partial(_times, (1.0, 1.0, 0.3048)))
+    yield phrase("control-system.swapped"), _swap(table), _swapped
+    feet = phrase("control-system.unit", name=z, unit="ft")
+    yield feet, f"--columns z={z}[ft]", partial(_times, (1.0, 1.0, 0.3048))
     if free:
         return
     for column, name, sign in (("x", x, (-1, 1, 1)), ("y", y, (1, -1, 1)), ("z", z, (1, 1, -1))):
-        yield (
-            f"{quoted(name)} has the other sign",
-            f"--columns {column}=-{name}",
-            partial(_times, sign),
-        )
+        reverse = phrase("control-system.sign", name=name)
+        yield reverse, f"--columns {column}=-{name}", partial(_times, sign)
     for unit, scale in (("ft", 0.3048), ("mm", 0.001)):
         option = f"--columns x={x}[{unit}],y={y}[{unit}],z={z}[{unit}]"
-        yield f"it is in {unit}", option, partial(_times, (scale, scale, scale))
+        every = phrase("control-system.units", unit=unit)
+        yield every, option, partial(_times, (scale, scale, scale))
     if (values[:, 0] > ZONE).all():
-        yield (
-            f"the eastings are without the zone, {int(values[0, 0] // ZONE)}, before them",
-            "take it off, or name a system with it by --control-crs (EPSG:4647 is ETRS89, zone 32)",
-            lambda xyz: np.column_stack([xyz[:, 0] % ZONE, xyz[:, 1:]]),
-        )
+        zone = phrase("control-system.zone", zone=int(values[0, 0] // ZONE))
+        option = "--control-crs CRS, whose eastings have the zone (EPSG:4647 is ETRS89, zone 32)"
+        yield zone, option, lambda xyz: np.column_stack([xyz[:, 0] % ZONE, xyz[:, 1:]])
 
 
 def _systems(project: Project, settings: Settings) -> Iterator[tuple[str, Settings]]:

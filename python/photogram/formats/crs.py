@@ -17,18 +17,17 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.project import Frame
 from photogram.network.geometry import local_frames
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pyproj
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
-ORIGIN_DECIMALS = 4
-"""Of the degrees of a chosen origin; its height is rounded to a metre."""
+ORIGIN_DECIMALS = 4  # Of the degrees of a chosen origin; its height is rounded to a metre
 _ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
 _GEOID = re.compile(r"\+geoid=([-+]?\d+(?:\.\d*)?)\s*$", re.IGNORECASE)
 """Behind a system: the height of the geoid above the ellipsoid, one for all."""
-STEP = 1.0
-"""Metres, for the directions of the axes of a system at a point."""
+STEP = 1.0  # Metres, for the directions of the axes of a system at a point
 
 
 @cache
@@ -40,7 +39,7 @@ def _system(crs: str) -> pyproj.CRS:
             warnings.simplefilter("ignore", FutureWarning)  # of spellings that PROJ would like to drop
             return pyproj.CRS.from_user_input(without_geoid(crs))
     except pyproj.exceptions.CRSError as error:
-        raise InputError(f"{crs!r} is no coordinate reference system that PROJ knows: {error}") from None
+        raise InputError(phrase("crs.unknown", crs=crs, reason=str(error))) from None
 
 
 @cache
@@ -55,17 +54,19 @@ def _transformer(source: str, target: str) -> Any:
         )
     except pyproj.exceptions.ProjError as error:
         raise InputError(
-            f"there is no transformation from {source} to {target}: {error}{_hint(source, target)}"
+            phrase(
+                "crs.transformation",
+                source=source,
+                target=target,
+                reason=str(error),
+                hint=_hint(source, target),
+            )
         ) from None
 
 
-def _hint(source: str, target: str) -> str:
-    if not (_system(source).is_compound or _system(target).is_compound):
-        return ""
-    return (
-        "; heights above sea level need the grid of a geoid: install it (projsync), give ellipsoidal heights"
-        " and the horizontal system alone, or that with the height of the geoid: EPSG:25832+geoid=46.5"
-    )
+def _hint(source: str, target: str) -> list[Phrase]:
+    compound = _system(source).is_compound or _system(target).is_compound
+    return [phrase("crs.grid")] if compound else []
 
 
 def _transformed(source: str, target: str, xyz: Floats) -> Floats:
@@ -76,11 +77,17 @@ def _transformed(source: str, target: str, xyz: Floats) -> Floats:
         found = np.column_stack(transformer.transform(*xyz.T, errcheck=True))
     except pyproj.exceptions.ProjError as error:
         raise InputError(
-            f"cannot be transformed from {source} to {target}: {error}{_hint(source, target)}"
+            phrase(
+                "crs.transformation",
+                source=source,
+                target=target,
+                reason=str(error),
+                hint=_hint(source, target),
+            )
         ) from None
     if not np.isfinite(found).all():
         row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
-        raise InputError(f"{xyz[row].tolist()} of {source} has no place in {target}")
+        raise InputError(phrase("crs.outside", position=xyz[row].tolist(), source=source, target=target))
     return found
 
 
@@ -158,7 +165,7 @@ def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
     )
 
 
-def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[str]]:
+def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
     """Carry positions into the frame of a project.
 
     Parameters
@@ -193,7 +200,7 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
         local = local_frames(found)
         return found, turned_covariances(local, turned), remarks
     if frame.origin is None:
-        raise InputError("a topocentric frame has an origin")
+        raise InputError(phrase("crs.origin"))
     rows = east_north_up(frame.origin)
     return (earth - _geocentric_of(frame.origin)) @ rows.T, turned_covariances(rows, turned), remarks
 
@@ -269,7 +276,7 @@ def _geographic(frame: Frame) -> str:
 def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     """Return geocentric positions, and (n, 3, 3) rows: the axes of the frame there in geocentric axes."""
     if not has_place(frame):
-        raise InputError(f"a frame that is {frame} has no known place on the earth")
+        raise InputError(phrase("crs.place", frame=frame.phrase))
     if frame.kind == "topocentric" and frame.origin is not None:
         rows = np.broadcast_to(east_north_up(frame.origin), (len(xyz), 3, 3))
         return _geocentric_of(frame.origin) + xyz @ rows[0] if len(xyz) else xyz, rows
@@ -326,25 +333,25 @@ def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
     return found
 
 
-def _remarks(crs: str) -> list[str]:
+def _remarks(crs: str) -> list[Phrase]:
     if enu_origin(crs) is not None:
         return []
     system = _system(crs)
     remarks = []
     if _GEOID.search(crs):
-        remarks.append(f"heights are raised by {_geoid(crs)[2]:g} m from the geoid to the ellipsoid")
+        remarks.append(phrase("crs.geoid", height=float(_geoid(crs)[2])))
     elif len(system.axis_info) == 2:
-        remarks.append(f"{crs} says nothing of heights: they are taken as ellipsoidal")
+        remarks.append(phrase("crs.heights", crs=crs))
     if system.datum is not None and "dynamic" in system.datum.type_name.lower():
-        remarks.append(f"{crs} is of a datum that moves: the epoch is not regarded")
+        remarks.append(phrase("crs.dynamic", crs=crs))
     if system.is_projected and system.axis_info[0].direction == "north":
-        remarks.append(f"{crs} has the northing first: x was read as the easting all the same")
+        remarks.append(phrase("crs.northing", crs=crs))
     return remarks
 
 
 def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
     """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame."""
     if frame.kind != "topocentric" or frame.origin is None:
-        raise InputError(f"attitudes of {crs} cannot be carried into a frame that is {frame}")
+        raise InputError(phrase("crs.attitudes", crs=crs, frame=frame.phrase))
     found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)
     return found

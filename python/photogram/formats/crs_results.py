@@ -22,15 +22,14 @@ from photogram.network.observations import Control
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
 from photogram.show.page import Column, Row, Section, Table, decimals_of
+from photogram.words import phrase
 
 __all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
-DEGREE = 180.0 / np.pi
-"""Of a radian."""
-MOST = 500
-"""Points that are listed; the tables have all."""
+DEGREE = 180.0 / np.pi  # Of a radian
+MOST = 500  # Points that are listed; the tables have all
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,19 +127,12 @@ def check_place(block: Block, crs: str) -> Frame:
     axes_of(crs)
     if frame.kind == "geographic" and not has_place(frame):
         if not is_on(crs, frame.ellipsoid):
-            raise InputError(
-                f"results cannot be brought to {crs}: the longitudes and latitudes are on the ellipsoid"
-                f" {frame.ellipsoid[0]:.12g}, {frame.ellipsoid[1]:.12g}, and nothing says of which datum;"
-                " --crs with a geographic system on it (of Clarke 1866, EPSG:4267) takes them as its own"
-            )
+            raise InputError(phrase("crs.ellipsoid", crs=crs, a=frame.ellipsoid[0], b=frame.ellipsoid[1]))
         return replace(frame, crs=crs)
     if not has_place(frame):
-        raise InputError(
-            f"results cannot be brought to {crs}: nothing says where on the earth the frame ({frame}) is;"
-            " [frame] or [control] crs, or --control-crs, do"
-        )
+        raise InputError(phrase("crs.results-place", crs=crs, frame=frame.phrase))
     if block.linear_unit != "m":
-        raise InputError(f"results cannot be brought to {crs} from {block.linear_unit}: metres are needed")
+        raise InputError(phrase("crs.metres", crs=crs, unit=block.linear_unit))
     return frame
 
 

@@ -11,6 +11,7 @@ from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.results.result import Result
+from photogram.words import Phrase
 
 __all__ = ["Format", "GnssFile", "PhotoFiles", "Wishes", "later"]
 
@@ -135,7 +136,7 @@ class Format:
     write
         The files of a project, by their names below a directory; None where the format is only read.
     cannot_hold
-        What of a project gets lost in the format, in sentences.
+        Parts of a project that the format cannot contain.
     results
         Files with what an adjustment found that go beside an adjusted project in the format; None: none.
     files
@@ -157,7 +158,7 @@ class Format:
     recognises: Callable[[Path], bool]
     read: Callable[[Path, Wishes], Project]
     write: Callable[[Project], Mapping[str, bytes]] | None = None
-    cannot_hold: Callable[[Project], list[str]] = lambda _: []
+    cannot_hold: Callable[[Project], Sequence[Phrase | str]] = lambda _: ()
     results: Callable[[Project, Result], Mapping[str, bytes]] | None = None
     files: tuple[str, ...] = ()
     folders: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.losses import losses
 from photogram.formats.models import intersected
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
@@ -22,13 +23,11 @@ from photogram.network.geometry import (
     local_frames,
 )
 from photogram.network.motion import scanners
+from photogram.words import Phrase, phrase
 
-NOMINAL_MM = 0.01
-"""Side of a pixel where nothing says how large they are: rays are the same."""
-ROUND = 100
-"""Pixels: to whole ones of these go widths and heights that nothing says."""
-ROUND_ORIGIN = 1e-4
-"""Degrees to which the origin is rounded; its height is 0."""
+NOMINAL_MM = 0.01  # Side of a pixel where nothing says how large they are: rays are the same
+ROUND = 100  # Pixels: to whole ones of these go widths and heights that nothing says
+ROUND_ORIGIN = 1e-4  # Degrees to which the origin is rounded; its height is 0
 
 
 def in_pixels(project: Project) -> Project:
@@ -41,9 +40,7 @@ def in_pixels(project: Project) -> Project:
     """
     block = project.block
     if (strips := np.flatnonzero(scanners(block))).size:
-        raise InputError(
-            f"the photo {block.photo_ids[int(strips[0])]} is of a line scanner, and has no pixels"
-        )
+        raise InputError(phrase("format.scanner", photo=block.photo_ids[int(strips[0])]))
     given = block.image_unit == "px"
     if given and not _unsized(project):
         return project
@@ -75,16 +72,11 @@ def in_pixels(project: Project) -> Project:
     )
 
 
-def nominal_pixels(project: Project) -> list[str]:
-    """Return what is to be said of a project whose pixels, or sizes of pictures, are nominal."""
-    found = []
-    if project.block.image_unit == "mm" and None in (project.pixel_mm or (None,)):
-        found.append(
-            f"millimetres: pixels, whose size is not known, are taken as {NOMINAL_MM:g} mm; rays are the same"
-        )
-    if _unsized(project):
-        found.append("that the size of pictures is not known: they are as large as their images")
-    return found
+def nominal_pixels(project: Project) -> list[Phrase]:
+    """Return remarks on nominal sizes of pixels and images."""
+    nominal = project.block.image_unit == "mm" and None in (project.pixel_mm or (None,))
+    found = [phrase("lost.nominal-pixels", size=NOMINAL_MM)] if nominal else []
+    return found + ([phrase("lost.image-size")] if _unsized(project) else [])
 
 
 def _unsized(project: Project) -> bool:
@@ -188,22 +180,19 @@ def in_topocentric(project: Project) -> Project:
     return rectangular.replace(block=block_made, starts=starts)
 
 
-def topocentric_remarks(project: Project) -> list[str]:
-    """Return what is to be said of a geographic project that is written in rectangular coordinates."""
+def topocentric_remarks(project: Project) -> list[Phrase | str]:
+    """Return remarks on a geographic project that is written in rectangular coordinates."""
     block = project.block
     if block.spheroid is None:
         return []
-    origin, unit = _origin(block), block.linear_unit
+    origin = _origin(block)
     up = local_frames(np.vstack([origin, block.photo_positions]))[:, 2]
     angle = math.degrees(float(np.arccos(np.clip(up[1:] @ up[0], -1, 1)).max())) * 60
     longitude, latitude = np.degrees(origin[0, :2])
-    found = [
-        f"longitude, latitude and height: written as {unit} east, north and up of latitude {latitude:.4f},"
-        f" longitude {longitude:.4f}, height 0 on the ellipsoid {block.spheroid.a:.12g},"
-        f" {block.spheroid.b:.12g}; verticals differ by up to {angle:.2g} minutes of arc from that, and"
-        " standard deviations stay along them"
-    ]
-    return found + (["observations beside images"] if block.observations else [])
+    place = {"latitude": float(latitude), "longitude": float(longitude)}
+    ellipsoid = {"a": block.spheroid.a, "b": block.spheroid.b}
+    found = [phrase("lost.geographic", unit=block.linear_unit, **place, **ellipsoid, angle=angle)]
+    return [*found, *losses(project, "all-observations")]
 
 
 def _origin(block: Block) -> Floats:

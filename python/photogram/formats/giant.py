@@ -15,6 +15,7 @@ from photogram.giant.assembly import job_refraction
 from photogram.giant.files import present_files, to_bytes
 from photogram.giant.project import Project as GiantProject
 from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
 TITLE = "GIANT project"
 
@@ -37,8 +38,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     if found.common.intersection_only:
         messages.append(
             Message(
-                "COMMON column 10 asks for intersection only, which `photogram giant` does: here photos are"
-                " adjusted",
+                phrase("format.intersection"),
                 path,
             )
         )
@@ -64,13 +64,13 @@ def write(project: Project) -> Mapping[str, bytes]:
     return {name: to_bytes(lines) for name, lines in records.items()}
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the cards have no place for."""
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the cards cannot contain."""
     try:
         GiantProject.from_block(project.block)
     except InputError as error:
-        return [f"the project: {error.message}"]
-    return ["digits beyond the columns of the cards: 5 decimals of the millimetre, 4 of the second"]
+        return [phrase("lost.project", reason=error.phrase or error.message)]
+    return [phrase("lost.giant-digits")]
 
 
 FORMAT = Format(

@@ -13,8 +13,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
+from photogram.io.places import Failing
 from photogram.io.units import scaled
 from photogram.network.cameras import Camera
+from photogram.words import phrase
 
 
 def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Floats]) -> Floats:
@@ -53,7 +55,7 @@ def to_corner(project: Project) -> Floats:
     """Return (m, 2) columns and rows from the upper-left corner, pixels; images in millimetres have none."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError("images are in millimetres: they have no columns and rows")
+        raise InputError(phrase("format.pixels"))
     which = block.photo_cameras[block.image_photos]
     return by_camera(
         block.image_xy, which, lambda row, own: in_corner(block.cameras[row], project.sizes[row], own)
@@ -63,7 +65,7 @@ def to_corner(project: Project) -> Floats:
 def known_size(camera: Camera, size: Size | None) -> Size:
     """Return the size of the pictures of a camera."""
     if size is None:
-        raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
+        raise InputError(phrase("format.image-size", camera=camera.title))
     return size
 
 
@@ -96,3 +98,22 @@ def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Fl
     if camera.unit == "px" and image_y == "down":
         return in_corner(camera, size, xy)
     return xy if camera.image_y == image_y else xy * [1.0, -1.0]
+
+
+Y_DOWN: Floats = np.diag([1.0, -1.0, -1.0])
+"""Carries vectors between axes x right, y up, z back and axes x right, y down, z forward."""
+
+
+def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
+    """Whether a (3, 3) matrix is orthonormal, up to the digits that a file has, and not mirrored."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    return bool(apart < tolerance and np.linalg.det(matrix) > 0)
+
+
+def checked_rotation(place: Failing, matrix: Floats) -> Floats:
+    """Return a rotation matrix of a file, orthonormal to the last bits."""
+    if not is_rotation(matrix):
+        raise place.error(phrase("format.rotation"))
+    found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
+    return found

@@ -19,11 +19,11 @@ from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
+from photogram.words import phrase
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
-AMID = 0.1
-"""Marks whose mean is farther from the origin, in parts of the format, are counted from a corner."""
+AMID = 0.1  # Marks whose mean is farther from the origin, in parts of the format, are counted from a corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,20 +90,20 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     """
     scans, files = _of_images(folder)
     if not files:
-        raise InputError("has no MeasuresIm-*.xml", file=scans)
+        raise InputError(phrase("format.files", name="MeasuresIm-*.xml"), file=scans)
     beside = [path for path in (scans / CAMERA, folder / CAMERA, scans.parent / CAMERA) if path.is_file()]
     path = camera or next(iter(beside), scans / CAMERA)
     places = _measures(path)
     if len(places) != 1:
-        raise InputError(f"is of {len(places)} images: the marks of one camera are read", file=path)
+        raise InputError(phrase("micmac.images", n=len(places)), file=path)
     (down,) = places.values()
     readings: dict[str, dict[str, Floats]] = {}
     for file in files:
         for photo, own in _measures(file).items():
             if strange := next((mark for mark in own if mark not in down), None):
-                raise InputError(f"the camera has no mark {strange}", file=file)
+                raise InputError(phrase("format.undefined", what="mark", name=strange), file=file)
             if photo in readings:
-                raise InputError(f"the photo {photo} is in two files", file=file)
+                raise InputError(phrase("format.repeated", what="photo", name=photo), file=file)
             readings[photo] = own
     remarks = _named(scans, folder, path, down, readings)
     turned, remark = _turned(down, readings)
@@ -140,11 +140,11 @@ def _named(
     for record, line in enumerate(read_lines(path), 1):
         name = line.strip()
         if name and (name in given or name not in places):
-            what = "is there twice" if name in given else f"is no mark of {camera.name}"
-            raise InputError(f"the mark {name} {what}", file=path, record=record, text=line)
+            code = "format.repeated" if name in given else "format.undefined"
+            raise InputError(phrase(code, what="mark", name=name), file=path, record=record, text=line)
         given.add(name)
     if unnamed := [mark for mark in places if mark not in given]:
-        raise InputError(f"has no {listed(unnamed)}, which {camera.name} has", file=path)
+        raise InputError(phrase("micmac.unnamed", names=unnamed, file=camera.name), file=path)
     return remarks
 
 
@@ -171,7 +171,7 @@ def _measures(path: Path) -> dict[str, dict[str, Floats]]:
         for each in element.all("OneMesureAF1I"):
             name = each.need("NamePt").text.strip()
             if not name or name in own:
-                raise each.error(f"the mark {name} is there twice" if name else "has a mark without a name")
+                raise each.error(phrase("format.name", what="mark", name=name))
             own[name] = each.need("PtIm").numbers(2)
 
     root, _ = root_of(path)
@@ -190,9 +190,9 @@ def write_marks(project: Project) -> dict[str, bytes]:
     cameras, which = known_cameras(project.block)
     films = WrittenFilms(project, [cameras[row].name for row in which])
     if not films.readings or not films.pixels:
-        raise InputError("MicMac has readings of marks in pixels of scans, and this project has none")
+        raise InputError(phrase("micmac.readings"))
     if len(films.certificates) != 1:
-        raise InputError(f"MicMac has one camera, and marks are of {', '.join(films.certificates)}")
+        raise InputError(phrase("micmac.cameras", names=list(films.certificates)))
     (certificate,) = films.certificates.values()
     places = {name: mark.position[:2] * [1.0, -1.0] for name, mark in certificate.marks.items()}
     photos: dict[str, dict[str, Floats]] = {}

@@ -13,8 +13,7 @@ from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
 from photogram.network.subset import kept_images
 
-STEEPEST = 1e12
-"""Condition of the normal equations of a point beyond which its rays are parallel."""
+STEEPEST = 1e12  # Condition of the normal equations of a point beyond which its rays are parallel
 
 
 def intersected(project: Project, points: Indices) -> Floats:

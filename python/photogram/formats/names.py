@@ -14,6 +14,7 @@ from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
+from photogram.words import phrase
 
 NAMES = "names.csv"
 LARGEST = 2**53
@@ -33,9 +34,9 @@ def with_names(project: Project, path: Path) -> Project:
     for row, name in enumerate(ids):
         if taken.setdefault(name, row) != row:
             first = next(k for k, each in enumerate(names) if each == name)
-            raise table.error(first, f"two points would have the name {name}")
+            raise table.error(first, phrase("format.repeated", what="point", name=name))
     new = {project.block.point_ids[place]: name for place, name in zip(rows, names, strict=True)}
-    message = Message(f"{len(rows)} points have the names of {path.name}", path)
+    message = Message(phrase("format.renamed", n=len(rows), file=path.name), path)
     return with_other_names(project, new).replace(messages=(*project.messages, message))
 
 

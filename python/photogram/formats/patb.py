@@ -20,6 +20,7 @@ from photogram.formats.cards import (
     to_radians,
 )
 from photogram.formats.format import Format, Wishes
+from photogram.formats.images import is_rotation
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
 from photogram.formats.reduced_coordinates import (
@@ -32,17 +33,16 @@ from photogram.formats.reduced_coordinates import (
     reduced_images,
     with_fitting_rotations,
 )
-from photogram.formats.rotations import is_rotation
 from photogram.io.csv_text import csv_text
 from photogram.io.units import scaled
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
+from photogram.words import Phrase, phrase
 
 TITLE = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
-DIGITS = 6
-"""Of principal distances in millimetres: files have three of the micrometre."""
+DIGITS = 6  # Of principal distances in millimetres: files have three of the micrometre
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -50,17 +50,16 @@ def read(path: Path, wishes: Wishes) -> Project:
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
-        raise InputError(f"has no image file *{IMAGES}", file=path)
+        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
     names = names_beside(folder / NAMES)
     found, messages = Reduced(), []
     _images(images, names, found)
     if not found.images:
-        raise InputError("has no images", file=images)
+        raise InputError(phrase("format.missing", what="image observations"), file=images)
     first = found.images[0]
     messages.append(
         Message(
-            f"micrometres; first record: point {first[1]} on photo {first[0]}, x {first[2]:.4f} mm, y"
-            f" {first[3]:.4f} mm",
+            phrase("format.first-record", unit="um", point=first[1], photo=first[0], x=first[2], y=first[3]),
             images,
         )
     )
@@ -81,7 +80,7 @@ def _images(path: Path, names: dict[str, str], found: Reduced) -> None:
         elif photo is None:
             photo = names.get(card.words[0], card.words[0])
             if photo in found.photos:
-                raise card.place.error(f"the photo {photo} is there twice")
+                raise card.place.error(phrase("format.repeated", what="photo", name=photo))
             c = card.number(1, "the principal distance") * MICROMETRES
             found.photos[photo] = found.principal_distance(c, card.place)
         else:
@@ -105,22 +104,22 @@ def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wish
             elements: list[float] = []
             while len(elements) < 9:
                 if row >= len(lines):
-                    raise head.place.error("ends before the nine elements of the rotation")
+                    raise head.place.error(phrase("format.end", name="the nine elements of the rotation"))
                 elements += lines[row].numbers(0, " ".join(["element"] * len(lines[row].words))).tolist()
                 row += 1
             matrix = _rotation(head, elements)
         if photo in found.poses:
-            raise head.place.error(f"the photo {photo} is there twice")
+            raise head.place.error(phrase("format.repeated", what="photo", name=photo))
         found.poses[photo] = centre, matrix
 
 
 def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Return A, photo to object; twelve digits are not orthonormal to the last bit."""
     if len(elements) != 9:
-        raise card.place.error(f"is followed by {len(elements)} elements of a rotation, not 9")
+        raise card.place.error(phrase("format.count", n=len(elements), required=9))
     matrix = np.array(elements).reshape(3, 3)
     if not is_rotation(matrix, 1e-4):
-        raise card.place.error("is followed by no rotation matrix: not orthonormal, or mirrored")
+        raise card.place.error(phrase("format.rotation"))
     u, _, vt = np.linalg.svd(matrix)
     nearest: np.ndarray[tuple[int, int], np.dtype[np.float64]] = u @ vt
     return nearest
@@ -134,20 +133,17 @@ def _control(path: Path, names: dict[str, str], found: Reduced) -> None:
         position = card.numbers(1, "X Y Z")
         codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
         if name in found.control:
-            raise card.place.error(f"the point {name} is there twice")
+            raise card.place.error(phrase("format.repeated", what="point", name=name))
         # One code is that of all coordinates, two are of position and height.
         level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
         found.control[name] = position, np.array([level, level, height])
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the files have no place for."""
-    found = lost_of_reduced(project, reduced_images(project, DIGITS))
-    found.append(
-        "digits: image coordinates are written to 1e-4 micrometres, positions to 1e-5, rotations to 1e-12"
-    )
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the files cannot contain."""
+    found = [*lost_of_reduced(project, reduced_images(project, DIGITS)), phrase("lost.patb-digits")]
     if any((held[0] != held[1]) for _, held in given_control(project).values()):
-        found.append("control that is held in one of x and y: neither is held")
+        found.append(phrase("lost.horizontal-control"))
     return found
 
 

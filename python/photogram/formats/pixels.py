@@ -13,6 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import by_camera, from_corner, to_corner
+from photogram.formats.losses import losses
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
@@ -24,8 +25,8 @@ from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
 from photogram.io.rows import DELIMITERS
-from photogram.messages import Message, quoted
-from photogram.words import Phrase
+from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
 TITLE = "table of pixels"
 FILE = "images.csv"
@@ -73,7 +74,7 @@ def _headings(begin: str) -> list[str]:
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a table; photos have the only camera of `--camera FILE`, or that of a column `camera`."""
     if wishes.cameras is None:
-        raise InputError("a table of pixels has no cameras: --camera FILE gives them", file=path)
+        raise InputError(phrase("format.cameras"), file=path)
     messages: list[Message] = []
     table = pixel_table(path, messages)
     cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), messages))
@@ -83,18 +84,14 @@ def read(path: Path, wishes: Wishes) -> Project:
     of_photo[photos.rows] = which
     other = np.flatnonzero(of_photo[photos.rows] != which)
     if len(other):
-        raise table.error(int(other[0]), "column camera: the photo had another camera before")
+        raise table.error(int(other[0]), phrase("pixels.camera"))
     corner = corner_of(table, wishes.pixel_origin)
     if wishes.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
-        messages.append(
-            Message(
-                "coordinates below 0 say that the middle of the first pixel is 0, 0: --pixel-origin center"
-            )
-        )
+        messages.append(Message(phrase("pixels.origin")))
     xy = by_camera(corner, which, lambda row, own: from_corner(cameras.cameras[row], cameras.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
-        messages.append(Message(f"{np.count_nonzero(~keep)} images are not used", path))
+        messages.append(Message(phrase("pixels.unused", n=int(np.count_nonzero(~keep))), path))
     sd = _sd(table, wishes)
     count = len(photos.names)
     return assembled(
@@ -127,20 +124,21 @@ def _sd(table: ColumnTable, wishes: Wishes) -> Floats | None:
     found = np.where(np.isnan(found), common[:, np.newaxis], found)
     bad = np.flatnonzero(~(found > 0).all(axis=1))
     if len(bad):
-        raise table.error(int(bad[0]), "a standard deviation is not positive")
+        value = float(found[bad[0]].min())
+        raise table.error(int(bad[0]), phrase("format.positive", name="the standard deviation", value=value))
     return found
 
 
 def _cameras_of(table: ColumnTable, names: list[str]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     if "camera" not in table:
         if len(names) > 1:
-            raise table.head.error(f"the column camera is missing, and there are {len(names)} cameras")
+            raise table.head.error(phrase("format.camera-column", n=len(names)))
         return np.zeros(table.count, dtype=np.int64)
     places = {name: row for row, name in enumerate(names)}
     texts = table.texts("camera", names[0] if len(names) == 1 else "")
     bad = next((row for row, name in enumerate(texts) if name not in places), None)
     if bad is not None:
-        raise table.error(bad, f"column camera: there is no camera {quoted(texts[bad])}")
+        raise table.error(bad, phrase("format.undefined", what="camera", name=texts[bad]))
     return np.array([places[name] for name in texts], dtype=np.int64)
 
 
@@ -166,13 +164,9 @@ def write(project: Project) -> Mapping[str, bytes]:
     }
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project a table of pixels has no place for."""
-    del project
-    return [
-        f"everything but image coordinates and their standard deviations; cameras: {CAMERAS} beside it is a"
-        " table for --camera"
-    ]
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that a table of pixels cannot contain."""
+    return losses(project, "all-but-images")
 
 
 FORMAT = Format(

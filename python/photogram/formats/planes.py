@@ -11,13 +11,11 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
+from photogram.words import Phrase, phrase
 
-RADIUS = 6_371_000.0
-"""Of the earth, metres."""
-LIKE_A_PLANE = 1e5
-"""Metres: coordinates that are both larger are those of a map, not of axes of one's own."""
-STEP = 100.0
-"""Metres, over which scales are measured."""
+RADIUS = 6_371_000.0  # Of the earth, metres
+LIKE_A_PLANE = 1e5  # Metres: coordinates that are both larger are those of a map, not of axes of one's own
+STEP = 100.0  # Metres, over which scales are measured
 
 
 @dataclass(frozen=True)
@@ -30,15 +28,14 @@ class Bend:
     # the edges: least and largest; heights have scale 1. None where the projection is not known
     scale: tuple[float, float] | None
 
-    def __str__(self) -> str:
-        text = (
-            f"heights bend by {self.curvature:.3g} m over the {self.extent:.0f} m from the middle of the"
-            " block to its edge"
-        )
+    @property
+    def phrase(self) -> Phrase:
+        """The effect in words."""
+        sizes = {"curvature": self.curvature, "extent": self.extent}
         if self.scale is None:
-            return text
-        least, largest = (1e6 * each for each in self.scale)
-        return f"{text}, horizontal lengths are scaled by {least:.0f} to {largest:.0f} ppm, heights are not"
+            return phrase("planes.heights", **sizes)
+        least, largest = (1e6 * part for part in self.scale)
+        return phrase("planes.scales", **sizes, least=least, largest=largest)
 
 
 def bend(xyz: Floats, crs: str = "") -> Bend:
@@ -76,8 +73,7 @@ def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> lis
             return []
         return [
             Message(
-                f"the plane of {frame.crs} is adjusted as if it were cartesian: {bend(known, frame.crs)};"
-                " with [control] crs in place of [frame] crs the frame is a cartesian one",
+                phrase("planes.projected", crs=frame.crs, bend=bend(known, frame.crs).phrase),
                 path,
             )
         ]
@@ -86,9 +82,7 @@ def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> lis
         return []
     return [
         Message(
-            "coordinates look like those of a map, and are adjusted as if they were cartesian:"
-            f" {bend(known)}, and the scale of the projection is not that of heights; where [control] crs or"
-            " --control-crs names the system, a cartesian frame is chosen",
+            phrase("planes.map", bend=bend(known).phrase),
             path,
         )
     ]

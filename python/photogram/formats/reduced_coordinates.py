@@ -11,6 +11,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Wishes
+from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, assembled
@@ -20,17 +21,13 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
-from photogram.network.observations import Control
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
-BETTER = 3.0
-"""How much better rotations must fit transposed to be taken so."""
-LEAST, MOST = 2.0, 3000.0
-"""Millimetres between which principal distances of cameras lie."""
+BETTER = 3.0  # How much better rotations must fit transposed to be taken so
+LEAST, MOST = 2.0, 3000.0  # Millimetres between which principal distances of cameras lie
 NOMINAL = 100.0
 """Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
-SIDE = -0.02
-"""u3 of unit directions beyond which a perspective camera has no picture."""
+SIDE = -0.02  # u3 of unit directions beyond which a perspective camera has no picture
 
 
 @dataclass
@@ -49,7 +46,7 @@ class Reduced:
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
         if not LEAST < abs(c) < MOST:
-            raise place.error(f"a principal distance of {abs(c):g} mm: is the unit another one?")
+            raise place.error(phrase("reduced.distance", value=abs(c), low=LEAST, high=MOST))
         name = f"c {abs(c):.12g} mm"
         # Coordinates are those of the positive plane: the model has c negative there.
         self.cameras.setdefault(name, Camera("perspective", {"c": -abs(c)}, name=name))
@@ -103,9 +100,7 @@ def project_of(
         lacks=lacks,
         messages=[
             *messages,
-            Message(
-                "coordinates are taken as reduced and the object space as cartesian, as such files mean them"
-            ),
+            Message(phrase("reduced.assumed")),
         ],
     )
 
@@ -125,13 +120,11 @@ def with_fitting_rotations(project: Project) -> Project:
     limit = 0.1 * float(np.median(block.camera_scales()))
     if min(as_read, transposed) > limit:
         raise InputError(
-            f"rays meet neither with the rotations as they stand nor transposed: residuals of"
-            f" {as_read:.3g} and"
-            f" {transposed:.3g} mm",
+            phrase("reduced.rays", as_read=as_read, transposed=transposed),
             file=project.path,
         )
     if transposed * BETTER < as_read:
-        remark = Message("rotations were read transposed: so rays meet, and as they stand they do not")
+        remark = Message(phrase("reduced.transposed"))
         return other.replace(messages=(*project.messages, remark))
     return project
 
@@ -203,31 +196,14 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
     return found
 
 
-def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[str]:
-    """Return what has no place in files of reduced coordinates."""
-    block = project.block
-    found = [
-        "standard deviations of images, poses and control",
-        "positions of points that are no control, the frame and its unit",
-    ]
-    cameras, _ = known_cameras(block)
-    if any(each.model != "perspective" for each in cameras):
-        found.append(
-            "lenses: coordinates are those of cameras without distortion, which is exact for the geometry"
-        )
-    if any(each.unit == "px" for each in cameras) and None in project.pixel_mm:
-        found.append(f"pixels whose size is not known: the principal distance is {NOMINAL:g} mm for them")
-    if lost := len(block.image_xy) - len(reduced.rows):
-        found.append(f"{lost} images that a perspective camera does not have")
-    if not reduced.posed.all():
-        found.append(f"that {np.count_nonzero(~reduced.posed)} photos have no pose or only part of one")
-    others = [each for each in block.observations if not isinstance(each, Control)]
-    if len(others) < len(block.observations):
-        found.append("correlations between coordinates of control")
-    if others:
-        found.append(f"{len(others)} observations beside images and control")
-    if block.mounts:
-        found.append("rigs: photos have their poses")
+def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
+    """Return parts of a project that files of reduced coordinates cannot contain."""
+    found = losses(project, "deviations", "points", "frame", "lenses", "unposed", "correlations")
+    found += losses(project, "observations-and-gnss", "rigs")
+    if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
+        found.append(phrase("lost.nominal-distance", distance=NOMINAL))
+    if lost := len(project.block.image_xy) - len(reduced.rows):
+        found.append(phrase("lost.images", n=lost))
     return found
 
 

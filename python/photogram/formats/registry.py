@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 from types import MappingProxyType
 
 from photogram.errors import InputError, PhotogramError, message_of
-from photogram.formats.block_contents import check_images, lost_motions
+from photogram.formats.block_contents import check_images
 from photogram.formats.format import Format, Wishes, later
 from photogram.formats.format_coordinates import (
     in_pixels,
@@ -17,6 +17,7 @@ from photogram.formats.format_coordinates import (
     nominal_pixels,
     topocentric_remarks,
 )
+from photogram.formats.losses import losses
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
@@ -24,8 +25,8 @@ from photogram.formats.xml_stream import check_root
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
-from photogram.messages import counted, listed
 from photogram.results.result import Result
+from photogram.words import phrase
 
 __all__ = [
     "FORMATS",
@@ -76,7 +77,7 @@ def _written(name: str, project: Project) -> Mapping[str, bytes]:
 def _unread(path: Path, wishes: Wishes) -> Project:
     """Refuse to read what has cameras alone."""
     del wishes
-    raise InputError("has cameras alone, and no photos", file=path)
+    raise InputError(phrase("format.cameras-only"), file=path)
 
 
 FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
@@ -103,8 +104,7 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 SD = ("images", "control", "check", "gnss")
 """What of any format may have standard deviations that its files do not say."""
-MOST = 200
-"""Files of a folder that are looked at where the folder itself has no format."""
+MOST = 200  # Files of a folder that are looked at where the folder itself has no format
 
 
 def recognised(path: Path) -> Format:
@@ -134,24 +134,14 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
         # The reader says best what is missing.
         return among[0], path
     if found:
-        several = ", ".join(
-            f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
-            for each, where in found
-        )
-        raise InputError(f"may be read as {several}: say which", file=path)
-    for each in files:
-        check_root(each)
-    what = "folder holds" if path.is_dir() else "file is"
-    titles = listed([f"{each.title} ({each.name})" for each in FORMATS.values()], len(FORMATS))
-    raise InputError(f"the {what} none of the formats that are known: {titles}{_beside(path)}", file=path)
-
-
-def _beside(path: Path) -> str:
-    """Return what is to be said where a file is one of several of a project."""
-    if path.is_dir():
-        return ""
-    found = [each.title for each in FORMATS.values() if each.recognises(path.parent)]
-    return f"; its folder is a {found[0]}: give that" if len(found) == 1 else ""
+        names = [f"{where.name}: --format {each.name}" for each, where in found]
+        raise InputError(phrase("format.ambiguous", names=names), file=path)
+    for file in files:
+        check_root(file)
+    names = [f"{each.title} ({each.name})" for each in FORMATS.values()]
+    of_folder = [each.title for each in FORMATS.values() if path.is_file() and each.recognises(path.parent)]
+    code = "format.folder" if len(of_folder) == 1 else "format.unrecognised"
+    raise InputError(phrase(code, names=names, title=of_folder[0] if of_folder else ""), file=path)
 
 
 def read(path: Path, file_format: str | None = None, wishes: Wishes | None = None) -> Project:
@@ -177,9 +167,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
         try:
             wishes = wishes or Wishes()
             if wishes.settings and chosen.name != "plain":
-                raise InputError(f"is no plain project but {chosen.title}, which has no settings: --set")
+                raise InputError(phrase("format.settings", title=chosen.title))
             if (own := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
-                raise InputError(f"is no plain project but {chosen.title}, which has no {own[0]}: --sd")
+                raise InputError(phrase("format.kind", kind=own[0], title=chosen.title))
             project = chosen.read(path, wishes)
             if wishes.photos or wishes.gnss or "settings" in project.details:
                 from photogram.formats.metadata.adding import with_wished_photos
@@ -194,10 +184,8 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
-            # A reader has names for all that it expects; what it did not is still no bug of the user's.
-            what = f"cannot be read as {chosen.title} because of a value that it does not allow"
-            remedy = "check the file, or name its format (--format)"
-            raise InputError(f"{what} ({type(error).__name__}: {error}): {remedy}", file=path) from error
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(phrase("format.value", title=chosen.title, reason=reason), file=path) from error
 
 
 def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
@@ -210,8 +198,8 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
     """
     chosen = _named(file_format, _TO_WRITE)
     if chosen.write is None:
-        writable = ", ".join(name for name, each in _TO_WRITE.items() if each.write)
-        raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
+        writable = [name for name, each in _TO_WRITE.items() if each.write]
+        raise InputError(phrase("format.read-only", title=chosen.title, names=writable))
     if chosen.name != "plain":
         check_images(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
@@ -272,8 +260,8 @@ def target(path: Path, file_format: str | None = None) -> Target:
         exact = [each for each in among if each.files[:1] == (path.name,)]
         found = exact or [each for each in among if any(path.match(pattern) for pattern in each.files)]
         if len(found) > 1:
-            names = " or ".join(f"{each.title} (--to {each.name})" for each in found)
-            raise InputError(f"may be {names}: say which", file=path)
+            names = [f"{each.title} (--to {each.name})" for each in found]
+            raise InputError(phrase("format.target", names=names), file=path)
         if found:
             return Target(found[0], path.parent, path.name)
     if file_format is not None:
@@ -299,14 +287,12 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
         check_images(project.block, chosen.title)
-    beside = [counted(len(project.features), "feature")] if project.features else []
-    beside += parts_of_asked(project.statement) + lost_motions(project.block)
-    return [
-        *([] if chosen.geographic else topocentric_remarks(project)),
-        *chosen.cannot_hold(_fitting(project, chosen)),
-        *([] if chosen.name == "plain" else beside),
-        *(nominal_pixels(project) if chosen.pixels else []),
-    ]
+    found = [] if chosen.geographic else topocentric_remarks(project)
+    found += chosen.cannot_hold(_fitting(project, chosen))
+    if chosen.name != "plain":
+        found += [*losses(project, "features"), *parts_of_asked(project.statement)]
+        found += losses(project, "trajectories", "moments")
+    return [str(part) for part in [*found, *(nominal_pixels(project) if chosen.pixels else [])]]
 
 
 def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
@@ -329,5 +315,5 @@ def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
 def _named(file_format: str, among: Mapping[str, Format] = FORMATS) -> Format:
     if file_format not in among:
-        raise InputError(f"format is one of {', '.join(among)}, not {file_format!r}")
+        raise InputError(phrase("format.unknown", what="format", value=file_format, names=list(among)))
     return among[file_format]

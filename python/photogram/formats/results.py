@@ -17,6 +17,7 @@ from photogram.results.block_files import KIND as BLOCK
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
 from photogram.results.saved_block import read_block_result
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.collection.result import AdjustedCollection
@@ -55,13 +56,16 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     document = read_summary(folder)
     kind = document["kind"]
     if kind not in readers:
-        raise InputError(f"keeps a result of a kind that is not known: {kind!r}", file=folder / SUMMARY)
+        raise InputError(
+            phrase("format.unknown", what="kind of the result", value=str(kind), names=list(readers)),
+            file=folder / SUMMARY,
+        )
     try:
         return readers[kind](folder, document)
     except InputError:
         raise
     except (LookupError, TypeError, ValueError) as error:
-        raise InputError(f"does not hold together: {error}", file=folder / SUMMARY) from None
+        raise InputError(phrase("results.contradiction", reason=str(error)), file=folder / SUMMARY) from None
 
 
 def is_result(path: Path) -> bool:
@@ -74,7 +78,7 @@ def _project(path: Path, wishes: Wishes) -> Project:
     del wishes
     result = read_result(path)
     if not isinstance(result, Result):
-        raise InputError("holds the result of a collection, which photogram.read_result reads", file=path)
+        raise InputError(phrase("results.collection"), file=path)
     datums: dict[str, DatumName] = {"inner constraints": "inner", "minimum constraints": "minimum"}
     losses: dict[str, Literal["huber", "cauchy"]] = {"huber": "huber", "cauchy": "cauchy"}
     variances: dict[str, Literal["unity", "redundancy"]] = {"unity": "unity", "redundancy": "redundancy"}

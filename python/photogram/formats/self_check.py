@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.images import Y_DOWN
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
-from photogram.formats.rotations import Y_DOWN
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -18,13 +18,11 @@ from photogram.network.film_reduction import camera_images, camera_unit
 from photogram.network.motion import given_poses, on_shared
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
+from photogram.words import phrase
 
-MOST = 20_000
-"""Images that are looked at."""
-GROSS, PART = 50.0, 0.1
-"""Pixels, and part of the width, that a median residual must exceed to be doubted."""
-BETTER = 10.0
-"""How much smaller it must be with another convention for that to be named."""
+MOST = 20_000  # Images that are looked at
+GROSS, PART = 50.0, 0.1  # Pixels, and part of the width, that a median residual must exceed to be doubted
+BETTER = 10.0  # How much smaller it must be with another convention for that to be named
 NEARLY_ALL = 0.9
 
 
@@ -123,29 +121,18 @@ def doubts(project: Project) -> list[Message]:
         return []
     messages = []
     if found.behind > NEARLY_ALL:
-        messages.append(
-            Message(
-                f"{100 * found.behind:.0f} % of the points lie behind their photos: the file may be mirrored,"
-                " or its photos look the other way"
-            )
-        )
+        messages.append(Message(phrase("agreement.mirrored", percent=100 * found.behind)))
     elif found.behind > 0:
-        messages.append(
-            Message(f"{100 * found.behind:.2g} % of the images show points that lie behind their photos")
-        )
+        messages.append(Message(phrase("agreement.behind", percent=100 * found.behind)))
     widths = [size[0] for size in project.sizes if size is not None]
     scale = float(np.median(project.block.camera_scales()))
     limit = max(GROSS, PART * min(widths)) if widths and camera_unit(project.block) == "px" else PART * scale
     if found.median > limit:
         sample = _sample(project)
         helps = [name for name, change in _OTHERS.items() if change(sample).median() * BETTER < found.median]
-        advice = f"; it would be {BETTER:g} times smaller with {' or with '.join(helps)}" if helps else ""
-        messages.append(
-            Message(
-                f"positions and images do not agree: the median residual is {found.median:.3g}"
-                f" {camera_unit(project.block)}{advice}"
-            )
-        )
+        code = "agreement.convention" if helps else "agreement.residuals"
+        fields = {"median": found.median, "unit": camera_unit(project.block), "names": helps}
+        messages.append(Message.of(code, **fields, factor=BETTER))
     return messages
 
 
@@ -162,8 +149,8 @@ def _mirrored(axis: int) -> Callable[[_Sample], _Sample]:
 
 
 _OTHERS: dict[str, Callable[[_Sample], _Sample]] = {
-    "y (rows) counted the other way": _mirrored(1),
-    "x (columns) counted the other way": _mirrored(0),
-    "rotations transposed": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
-    "photos that look the other way": lambda sample: replace(sample, matrices=Y_DOWN @ sample.matrices),
+    "y (rows) in the opposite direction": _mirrored(1),
+    "x (columns) in the opposite direction": _mirrored(0),
+    "transposed rotations": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
+    "photos in the opposite direction": lambda sample: replace(sample, matrices=Y_DOWN @ sample.matrices),
 }

@@ -18,14 +18,12 @@ from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
-SUFFIXES = (".xml", ".psz")
-"""The endings of documents, and of archives with a document."""
+SUFFIXES = (".xml", ".psz")  # The endings of documents, and of archives with a document
 PIECE = 1 << 16
 DEEPEST = 200
-LONGEST = 1 << 20
-"""Bytes of a tag, characters of a text: the parser begins a long tag again with every piece."""
+LONGEST = 1 << 20  # Bytes of a tag, characters of a text: the parser begins a long tag again with every piece
 MOST = 1_000_000
 """Elements that are kept until what holds them is handed over; 64 characters of theirs count as another."""
 CHARACTERS = 64
@@ -65,7 +63,7 @@ class Element:
         """Return the first child of a name; an error where there is none."""
         found = self.child(name)
         if found is None:
-            raise self.error(f"has no {name}")
+            raise self.error(phrase("format.member", name=name))
         return found
 
     def word(self, name: str, default: str = "") -> str:
@@ -105,14 +103,14 @@ class Element:
         if name not in self.attributes:
             if default is not None:
                 return default
-            raise self.error(f"has no attribute {name}")
+            raise self.error(phrase("format.member", name=name))
         return self._number(self.attributes[name])
 
     def numbers(self, count: int) -> Floats:
         """Return the text as so many numbers."""
         words = self.text.split()
         if len(words) != count:
-            raise self.error(f"has {len(words)} numbers, not {count}")
+            raise self.error(phrase("format.count", n=len(words), required=count))
         return np.array([self._number(word) for word in words])
 
 
@@ -127,9 +125,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
         names = [name for name in archive.namelist() if name.lower().endswith(".xml")]
         name = "doc.xml" if "doc.xml" in names else names[0] if len(names) == 1 else None
         if name is None:
-            raise InputError(
-                f"is an archive with {len(names)} documents: one, or doc.xml, is read", file=path
-            )
+            raise InputError(phrase("xml.archive", n=len(names)), file=path)
         check_unpacked_size(path, [archive.getinfo(name)])
         with archive.open(name) as packed:
             yield packed
@@ -167,14 +163,14 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
         nonlocal kept
         kept += more
         if kept > MOST:
-            raise element.error(f"more than {MOST} elements stand in one")
+            raise element.error(phrase("xml.elements", most=MOST))
 
     def start(name: str, attributes: dict[str, str]) -> None:
         element = Element(name, attributes, path, parser.CurrentLineNumber)
         if not stack and name != root:
-            raise element.error(f"the root is {name}, not {root}")
+            raise element.error(phrase("xml.root", name=root, value=name))
         if len(stack) >= DEEPEST:
-            raise element.error("elements are nested too deep")
+            raise element.error(phrase("xml.depth", most=DEEPEST))
         first[:] = first or [element]
         before.append(kept)
         keep(element, 1 + sum(map(len, attributes.values())) // CHARACTERS)
@@ -192,12 +188,12 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     def text(data: str) -> None:
         element = stack[-1]
         if len(element.text) > LONGEST:
-            raise element.error(f"has a text of more than {LONGEST} characters")
+            raise element.error(phrase("xml.text", most=LONGEST))
         keep(element, len(data) // CHARACTERS)
         element.text += data
 
     def declares(*_: Any) -> None:
-        raise Place(path, parser.CurrentLineNumber).error("declares entities, which are not read")
+        raise Place(path, parser.CurrentLineNumber).error(phrase("xml.entities"))
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.EntityDeclHandler = text, declares
@@ -208,17 +204,19 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
                 parser.Parse(piece, False)
                 fed += len(piece)
                 if fed - parser.CurrentByteIndex > LONGEST:
-                    raise Place(path, parser.CurrentLineNumber).error(f"a tag of more than {LONGEST} bytes")
+                    raise Place(path, parser.CurrentLineNumber).error(phrase("xml.tag", most=LONGEST))
             parser.Parse(b"", True)
     except UNPACKABLE as error:
-        raise InputError(f"cannot be unpacked: {error}", file=path) from None
+        raise InputError(phrase("xml.packed", reason=str(error)), file=path) from None
     except xml.parsers.expat.ExpatError as error:
         what = xml.parsers.expat.ErrorString(error.code)
         raise InputError(
-            f"is no XML: {what}, column {error.offset + 1}", file=path, record=error.lineno
+            phrase("xml.syntax", reason=what, column=error.offset + 1), file=path, record=error.lineno
         ) from None
     except (ValueError, LookupError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"is no XML: {error}", file=path, record=parser.CurrentLineNumber) from None
+        raise InputError(
+            phrase("xml.syntax", reason=str(error), column=1), file=path, record=parser.CurrentLineNumber
+        ) from None
     return first[0]

@@ -1,7 +1,7 @@
-from .cameras import Camera as Camera
 from .common import Common as Common
 from .diagnostics import ErrorWarning as ErrorWarning
 from .diagnostics import error_warnings as error_warnings
+from .frames import Camera as Camera
 from .frames import Frame as Frame
 from .ground import GroundPoint as GroundPoint
 from .images import ImageFrame as ImageFrame

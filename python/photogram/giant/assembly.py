@@ -17,13 +17,13 @@ from photogram.giant.ground import GroundPoint
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
-from photogram.network.structuring import structure
-from photogram.network.ties import FEWEST_TIES, ties
+from photogram.network.structuring import FEWEST_TIES, structure, ties
+from photogram.words import Phrase, phrase
 
 EARTH_RADIUS = 6.371e6  # Metres
 FALSE_ORIGIN = 1e5  # Map projections count from an origin farther off than this; local systems seldom do
@@ -36,11 +36,7 @@ def remarks(block: Block, frames: list[Frame]) -> list[Message]:
     for frame, count in zip(frames, ties(block).tolist(), strict=True):
         loose = not (all(frame.position_sd) and all(frame.attitude_sd))
         if count < FEWEST_TIES and loose:
-            text = (
-                f"the frame {frame.name} has {count} points that other frames or control tie: its station"
-                " rests on its weights, which are the weak defaults"
-            )
-            messages.append(message_at(frame.record, text))
+            messages.append(message_at(frame.record, phrase("giant.ties", frame=frame.name, n=count)))
     return messages + _alike(block) + _map_projection(block)
 
 
@@ -64,11 +60,7 @@ def _alike(block: Block) -> list[Message]:
             groups.setdefault(alike, []).append(name)
         pairs = [" and ".join(map(repr, group)) for group in groups.values() if len(group) > 1]
         if pairs:
-            messages.append(
-                Message(
-                    f"{what} whose names differ by case or blanks only are different {what}: {listed(pairs)}"
-                )
-            )
+            messages.append(Message.of(f"giant.similar-{what}", names=pairs))
     return messages
 
 
@@ -92,13 +84,7 @@ def _map_projection(block: Block) -> list[Message]:
     shift = float(np.quantile(shifts, 0.95))
     if shift < np.median(block.image_sd):
         return []
-    return [
-        Message(
-            "the coordinates look like those of a map projection (State Plane, UTM): the earth's curvature"
-            f" is not modelled, which moves images by up to {1000 * shift:.0f} um (heights in metres);"
-            " geographic coordinates (COMMON column 1) or a local tangent system have no such error"
-        )
-    ]
+    return [Message.of("giant.map-projection", shift=1000 * shift)]
 
 
 LONGEST_METRES = 1e7  # No semi-major axis in metres is longer than this; in feet all are
@@ -114,7 +100,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
     check_files(project, limits)
     photos = _photos(project, messages)
     if not photos:
-        raise InputError("FRAMES lists no frame with images", file=project.directory)
+        raise InputError(phrase("giant.no-frames"), file=project.directory)
     frames = [frame for frame, _ in photos]
     images = [image_frame for _, image_frame in photos]
 
@@ -186,29 +172,25 @@ def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, Ima
     for images in project.images:
         first = measured.setdefault(images.name, images)
         if first is not images and images.name in listed:
-            where = f" (record {first.record.number})" if first.record else ""
-            raise error_at(images.record, f"the frame {images.name!r} already has images{where}")
+            raise error_at(images.record, phrase("giant.images-repeated", frame=images.name))
     photos = []
     for frame in project.frames:
         if frame.name in measured and measured[frame.name].points:
             photos.append((frame, measured[frame.name]))
         elif project.common.intersection_only:
-            messages.append(message_at(frame.record, f"the frame {frame.name!r} has no images: left out"))
+            messages.append(message_at(frame.record, phrase("giant.frame-excluded", frame=frame.name)))
         else:
-            raise error_at(
-                frame.record,
-                f"the frame {frame.name!r} has no images{_lost_header(project.images, frame.name)}",
-            )
+            hint = _lost_header(project.images, frame.name)
+            raise error_at(frame.record, phrase("giant.no-images", frame=frame.name, hint=hint))
     return photos
 
 
-def _lost_header(images: list[ImageFrame], name: str) -> str:
-    """Say where the name of a frame stands among points: a terminator is missing before it."""
+def _lost_header(images: list[ImageFrame], name: str) -> Phrase | str:
+    """Return a hint if a point has the name of a frame: a terminator is missing before its header."""
     for frame in images:
         if name in frame.points:
             record = frame.point_record(frame.points.index(name))
-            where = f" (record {record.number} of {record.source.path.name})" if record else ""
-            return f", but a point of {frame.name!r} has its name{where}: is a terminator **** missing?"
+            return phrase("giant.lost-header", frame=frame.name, record=record.number if record else "")
     return ""
 
 
@@ -216,12 +198,8 @@ def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
     cameras = {camera.name: camera.principal_distance for camera in project.cameras}
     for each in images:
         if not each.principal_distance and each.camera not in cameras:
-            known = ", ".join(repr(name) for name in cameras) or "none"
-            raise error_at(
-                each.record,
-                f"the frame {each.name!r} has no principal distance,"
-                f" and its camera {each.camera!r} is not in CAMERAS (there: {known})",
-            )
+            fields = {"frame": each.name, "camera": each.camera, "names": [*map(repr, cameras)]}
+            raise error_at(each.record, phrase("giant.unknown-camera", **fields))
     return np.array([each.principal_distance or cameras[each.camera] for each in images])
 
 
@@ -239,7 +217,7 @@ def _first_images(
     for row in again.tolist():
         frame = images[image_photos[row]]
         at = row - starts[image_photos[row]]
-        text = f"the point {frame.points[at]} stands in the frame {frame.name} twice: the first image is kept"
+        text = phrase("giant.image-repeated", point=frame.points[at], frame=frame.name)
         messages.append(message_at(frame.point_record(at), text))
     return np.delete(np.arange(len(pairs)), again)
 
@@ -259,18 +237,15 @@ def _control(
     alike = {} if is_complete else {plain_name(name): name for name in index}
     for point in project.ground:
         if point.name in placed:
-            messages.append(
-                message_at(point.record, f"duplicate control point {point.name}: the first is kept")
-            )
+            messages.append(message_at(point.record, phrase("giant.duplicate", point=point.name)))
             continue
         placed.add(point.name)
         row = index.get(point.name)
         if row is None:
             like = alike.get(plain_name(point.name))
-            hint = f" (the point {like!r} is, but names are compared exactly)" if like else ""
-            messages.append(
-                message_at(point.record, f"control point {point.name} is not photographed: ignored{hint}")
-            )
+            hint = phrase("giant.similar-name", name=like) if like else ""
+            text = phrase("giant.ignored-control", point=point.name, hint=hint)
+            messages.append(message_at(point.record, text))
             continue
         control[row] = point
     if control:
@@ -289,7 +264,7 @@ def _control(
     if not np.isfinite(sd).any():
         record = next((point.record for point in project.ground if point.record), None)
         path = record.source.path if record else project.directory
-        messages.append(Message("GROUND holds no component of a photographed point", path))
+        messages.append(Message.of("giant.no-control", path))
     return position, sd, check_sd
 
 

@@ -8,6 +8,7 @@ from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
+from photogram.words import phrase
 
 UnitVariance = Literal["free", "constrained", "unity"]
 UNIT_VARIANCE: tuple[UnitVariance, ...] = ("free", "constrained", "unity")
@@ -127,7 +128,7 @@ class Common:
 def parse_common(source: Source) -> Common:
     """Read COMMON."""
     if len(source.lines) < 2:
-        raise source.error("two records are needed: the title and the job definition")
+        raise source.error(phrase("giant.two-records"))
     job = source.record(2)
     common = Common(title=source.lines[0].strip(" "), strip=job.columns(15, 15).strip(" "))
     for column, name, true in SWITCHES:
@@ -139,13 +140,15 @@ def parse_common(source: Source) -> Common:
     common.residual_limit = job.real(41, 50)
     common.semi_major = job.real(51, 60, 2) or common.semi_major
     common.semi_minor = job.real(61, 70, 2) or common.semi_minor
-    _remark_on_refraction(common, job)
+    # Images that were corrected before would be corrected twice.
+    if common.air_refraction:
+        job.remark(phrase("giant.air-refraction"))
+    if common.water_refraction:
+        job.remark(phrase("giant.water-refraction", level=common.water_level))
     if common.convergence_percent < 0:
-        raise job.error("columns 18-19: the convergence criterion is negative")
+        raise job.error(phrase("giant.criterion"))
     if not 0 < common.semi_minor <= common.semi_major:
-        raise job.error(
-            "columns 51-70: the semi-minor axis must be positive and not exceed the semi-major axis"
-        )
+        raise job.error(phrase("giant.axes"))
     if len(source.lines) > 2:
         deviations, angle = source.record(3), common.geographic
         common.control_sd = (
@@ -155,42 +158,25 @@ def parse_common(source: Source) -> Common:
         )
     for record in source.records():
         if record.number > 3:
-            record.remark("COMMON has three records: this one is ignored")
+            record.remark(phrase("giant.fourth-record"))
     return common
-
-
-def _remark_on_refraction(common: Common, job: Record) -> None:
-    """Say what columns 16 and 17 ask for: images that were corrected before would be corrected twice."""
-    if common.air_refraction:
-        job.remark(
-            "column 16 asks for refraction in air, which is that of Appendix F unless --air-refraction names"
-            " another model; 0, or --air-refraction none, if the preprocessing has corrected the images"
-        )
-    if common.water_refraction:
-        job.remark(
-            "column 17 asks for refraction in water, which is that of Appendix G for points below"
-            f" {common.water_level:g} m (columns 31-40) unless --water-refraction names another model; 0, or"
-            " --water-refraction none, if there are none"
-        )
 
 
 def _digit(job: Record, column: int, largest: int) -> int:
     value = job.integer(column, column)
     if not 0 <= value <= largest:
-        raise job.error(f"column {column}: {value} is not one of 0 to {largest}")
+        raise job.error(phrase("giant.digit", column=column, largest=largest, value=value))
     return value
 
 
 def common_records(common: Common) -> list[str]:
     """Write COMMON."""
     if len(common.title) > 80 or not common.title.isprintable():
-        raise ValueError("the title must be one line of at most 80 characters")
+        raise ValueError(phrase("giant.title"))
     if len(common.strip) > 1 or not common.strip.isprintable():
-        raise ValueError(f"the character stripped from names cannot be {common.strip!r}")
+        raise ValueError(phrase("giant.strip", value=common.strip))
     if not 1 <= common.max_iterations <= 9 or not 1 <= common.convergence_percent <= 99:
-        raise ValueError(
-            "the limit of iterations must be 1 to 9 and the convergence criterion 1 to 99 percent"
-        )
+        raise ValueError(phrase("giant.iteration-limits"))
     digits = {column: true if getattr(common, name) else 1 - true for column, name, true in SWITCHES}
     digits |= {12: UNIT_VARIANCE.index(common.unit_variance), 14: common.max_iterations}
     job = "".join(common.strip or " " if column == 15 else str(digits[column]) for column in range(1, 18))

@@ -6,39 +6,30 @@ from collections.abc import Callable
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.giant.cameras import Camera, camera_records
 from photogram.giant.common import Common, common_records
 from photogram.giant.fields import parse_name
 from photogram.giant.files import written
-from photogram.giant.frames import Frame, frame_records
+from photogram.giant.frames import Camera, Frame, camera_records, frame_records
 from photogram.giant.ground import GroundPoint, ground_records
 from photogram.giant.images import ImageFrame, image_records
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.show.summary import Brief, Rows, few
+from photogram.words import phrase
 
 
 @dataclass(repr=False)
 class Contents(Brief):
-    """The content of the five files.
+    """The content of the five files."""
 
-    Attributes
-    ----------
-    common, cameras, frames, images, ground
-        The files, each with its own names and units (see their classes).
-    messages
-        Remarks on the input, made while it was read and turned into a block.
-    directory
-        Where the files were read, if they were.
-    """
-
-    common: Common
+    common: Common  # The files, each with its own names and units (see their classes)
     cameras: list[Camera]
     frames: list[Frame]
     images: list[ImageFrame]
     ground: list[GroundPoint]
+    # Remarks on the input, made while it was read and turned into a block
     messages: list[Message] = field(default_factory=list)
-    directory: Path | None = None
+    directory: Path | None = None  # Where the files were read, if they were
 
     def brief(self) -> tuple[str, Rows]:
         """Return what the project is in a few lines: titles, and how many of everything there are."""
@@ -74,9 +65,7 @@ class Contents(Brief):
             # Stripping the beginning of a name would make another name of it.
             for name in sorted(names):
                 if parse_name(name, strip) != name:
-                    raise InputError(
-                        f"the name {name!r} cannot be written: COMMON strips {strip!r} from the beginning"
-                    )
+                    raise InputError(phrase("giant.stripped-name", name=name, strip=strip))
         writers: dict[str, Callable[[], list[str]]] = {
             "COMMON": lambda: common_records(self.common),
             "CAMERAS": lambda: camera_records(self.cameras),

@@ -11,17 +11,17 @@ import numpy as np
 from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
 from photogram.giant.contents import Contents
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
-from photogram.giant.frames import Frame, frame_records
+from photogram.giant.frames import Camera, Frame, frame_records
 from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
 from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
+from photogram.words import phrase
 
 Triple = tuple[float, float, float]
 
@@ -44,7 +44,7 @@ def block_files(
     if block.spheroid is not None:
         common.semi_major, common.semi_minor = round(block.spheroid.a, 2), round(block.spheroid.b, 2)
         if (common.semi_major, common.semi_minor) != (block.spheroid.a, block.spheroid.b):
-            messages.append(Message("the axes of the spheroid are rounded to the two decimals of COMMON"))
+            messages.append(Message.of("giant.rounded-axes"))
     of_photos = block.known_distances("GIANT files").tolist()
     distances = dict.fromkeys(of_photos)
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
@@ -78,18 +78,10 @@ def _write_refraction(common: Common, block: Block) -> list[Message]:
     unit = block.linear_unit
     if refraction.phrase(unit) != said.phrase(unit):
         messages.append(
-            Message(
-                f"COMMON can only switch refraction on: {refraction.describe(unit)} is read as"
-                f" {said.describe(unit)}"
-            )
+            Message.of("giant.refraction", given=refraction.phrase(unit), written=said.phrase(unit))
         )
     if block.refraction and not block.geographic and block.linear_unit != "m":
-        messages.append(
-            Message(
-                "rectangular space is read in metres: refraction will not be that of this block in"
-                f" {block.linear_unit}"
-            )
-        )
+        messages.append(Message.of("giant.refraction-unit", unit=block.linear_unit))
     return messages
 
 
@@ -104,8 +96,7 @@ def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
         values = initial if observed is None else np.where(weighted, observed, initial)
         left |= bool((values != initial).any())
         stations.append(values)
-    text = "FRAMES has one set of stations: observed values are written, initial values are not"
-    return (stations[0], stations[1]), [Message(text)] if left else []
+    return (stations[0], stations[1]), [Message.of("giant.one-set")] if left else []
 
 
 def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:
@@ -116,9 +107,7 @@ def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:
         rows = order[bounds[photo] : bounds[photo + 1]]
         sd = block.image_sd[rows]
         if (sd != sd[:1]).any():
-            raise InputError(
-                f"the images of photo {name} differ in standard deviation; IMAGES has one pair for a frame"
-            )
+            raise InputError(phrase("giant.image-sd", photo=name))
         points = [block.point_ids[point] for point in block.image_points[rows].tolist()]
         x_sd, y_sd = sd[0].tolist() if len(sd) else (0.0, 0.0)
         frames.append(ImageFrame(name, points, block.image_xy[rows], sd=(x_sd, y_sd), camera=cameras[photo]))
@@ -142,9 +131,7 @@ def _weights(what: str, names: list[str], sd: Floats) -> Floats:
     fixed = (sd == 0).any(axis=1)
     if fixed.any():
         name = names[int(fixed.argmax())]
-        raise InputError(
-            f"{what} {name} is fixed (standard deviation 0); in GIANT files zero stands for the default"
-        )
+        raise InputError(phrase("giant.fixed", subject=what, name=name))
     return np.where(np.isinf(sd), 0.0, sd)
 
 

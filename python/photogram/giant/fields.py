@@ -12,6 +12,7 @@ from decimal import Decimal
 
 from photogram.io.records import parse_real
 from photogram.show.angles import ARCSEC
+from photogram.words import phrase
 
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 """The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
@@ -39,14 +40,7 @@ def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
 
 
 def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
-    """Read a packed DMS field.
-
-    Returns
-    -------
-    angle, doubtful
-        Radians, and whether minutes or seconds are 60: the guide lets that pass, so it is worth a remark, not
-        a stop.
-    """
+    """Read a packed DMS field."""
     packed = parse_real(field, decimals)
     if abs(packed) > LARGEST_PACKED:
         raise ValueError(
@@ -71,7 +65,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
     if math.isnan(value):
         return " " * width
     if math.isinf(value):
-        raise ValueError(f"{value} has no spelling")
+        raise ValueError(phrase("giant.not-finite", value=value))
     text = repr(value + 0.0)
     if "e" in text or len(text) > width:
         text = _rounded(value, width)
@@ -82,7 +76,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
             return implied.replace(".", "").rjust(width)
     room = width - len(whole) - 1
     if room < 0:
-        raise ValueError(f"{value} does not fit {width} columns")
+        raise ValueError(phrase("giant.width", value=value, width=width))
     text = f"{whole}.{fraction.rstrip('0').ljust(min(decimals, room), '0')}"
     if text[0] == "-" and not text.strip("-.0"):
         text = text[1:]
@@ -129,7 +123,7 @@ def format_angle(value: float, width: int) -> str:
 def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
     """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
     if not abs(value) <= MOST_ANGLE:
-        raise ValueError(f"{value} rad is beyond 360 degrees")
+        raise ValueError(phrase("giant.angle", value=value))
     arcseconds = Decimal(repr(float(value) / ARCSEC))
     places, excess = min(most, width - 2) + 1, 1
     while excess > 0 and places > 0:
@@ -137,16 +131,16 @@ def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
         whole, _, fraction = pack_dms(round(arcseconds, places)).partition(".")
         excess = len(whole) + 1 + places - width
     if excess > 0:
-        raise ValueError(f"{value} rad does not fit {width} columns")
+        raise ValueError(phrase("giant.width", value=f"{value} rad", width=width))
     return f"{whole}.{fraction.rstrip('0').ljust(min(least, places), '0')}"
 
 
 def format_name(name: str) -> str:
     """Write a name of at most eight characters into its eight columns."""
     if len(name) > 8:
-        raise ValueError(f"the name {name!r} has more than 8 characters")
+        raise ValueError(phrase("giant.name-length", name=name))
     if name != name.strip(" ") or not name.isprintable() or name.startswith("****"):
-        raise ValueError(f"the name {name!r} cannot be written: it would not be read again as it is")
+        raise ValueError(phrase("giant.name", name=name))
     return name.ljust(8)
 
 
@@ -164,7 +158,7 @@ def format_principal_distance(value: float) -> str:
         return " " * 10
     field = format_real(value, 10, 3)
     if not _significant(field):
-        raise ValueError(f"the principal distance {value} cannot be written in ten columns")
+        raise ValueError(phrase("giant.width", value=value, width=10))
     return field
 
 
@@ -181,6 +175,6 @@ def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
             continue
         field = _packed(value, 10, least=3).rjust(10) if angle else format_real(value, 10, 3)
         if not value > 0 or not _significant(field):
-            raise ValueError(f"the standard deviation {value} cannot be written in ten columns")
+            raise ValueError(phrase("giant.width", value=value, width=10))
         fields.append(field)
     return "".join(fields)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from photogram.errors import InputError
+from photogram.words import phrase
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
@@ -18,7 +19,7 @@ def present_files(directory: Path) -> dict[str, list[Path]]:
         entries = sorted(directory.iterdir())
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(f"the directory cannot be read: {reason}", file=directory) from None
+        raise InputError(phrase("giant.folder", reason=reason), file=directory) from None
     for entry in entries:
         name = project_name(entry)
         # A link that leads nowhere or round in a loop is meant to be the file: reading it says what it is.
@@ -38,13 +39,10 @@ def find_files(directory: Path) -> dict[str, Path]:
     files: dict[str, Path] = {}
     for name, candidates in present_files(directory).items():
         if not candidates:
-            raise InputError(
-                f"{name} is missing (looked for {name}, {name.lower()}, {name}.* in any letter case)",
-                file=directory,
-            )
+            raise InputError(phrase("giant.missing", name=name, lower=name.lower()), file=directory)
         if len(candidates) > 1:
-            listed = ", ".join(candidate.name for candidate in candidates)
-            raise InputError(f"more than one file could be {name}: {listed}", file=directory)
+            names = [candidate.name for candidate in candidates]
+            raise InputError(phrase("giant.several", name=name, names=names), file=directory)
         files[name] = candidates[0]
     return files
 
@@ -54,7 +52,7 @@ def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
     try:
         return writer()
     except ValueError as error:
-        raise InputError(f"{name} cannot be written: {error}") from None
+        raise InputError(phrase("giant.not-written", name=name, error=str(error))) from None
 
 
 def to_bytes(records: Iterable[str]) -> bytes:

@@ -1,4 +1,4 @@
-"""FRAMES (units 3, 8 and 20): position and attitude of the camera stations (GIANT guide, section II.B.4)."""
+"""CAMERAS (unit 1) and FRAMES (units 3, 8, 20): cameras and stations (GIANT guide, sections II.B.2 and 4)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,56 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
-from photogram.giant.fields import format_name
+from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
+from photogram.words import phrase
 
 ATTITUDE_SD = 90 * 3600 * ARCSEC  # Default standard deviation of omega, phi and kappa: 90 degrees, in radians
+
+
+@dataclass
+class Camera:
+    """One camera system.
+
+    Attributes
+    ----------
+    name
+        At most 8 characters; blank is a name too, of use where there is one camera only.
+    principal_distance
+        Millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
+    record
+        Where the camera was read.
+    """
+
+    name: str
+    principal_distance: float
+    record: Record | None = field(default=None, compare=False, repr=False)
+
+
+def parse_cameras(source: Source) -> list[Camera]:
+    """Read CAMERAS."""
+    cameras: list[Camera] = []
+    spellings: dict[str, Record] = {}
+    for record in source.records():
+        name = record.identification(spellings)
+        first = spellings[name]
+        if first is not record:
+            raise record.error(phrase("giant.camera-repeated", camera=name, record=first.number))
+        principal_distance = record.real(11, 20)
+        if principal_distance == 0:
+            raise record.error(phrase("giant.principal-distance", camera=name))
+        cameras.append(Camera(name, principal_distance, record))
+    return cameras
+
+
+def camera_records(cameras: Iterable[Camera]) -> list[str]:
+    """Write CAMERAS."""
+    return [
+        f"{format_name(camera.name)}  {format_principal_distance(camera.principal_distance)}"
+        for camera in cameras
+    ]
 
 
 @dataclass
@@ -57,13 +101,13 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
     for position, attitude, (plain_position, plain_attitude) in pairs:
         name = position.identification(spellings)
         if not name:
-            raise position.error("columns 1-8: the frame has no name")
+            raise position.error(phrase("giant.no-name", subject="frame"))
         first = spellings[name]
         if first is not position:
-            raise position.error(f"the frame {name!r} is already listed in record {first.number}")
+            raise position.error(phrase("giant.frame-repeated", frame=name, record=first.number))
         if attitude is None or attitude.identification(spellings) != name:
             where = position if attitude is None else attitude
-            raise where.error(f"the second record (attitude) of the frame {name!r} was expected")
+            raise where.error(phrase("giant.attitude-record", frame=name))
         station, station_sd = plain_position or (
             position.position(geographic),
             position.deviations(geographic, geographic, False),

@@ -10,6 +10,7 @@ import numpy as np
 from photogram.giant.columns import Columns, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
+from photogram.words import phrase
 
 CHECK_POINT = 7  # The type code of a point of which nothing is held
 
@@ -66,17 +67,15 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
         )
         point = GroundPoint(name, position, sd, int(type_code), record)
         if point.type_code > CHECK_POINT:
-            raise record.error(f"column 80: the type code {point.type_code} is not one of 0 to 7")
+            raise record.error(phrase("giant.digit", column=80, largest=7, value=point.type_code))
         first = points.setdefault(name, point)
         if first is not point and first.record is not None:
             first.repeats += 1
-            record.remark(f"duplicate control point {name}: record {first.record.number} is kept")
+            record.remark(phrase("giant.control-repeated", point=name, record=first.record.number))
             continue
         for held, value, column in zip(point.held, position, (9, 21, 33), strict=True):
             if held and value == 0 and record.blank(column, column + 11):
-                record.remark(
-                    f"columns {column}-{column + 11}: the blank component of {name} is held at zero"
-                )
+                record.remark(phrase("giant.blank-component", first=column, last=column + 11, point=name))
     return list(points.values())
 
 

@@ -11,6 +11,7 @@ from photogram.giant.columns import Columns, deviation_fields, real_fields, text
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.words import phrase
 
 IMAGE_SD = 0.010  # Default standard deviation of an image coordinate in millimetres
 
@@ -67,7 +68,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     if starts[-1] != len(numbers):
         header, last = source.record(numbers[starts[-1]]), source.record(numbers[-1])
         raise last.error(
-            f"the frame {header.name(1)!r} (record {header.number}) has no terminator {TERMINATOR}"
+            phrase("giant.terminator", frame=header.name(1), record=header.number, text=TERMINATOR)
         )
     points = np.ones(len(numbers), dtype=bool)
     points[ends] = False
@@ -88,10 +89,10 @@ def parse_images(source: Source) -> list[ImageFrame]:
     bounds = np.searchsorted(point_rows, starts).tolist()
     for header, values, first, last in zip(headers, plain, bounds, bounds[1:], strict=False):
         if header.text.startswith(TERMINATOR):
-            raise header.error("a terminator without the header of a frame before it")
+            raise header.error(phrase("giant.no-header"))
         name = header.identification(spellings)
         if not name:
-            raise header.error("columns 1-8: the frame has no name")
+            raise header.error(phrase("giant.no-name", subject="frame"))
         sd, (distance,) = values or (
             (header.deviation(21, 30), header.deviation(31, 40)),
             (header.real(11, 20),),
@@ -111,11 +112,9 @@ def _coordinates(source: Source, numbers: list[int]) -> Floats:
         record = source.record(numbers[row])
         blank = [record.blank(first, first + 9) for first in (11, 21)]
         if all(blank) or (any(blank) and not record.blank(31, 48)):
-            raise record.error(
-                "a point without coordinates; if it is a header, the terminator **** before it is missing"
-            )
+            raise record.error(phrase("giant.no-coordinates"))
         if any(blank):
-            record.remark("a blank image coordinate is read as zero")
+            record.remark(phrase("giant.blank-coordinate"))
         xy[row] = record.real(11, 20), record.real(21, 30)
     return xy
 

@@ -11,7 +11,8 @@ from photogram.arguments.types import Bools, Indices
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
 from photogram.lazy_dataclasses import dataclass, fields
-from photogram.messages import Message, listed
+from photogram.messages import Message
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.giant.contents import Contents
@@ -66,7 +67,7 @@ class Limits:
         for each in fields(self):
             value = getattr(self, each.name)
             if value is not None and (not isinstance(value, int) or value < 1):
-                raise InputError(f"the limit of {each.name} must be a positive whole number, not {value!r}")
+                raise InputError(phrase("giant.limit", name=each.name, value=repr(value)))
 
     @classmethod
     def parse(cls, text: str) -> Self:
@@ -81,7 +82,7 @@ class Limits:
         for each in text.split(","):
             name, _, value = (part.strip() for part in each.partition("="))
             if name.upper() not in NAMES or not (value.isascii() and value.isdigit()):
-                raise InputError(f"limits are written N1=300,N4=8 with N1 to N6, not {each.strip()!r}")
+                raise InputError(phrase("giant.limits", value=each.strip()))
             values[NAMES[name.upper()]] = int(value)
         return cls(**values)
 
@@ -103,9 +104,8 @@ def check_points(names: Sequence[str] | dict[str, int], limits: Limits) -> None:
 def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int, limit: int | None) -> None:
     if limit is None or count <= limit:
         return
-    text = f"**{what} EXCEEDED {limit}: there are {count}"
     record = items[limit].record if len(items) > limit else None
-    raise error_at(record, text)
+    raise error_at(record, phrase("giant.exceeded", subject=what, limit=limit, count=count))
 
 
 def allowed_images(image_points: Indices, names: list[str], limits: Limits, messages: list[Message]) -> Bools:
@@ -123,9 +123,8 @@ def allowed_images(image_points: Indices, names: list[str], limits: Limits, mess
     allowed[by_point] = number < limit
     over = np.unique(image_points[~allowed]).tolist()
     if over:
-        shown = listed([names[point] for point in over], SHOWN)
-        text = f"PASS POINTS APPEARING ON MORE THAN {limit} PHOTOGRAPHS: {shown}"
-        messages.append(Message(f"{text}: of each the first {limit} images are kept"))
+        names_over = [names[point] for point in over]
+        messages.append(Message.of("giant.many-photographs", limit=limit, names=names_over))
     return allowed
 
 
@@ -146,15 +145,11 @@ def check_bandwidth(
     if overflow is None:
         return
     frame, point = frames[overflow.photo], points[overflow.point]
-    text = (
-        f"the effective bandwidth exceeds {limit} when the point {point} calls for the frame {frame.name};"
-        " is its name used for two points? Another order of FRAMES may help too"
-    )
+    remark = phrase("giant.bandwidth", limit=limit, point=point, frame=frame.name)
     if intersection_only:
-        messages.append(message_at(frame.record, text))
+        messages.append(message_at(frame.record, remark))
         return
     stored = [f"{photo + 1:4d}" for photo in overflow.photos]
     lines = [f"VARIABLES {' '.join(stored[first : first + 5])}" for first in range(0, len(stored), 5)]
     head = ["**ERROR IN SUBROUTINE MODID", f"ADDING VARIABLE {overflow.photo + 1}", *lines]
-    text = "\n".join([*head, text])
-    raise error_at(frame.record, text)
+    raise error_at(frame.record, phrase("giant.modid", head="\n".join(head), remark=remark))

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
-from photogram.giant.cameras import parse_cameras
 from photogram.giant.common import Common, parse_common
 from photogram.giant.contents import Contents
 from photogram.giant.export import block_files
 from photogram.giant.files import NAMES, find_files, present_files, to_bytes
-from photogram.giant.frames import parse_frames
+from photogram.giant.frames import parse_cameras, parse_frames
 from photogram.giant.ground import parse_ground
 from photogram.giant.images import parse_images
 from photogram.giant.limits import Limits
 from photogram.giant.records import Source
 from photogram.io.writing import write_whole
 from photogram.network.block import Block
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.diagnosis import Diagnosis
@@ -116,11 +116,11 @@ def project_files(project: Project, directory: Path, *, overwrite: bool = False)
     targets = {name: directory / name for name in NAMES}
     if directory.exists():
         for name, present in present_files(directory).items():
-            listed = ", ".join(path.name for path in present)
+            names = [path.name for path in present]
             if present and not overwrite:
-                raise InputError(f"{listed} would be overwritten", file=directory)
+                raise InputError(phrase("giant.overwrite", names=names), file=directory)
             if len(present) > 1:
-                raise InputError(f"more than one file could be {name}: {listed}", file=directory)
+                raise InputError(phrase("giant.several", name=name, names=names), file=directory)
             targets[name] = next(iter(present), targets[name])
     return {targets[name]: to_bytes(records) for name, records in texts.items()}
 

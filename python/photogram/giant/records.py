@@ -13,6 +13,7 @@ from photogram.giant.fields import format_deviations, parse_angle, parse_name
 from photogram.io import records
 from photogram.io.records import parse_integer, parse_real
 from photogram.messages import Message
+from photogram.words import Phrase, phrase
 
 T = TypeVar("T")
 QUARTER_CIRCLE = math.pi / 2 + 1e-12  # The largest latitude, rounding allowed for
@@ -45,7 +46,7 @@ class Source(records.Source):
             spellings: dict[str, Record] = {}
             for number in numbers:
                 if not self.record(number).identification(spellings):
-                    raise self.record(number).error("columns 1-8: the point has no name")
+                    raise self.record(number).error(phrase("giant.no-name", subject="point"))
         return [names[text] for text in fields]
 
 
@@ -69,8 +70,13 @@ class Record(records.Record):
         first = spellings.setdefault(name, self)
         if first.columns(1, 8).rstrip(" ") != self.columns(1, 8).rstrip(" "):
             raise self.error(
-                f"{self.columns(1, 8)!r} and {first.columns(1, 8)!r} (record {first.number})"
-                f" both become {name!r} without leading characters"
+                phrase(
+                    "giant.same-name",
+                    first=self.columns(1, 8),
+                    second=first.columns(1, 8),
+                    record=first.number,
+                    name=name,
+                )
             )
         return name
 
@@ -86,30 +92,27 @@ class Record(records.Record):
         )
         if abs(value) >= 10**width:
             # As with standard deviations: the output files have the same columns.
-            raise self.error(
-                f"columns {first}-{last}: {value:g} is out of range, {width} columns could not hold it"
-            )
+            raise self.error(phrase("giant.range", first=first, last=last, value=value, width=width))
         return value
 
     def angle(self, first: int, last: int, decimals: int = 3) -> float:
         """Read a packed DMS field as radians."""
         angle, doubtful = self._parse(first, last, "DMS", lambda text: parse_angle(text, decimals))
         if doubtful:
-            self.remark(
-                f"columns {first}-{last}: 60 minutes or 60 seconds in {self.columns(first, last).strip()!r}"
-            )
+            text = self.columns(first, last).strip()
+            self.remark(phrase("giant.sixty", first=first, last=last, value=text))
         return angle
 
     def deviation(self, first: int, last: int, *, angle: bool = False) -> float:
         """Read a standard deviation, F10.3 or DMS; zero stands for the default."""
         value = self.angle(first, last) if angle else self.real(first, last)
         if value < 0:
-            raise self.error(f"columns {first}-{last}: the standard deviation is negative")
+            raise self.error(phrase("giant.negative-sd", first=first, last=last))
         try:
             format_deviations((value,), (angle,))
         except ValueError:
             # An exponent can say what the output files, which repeat it, could not.
-            raise self.error(f"columns {first}-{last}: the standard deviation is out of range") from None
+            raise self.error(phrase("giant.sd-range", first=first, last=last)) from None
         return value
 
     def position(self, geographic: bool) -> tuple[float, float, float]:
@@ -118,7 +121,7 @@ class Record(records.Record):
             return self.real(9, 20), self.real(21, 32), self.real(33, 44)
         longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
         if abs(latitude) > QUARTER_CIRCLE:
-            raise self.error("columns 21-32: the latitude is beyond 90 degrees")
+            raise self.error(phrase("giant.latitude"))
         return longitude, latitude, height
 
     def attitude(self) -> tuple[float, float, float]:
@@ -139,17 +142,19 @@ class Record(records.Record):
         try:
             value = parse(columns)
         except ValueError as error:
-            raise self.error(f"columns {first}-{last} ({format_}): {error}") from None
+            raise self.error(
+                phrase("giant.field", first=first, last=last, format=format_, error=str(error))
+            ) from None
         if " " in columns.strip(" "):
-            self.remark(f"columns {first}-{last}: the blanks inside {columns.strip()!r} are ignored")
+            self.remark(phrase("giant.blanks", first=first, last=last, value=columns.strip()))
         return value
 
 
-def error_at(record: Record | None, text: str) -> InputError:
-    """Return an error about a record, or about no place when what it concerns was not read from a file."""
+def error_at(record: Record | None, text: Phrase) -> InputError:
+    """Return an error about a record, or without a location if the data are not from a file."""
     return record.error(text) if record else InputError(text)
 
 
-def message_at(record: Record | None, text: str) -> Message:
-    """Return a remark on a record, or on no place when what it concerns was not read from a file."""
+def message_at(record: Record | None, text: Phrase) -> Message:
+    """Return a remark on a record, or without a location if the data are not from a file."""
     return record.message(text) if record else Message(text)

@@ -300,8 +300,9 @@ def _decoded(
 
 def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:
     import pyarrow
-    import pyarrow.compute
     import pyarrow.parquet
+
+    from photogram.io.parquet import coded
 
     try:
         table = pyarrow.parquet.read_table(path)
@@ -313,22 +314,16 @@ def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> Column
     ready: dict[str, Floats | Names] = {}
     cells: dict[str, Sequence[str]] = {}
     for name, column in zip(columns, table.columns, strict=True):
-        kind = column.type
-        if pyarrow.types.is_integer(kind) and name not in numbers:
-            # Names that are digits all of them.
-            column, kind = column.cast(pyarrow.string()), pyarrow.string()
-        if pyarrow.types.is_large_string(kind):
-            column, kind = column.cast(pyarrow.string()), pyarrow.string()
-        if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-            whole = column.unify_dictionaries().combine_chunks()
-            coded = whole if pyarrow.types.is_dictionary(kind) else pyarrow.compute.dictionary_encode(whole)
-            texts = [str(text).strip() for text in coded.dictionary.to_pylist()]
-            codes = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
-            if (codes < 0).any():
-                texts.append("")
-                codes = np.where(codes < 0, len(texts) - 1, codes)
-            ready[name] = merged(codes, texts)
-        elif pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
+        kind = pyarrow.types
+        is_number = kind.is_floating(column.type) or kind.is_integer(column.type)
+        is_text = kind.is_string(column.type) or kind.is_large_string(column.type)
+        # Names may consist of digits.
+        digits = kind.is_integer(column.type) and name not in numbers
+        if is_text or digits or kind.is_dictionary(column.type):
+            texts, codes = coded(column)
+            empty = [""] * bool((codes < 0).any())  # the last name
+            ready[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
+        elif is_number:
             ready[name] = column.to_numpy().astype(float)
         else:
             cells[name] = ["" if each is None else str(each) for each in column.to_pylist()]

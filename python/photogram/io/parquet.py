@@ -122,6 +122,18 @@ def read_sheet(path: Path) -> Sheet:
     return Sheet(path, columns, about)
 
 
+def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
+    """Return the names of a column of text, and the name of each row; -1 for empty cells."""
+    import pyarrow
+
+    whole = column.unify_dictionaries().combine_chunks()
+    # A batch may have all names of its file.
+    if not pyarrow.types.is_dictionary(whole.type) or len(whole.dictionary) > len(whole):
+        whole = whole.cast(pyarrow.string()).dictionary_encode()
+    rows = whole.indices.fill_null(-1).to_numpy(zero_copy_only=False).astype(np.int64)
+    return whole.dictionary.to_pylist(), rows
+
+
 def packed(matrices: np.ndarray) -> np.ndarray:
     """Return (n, k (k + 1) / 2) the lower triangles of (n, k, k) symmetric matrices, row by row."""
     rows, columns = np.tril_indices(matrices.shape[1])
@@ -174,9 +186,7 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
     whole = column.combine_chunks()
     kind = column.type
     if pyarrow.types.is_dictionary(kind) or pyarrow.types.is_string(kind):
-        coded = whole.dictionary_encode() if pyarrow.types.is_string(kind) else whole
-        rows = coded.indices.fill_null(-1).to_numpy(zero_copy_only=False)
-        return Repeated(coded.dictionary.to_pylist(), rows.astype(np.int64))
+        return Repeated(*coded(column))
     if whole.null_count:
         raise InputError(phrase("error.column", column=name, message=phrase("error.empty")), file=path)
     if pyarrow.types.is_fixed_size_list(kind):

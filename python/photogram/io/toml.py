@@ -118,6 +118,27 @@ def quoted_text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
+def toml_text(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return tables as text of TOML, without tables and values that are empty (None)."""
+    lines = []
+    for name, values in tables.items():
+        if own := [f"{key} = {_text(value)}" for key, value in values.items() if value is not None]:
+            lines += [f"[{name}]", *own, ""]
+    return "\n".join(lines)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return quoted_text(value)
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{quoted_text(name)} = {_text(own)}' for name, own in value.items())} }}"
+    if isinstance(value, int):
+        return str(value)
+    return repr(float(value)) if isinstance(value, float) else f"[{', '.join(map(_text, value))}]"
+
+
 class Table:
     """One table of a TOML file, by its name in errors.
 

@@ -52,14 +52,14 @@ ARRAYS = (
     ("photo_attitudes", "photos", 3, "angle"),
     ("principal_distances", "photos", 0, "not-zero"),
     ("point_positions", "points", 3, "not-infinite"),
-    ("image_xy", "images", 2, "finite"),
-    ("image_sd", "images", 2, "positive"),
     ("photo_position_sd", "photos", 3, "sd"),
     ("photo_attitude_sd", "photos", 3, "sd"),
     ("point_sd", "points", 3, "sd"),
     ("photo_positions_observed", "photos", 3, "not-infinite"),
     ("photo_attitudes_observed", "photos", 3, "angle"),
     ("point_check_sd", "points", 3, "check-sd"),
+    ("image_xy", "images", 2, "finite"),
+    ("image_sd", "images", 2, "positive"),
 )
 """Arrays of a block: name, rows, columns (0 for one number in each row), and rule."""
 OPTIONAL = ("photo_positions_observed", "photo_attitudes_observed", "point_check_sd")
@@ -80,9 +80,10 @@ def check_block(block: Block) -> None:
     if block.cameras:
         block._set("photo_cameras", frozen(photo_indices(block.photo_cameras, block.cameras, photos)))
     counts = {"photos": photos, "points": points, "images": length("image_photos", block.image_photos)}
-    for name, count in (("image_photos", photos), ("image_points", points)):
-        block._set(name, indices(name, getattr(block, name), counts["images"], count))
     for name, rows, columns, rule in ARRAYS:
+        if name == "image_xy":  # Errors of images name their photos and points
+            for of, count in (("image_photos", photos), ("image_points", points)):
+                block._set(of, indices(of, getattr(block, of), counts["images"], count))
         value = getattr(block, name)
         if value is None and (name in OPTIONAL or (name == "principal_distances" and block.cameras)):
             continue

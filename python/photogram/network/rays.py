@@ -175,6 +175,20 @@ class Rays:
         return np.asarray(scale[:, np.newaxis, np.newaxis] * across @ turned)
 
 
+def meet_rays(points: Indices, count: int, centres: Floats, directions: Floats) -> Floats:
+    """Return (count, 3) intersections of the rays of points; NaN if they determine no position.
+
+    `points`, `centres` and unit `directions` have a row for each ray.
+    """
+    across = np.eye(3) - directions[:, :, np.newaxis] * directions[:, np.newaxis]
+    # Geocentric coordinates are large: positions are counted from a place nearby.
+    origin = np.median(centres, axis=0) if len(centres) else np.zeros(3)
+    normal, constant = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    np.add.at(normal, points, across)
+    np.add.at(constant, points, np.einsum("mij,mj->mi", across, centres - origin))
+    return meet(normal, constant, np.bincount(points, minlength=count).astype(np.float64)) + origin
+
+
 def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:
     """Solve (k, 3, 3) normal equations of `rays` rays each; NaN where they do not determine a position."""
     determined = rays >= 1.5

@@ -12,8 +12,11 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
 
-__all__ = ["Overflow", "Structure", "structure"]
+__all__ = ["FEWEST_TIES", "Overflow", "Structure", "structure", "ties"]
+
+FEWEST_TIES = 3  # Points that the orientation of a photo needs at least
 
 
 @dataclass(frozen=True)
@@ -117,3 +120,10 @@ def structure(image_photos: Indices, image_points: Indices, order: Indices | Non
     photos = image_photos[rows][starts]
     entered = np.argsort(entry, kind="stable")
     return Structure(photos[entered], entry[entered], exit_[entered], points[turn])
+
+
+def ties(block: Block) -> Indices:
+    """(P,) points of each photo that another photo or control ties."""
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    useful = (rays >= 2) | np.isfinite(block.point_sd).any(axis=1)
+    return np.bincount(block.image_photos[useful[block.image_points]], minlength=len(block.photo_ids))

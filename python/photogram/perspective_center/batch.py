@@ -14,6 +14,7 @@ from photogram.perspective_center.solution import PerspectiveCenter, Weights, de
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Judgement
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 __all__ = ["Run", "Stop", "run_deck"]
 
@@ -97,7 +98,7 @@ def run_deck(
         The deck cannot be read at all; sets together as published.
     """
     if together and as_published:
-        raise InputError("the program solves every set by itself: as_published or together")
+        raise InputError(phrase("projector.published-sets"))
     deck = Deck(path)
     run = Run()
     grid: Grid | None = None

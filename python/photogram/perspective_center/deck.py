@@ -25,6 +25,7 @@ from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce
+from photogram.words import phrase
 
 __all__ = ["CardFormat", "Deck", "read_deck"]
 
@@ -51,26 +52,12 @@ class _Field:
 
 
 class CardFormat:
-    """The FORMAT of a card with a whole number, then real numbers.
-
-    Parameters
-    ----------
-    text
-        For example `(I4,2F10.0)`: the descriptors I, F, E, D, X and T, repeats and groups. What follows the
-        closing parenthesis is not looked at.
-    reals, integers
-        How many numbers are wanted of it; the FORMAT may have more.
-
-    Raises
-    ------
-    ValueError
-        A FORMAT that gives no such numbers from one card.
-    """
+    """The FORMAT of a card with a whole number, then real numbers."""
 
     def __init__(self, text: str, *, reals: int, integers: int = 1) -> None:
         self.text = _parenthesised("".join(text.split()).upper())
         if _ALLOWED.fullmatch(self.text) is None:
-            raise ValueError(f"{self.text} holds more than the descriptors I, F, E, D, X and T")
+            raise ValueError(phrase("format.descriptors", format=self.text))
         _check_sizes(self.text)
         try:
             self._reader = fortranformat.FortranRecordReader(self.text)
@@ -79,39 +66,25 @@ class CardFormat:
             fields = fortranformat.FortranRecordReader(_NUMERIC.sub(r"A\2", self.text)).read(ruler)
             kinds = [type(value) for value in self._reader.read("0" * 4 * COLUMNS)]
         except Exception as error:  # fortranformat raises many kinds of exceptions, some of them its own
-            raise ValueError(f"{self.text} is no FORMAT: {error}") from None
+            raise ValueError(phrase("format.invalid", format=self.text, error=str(error))) from None
         wanted = [int] * integers + [float] * reals
         if kinds[: len(wanted)] != wanted:
-            raise ValueError(
-                f"{self.text} does not give {integers} whole and {reals} real numbers in this order"
-            )
+            raise ValueError(phrase("format.numbers", format=self.text, integers=integers, reals=reals))
         columns = [(ord(field[0]) - _FIRST, ord(field[-1]) - _FIRST + 1) for field in fields[: len(wanted)]]
         if max(last for _, last in columns) > COLUMNS:
-            raise ValueError(f"{self.text} reaches beyond column {COLUMNS}")
+            raise ValueError(phrase("format.columns", format=self.text, columns=COLUMNS))
         self._fields = [_Field(*place, kind) for place, kind in zip(columns, wanted, strict=True)]
 
     @classmethod
     def of(cls, record: Record, *, reals: int) -> CardFormat:
-        """Take the FORMAT that stands on a card.
-
-        Raises
-        ------
-        InputError
-            A FORMAT that gives no whole number and that many real numbers.
-        """
+        """Return the FORMAT on a card."""
         try:
             return cls(record.text, reals=reals)
         except ValueError as error:
-            raise record.error(str(error)) from None
+            raise record.error(error.args[0]) from None
 
     def read(self, record: Record) -> list[float]:
-        """Read the numbers of a card; whole numbers come as integers.
-
-        Raises
-        ------
-        InputError
-            A field that is no number.
-        """
+        """Return the numbers of a card; whole numbers are integers."""
         card = record.text.ljust(COLUMNS)
         for field in self._fields:
             card = card[: field.first] + self._filled(field, record, card) + card[field.last :]
@@ -122,22 +95,25 @@ class CardFormat:
         """Return the characters of a field with zeros for the blanks that FORTRAN IV takes for zeros."""
         raw = card[field.first : field.last].upper()
         digits = raw.lstrip(" ").replace(" ", "0")
-        place = f"columns {field.first + 1}-{field.last}"
+        columns = {"first": field.first + 1, "last": field.last}
         if digits and _NUMBERS[field.kind].fullmatch(digits) is None:
-            raise record.error(f"{place}: {raw.strip()!r} is not a {_NAMES[field.kind]} ({self.text})")
+            kind = _NAMES[field.kind]
+            raise record.error(
+                phrase("deck.number", **columns, kind=kind, format=self.text, value=raw.strip())
+            )
         counts = " " in raw.lstrip(" ") and (field.kind is int or "." not in raw or "E" in raw or "D" in raw)
         if counts:
-            record.remark(f"{place}: the blanks in {raw!r} count as zeros, which makes it {digits}")
+            record.remark(phrase("deck.blanks", **columns, value=raw, number=digits))
         return digits.rjust(field.last - field.first)
 
 
 def _check_sizes(text: str) -> None:
-    """Refuse what cannot stand on a card, before any memory or time is spent on it."""
+    """Reject sizes beyond a card before they cost memory or time."""
     # Nine digits do: int() has a limit of its own.
     numbers = [int(digits[:9]) for digits in re.findall(r"[0-9]+", text)]
     groups = math.prod(int(digits[:9]) for digits in re.findall(r"([0-9]+)\(", text))
     if max(numbers, default=0) > COLUMNS or groups > COLUMNS**2:
-        raise ValueError(f"{text} holds repeats, widths or columns beyond the {COLUMNS} columns of a card")
+        raise ValueError(phrase("format.sizes", format=text, columns=COLUMNS))
 
 
 def _parenthesised(text: str) -> str:
@@ -149,10 +125,9 @@ def _parenthesised(text: str) -> str:
             return text[: position + 1]
         if depth == 0:
             break
-    raise ValueError(f"{text!r} is no FORMAT in parentheses")
+    raise ValueError(phrase("format.parentheses", value=text))
 
 
-OUT_OF_ORDER = "ERROR - CARDS ARE OUT OF ORDER AT POINT NO."
 SPECIFICATIONS = CardFormat("(3I5,2F10.0)", integers=3, reals=2)
 FACTORS = CardFormat("(3D20.8)", integers=0, reals=3)
 APPROXIMATIONS = CardFormat("(6F10.0)", integers=0, reals=6)
@@ -160,45 +135,21 @@ APPROXIMATIONS = CardFormat("(6F10.0)", integers=0, reals=6)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What the sets of a job share: cards 1 to 6.
+    """What the sets of a job share: cards 1 to 6."""
 
-    Attributes
-    ----------
-    title
-        Card 1.
-    projected_format
-        Card 3.
-    sets
-        Number of sets of readings on the same grid (ICALF).
-    coordinatograph
-        Factors of card 5, None without.
-    principal_distance, tolerance
-        Millimetres, positive (FOCAL); the limit of the iteration as published (GDIF), in the unit of the
-        model.
-    numbers, plate_xy
-        Point numbers, and (n, 2) coordinates in millimetres, of the plate grid.
-    """
-
-    title: str
-    projected_format: CardFormat
-    sets: int
-    coordinatograph: Coordinatograph | None
+    title: str  # Card 1
+    projected_format: CardFormat  # Card 3
+    sets: int  # Number of sets of readings on the same grid (ICALF)
+    coordinatograph: Coordinatograph | None  # Factors of card 5, None without
+    # Millimetres, positive (FOCAL); the limit of the iteration as published (GDIF), in the unit of the model
     principal_distance: float
     tolerance: float
-    numbers: list[int]
+    numbers: list[int]  # Point numbers, and (n, 2) coordinates in millimetres, of the plate grid
     plate_xy: Floats
 
 
 class Deck:
-    """A deck that is read set by set, so that a fault in a later set does not lose the earlier ones.
-
-    Attributes
-    ----------
-    title, number
-        Title of the job and number of the set that are being read; None and 0 before the first.
-    messages
-        Remarks on the cards.
-    """
+    """A deck that is read set by set, so that a fault in a later set does not lose the earlier ones."""
 
     def __init__(self, path: Path) -> None:
         self._source = Source.read(path)
@@ -214,13 +165,7 @@ class Deck:
         return self._source.messages
 
     def grids(self) -> Iterator[Grid]:
-        """Read the sets one after the other.
-
-        Raises
-        ------
-        InputError
-            A card that cannot be used; its file, number and text are named.
-        """
+        """Read the sets one after another."""
         while self._next <= self._end:
             self.title, self.number = self._card("the title").text.rstrip(), 0
             job = self._job(self.title)
@@ -230,7 +175,7 @@ class Deck:
 
     def _card(self, what: str) -> Record:
         if self._next > len(self._source.lines):
-            raise self._source.error(f"the deck ends where {what} is expected")
+            raise self._source.error(phrase("deck.end", subject=what))
         self._next += 1
         return self._source.record(self._next - 1)
 
@@ -240,9 +185,9 @@ class Deck:
         card = self._card("the card of specifications")
         points, sets, correct, principal_distance, tolerance = SPECIFICATIONS.read(card)
         if points < 1:
-            raise card.error(f"the number of points cannot be {points}")
+            raise card.error(phrase("deck.points", value=points))
         if not principal_distance > 0:
-            raise card.error(f"the principal distance must be positive, not {principal_distance}")
+            raise card.error(phrase("projector.principal-distance", value=principal_distance))
         factors = None
         if correct == 1:
             factors = Coordinatograph(*FACTORS.read(self._card("the card of coordinatograph factors")))
@@ -264,11 +209,9 @@ class Deck:
             card = self._card("a card of the plate grid")
             row = plate_format.read(card)
             if row[0] == 0:
-                raise card.error(
-                    "a point of the plate grid cannot have the number 0, which is that of the flag card"
-                )
+                raise card.error(phrase("deck.zero"))
             if row[0] in rows:
-                raise card.error(f"point {row[0]} stands in the plate grid twice")
+                raise card.error(phrase("deck.point-repeated", point=row[0]))
             rows[row[0]] = row
         return list(rows.values())
 
@@ -294,19 +237,19 @@ class Deck:
         card, point, xyz = self._reading(job)
         for expected in job.numbers:
             if point != expected:
-                raise card.error(f"{OUT_OF_ORDER} {expected}")
+                raise card.error(phrase("deck.order", point=expected))
             rows = []
             while point == expected:
                 rows.append(xyz)
                 if self._next > len(self._source.lines):
                     if expected != job.numbers[-1]:
-                        raise self._source.error(f"the deck ends after the readings of point {expected}")
-                    card.remark("the deck ends here without a flag card")
+                        raise self._source.error(phrase("deck.end-after-point", point=expected))
+                    card.remark(phrase("deck.no-flag"))
                     return [*readings, np.array(rows)]
                 card, point, xyz = self._reading(job)
             readings.append(np.array(rows))
         if point != 0:
-            raise card.error(f"a flag card is expected behind the readings of point {job.numbers[-1]}")
+            raise card.error(phrase("deck.flag", point=job.numbers[-1]))
         return readings
 
     def _reading(self, job: Job) -> tuple[Record, int, list[float]]:

@@ -12,6 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]
 
@@ -115,14 +116,14 @@ class Grid(Brief):
         for name, shape in shapes.items():
             values = shaped(name, getattr(self, name), shape)
             if not np.isfinite(values).all():
-                raise InputError(f"{name} holds values that are not finite")
+                raise InputError(phrase("projector.finite", name=name))
             object.__setattr__(self, name, values)
         readings = shaped("readings", self.readings, (count,))
         if not ((readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))).all():
-            raise InputError("readings: every point has a whole number of them, one at least")
+            raise InputError(phrase("projector.readings"))
         object.__setattr__(self, "readings", readings.astype(np.int64))
         if not 0 < number("principal_distance", self.principal_distance) < math.inf:
-            raise InputError(f"the principal distance must be positive, not {self.principal_distance}")
+            raise InputError(phrase("projector.principal-distance", value=self.principal_distance))
 
 
 def joined(grids: Sequence[Grid]) -> Grid:
@@ -134,7 +135,7 @@ def joined(grids: Sequence[Grid]) -> Grid:
         No set, or sets of several principal distances.
     """
     if not grids or len({each.principal_distance for each in grids}) != 1:
-        raise InputError("sets that are joined are of one projector: one principal distance")
+        raise InputError(phrase("projector.joined"))
     first = grids[0]
     return Grid(
         ids=[f"{name}/{each.number}" for each in grids for name in each.ids],
@@ -179,7 +180,7 @@ def reduce(
         Readings of another shape.
     """
     if any(each.ndim != 2 or each.shape[1] != 3 or not len(each) for each in readings):
-        raise InputError("the readings of a point are an array of the shape (k, 3)")
+        raise InputError(phrase("projector.shape"))
     means = np.array([np.mean(each, axis=0) for each in readings])
     sd = [np.std(each[:, :2], axis=0, ddof=1) if len(each) > 1 else np.zeros(2) for each in readings]
     if coordinatograph is not None:

@@ -21,7 +21,7 @@ from photogram.arguments.arrays import one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
 from photogram.show.methods import Judged
@@ -29,7 +29,7 @@ from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import externally_studentized, studentized_limit
 from photogram.statistics.reliability import ROUNDING, TESTABLE
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
@@ -224,13 +224,15 @@ def determine(
     for name in unknown:
         one_of("unknown", name, INTERIOR)
     if unknown and as_published:
-        raise InputError("the program holds principal distance and principal point: as_published or unknown")
+        raise InputError(phrase("projector.published-interior"))
     try:
         if unknown:
             return _result(grid, weight, *_calibrated(grid, weight, unknown), unknown)
         course, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
     except RankError as error:
-        raise RankError(f"{SINGULAR}: {error}", [], error.points) from None
+        raise RankError(
+            phrase("projector.singular", error=error.phrase or str(error)), [], error.points
+        ) from None
     joint = course.partials, course.solution.cofactors
     return _result(grid, weight, grid, course, messages, *joint, as_published=as_published)
 
@@ -253,10 +255,8 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
         variance = 1.0 / (grid.readings if weights == "readings" else np.ones(len(grid.ids)))
     bad = np.flatnonzero(~((variance > 0) & np.isfinite(variance)))
     if bad.size:
-        names = ", ".join(str(grid.ids[index]) for index in bad[:12])
-        raise InputError(
-            f"no standard deviation to weight by at the points {names}: one reading, or equal ones"
-        )
+        names = [str(grid.ids[index]) for index in bad.tolist()]
+        raise InputError(phrase("projector.no-weight", names=names))
     weight: Floats = 1.0 / variance
     weight /= weight.mean()
     return weight
@@ -292,7 +292,7 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
         else:
             if start is None or (solution.status == "converged" and not solution.points_behind.size):
                 break
-        messages = [Message("the initial approximations lead to no solution; a direct one was taken instead")]
+        messages = [Message.of("projector.direct-start")]
     history: Floats = np.vstack([solution.start, solution.history])
     return _Iterated(
         solution,
@@ -306,7 +306,7 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
 
 def _as_published(grid: Grid, observed: Observed) -> Solved:
     if grid.initial is None:
-        raise InputError("the program needs initial approximations")
+        raise InputError(phrase("projector.no-approximations"))
     # Parameters are REAL*4 words, angles in minutes: what is cut off comes back as a last correction.
     units = np.array([1.0, 1.0, 1.0, *[MINUTES_PER_RADIAN] * 3])
     history: list[Floats] = [single(grid.initial * units) / units]
@@ -322,9 +322,7 @@ def _as_published(grid: Grid, observed: Observed) -> Solved:
             at_measured=True,
         )
         if solution.status == "diverged":
-            raise RankError(
-                "the iteration has led to where the points do not determine it", [], observed.names
-            )
+            raise RankError(phrase("projector.diverged"), [], observed.names)
         corrections.append(solution.pose - history[-1])
         history.append(single(solution.pose * units) / units)
         converged = bool(np.linalg.norm(corrections[-1][:3]) < grid.tolerance)
@@ -336,13 +334,7 @@ def _as_published(grid: Grid, observed: Observed) -> Solved:
 def _calibrated(
     grid: Grid, weight: Floats, unknown: tuple[str, ...]
 ) -> tuple[Grid, _Iterated, list[Message], Floats, Floats]:
-    """Determine pose and interior together: the pose is solved anew wherever the interior has gone.
-
-    Returns
-    -------
-    The grid with the interior that was found, the pose there, remarks; (n, 2, 6 + k) partials by all unknowns
-    and their (6 + k, 6 + k) cofactors.
-    """
+    """Determine pose and interior together: the pose is solved anew wherever the interior has gone."""
     chosen = [INTERIOR.index(name) for name in unknown]
     interior = np.array([grid.principal_distance, 0.0, 0.0])
     own = grid
@@ -366,20 +358,13 @@ def _calibrated(
         if not 0.5 < interior[0] / grid.principal_distance < 2.0:
             raise _open(unknown, grid)
         own = replace(grid, plate_xy=grid.plate_xy - interior[1:], principal_distance=float(interior[0]))
-    raise AdjustmentError(
-        f"{', '.join(unknown)} and the projector do not come to rest in {STRICT_CYCLES} steps"
-    )
+    raise AdjustmentError(phrase("projector.not-converged", names=unknown, n=STRICT_CYCLES))
 
 
 def _open(unknown: tuple[str, ...], grid: Grid) -> RankError:
     heights = len(np.unique(grid.model[:, 2]))
-    where = "one height" if heights == 1 else f"{heights} heights"
-    return RankError(
-        f"the points at {where} do not tell {', '.join(unknown)} from the place of the projector: readings at"
-        " several heights in one solution do",
-        [],
-        [str(each) for each in grid.ids],
-    )
+    text = phrase("projector.undetermined", n=heights, names=unknown)
+    return RankError(text, [], [str(point) for point in grid.ids])
 
 
 def _result(
@@ -447,19 +432,19 @@ def _result(
     behind = [str(grid.ids[point]) for point in solution.points_behind]
     messages += hidden(len(behind), behind, [])
     if result.outliers:
-        messages.append(Message(_outliers_named(result)))
+        names = [
+            phrase(
+                "projector.reading",
+                point=grid.ids[row],
+                axis="XY"[axis],
+                t=float(result.studentized[row, axis]),
+                residual=float(result.residual[row, axis]),
+            )
+            for row, axis in result.outliers
+        ]
+        place = {"title": grid.title, "set": grid.number}
+        messages.append(Message.of("projector.outliers", **place, limit=result.limit, names=names))
     return result
-
-
-def _outliers_named(result: PerspectiveCenter) -> str:
-    grid = result.grid
-    named = [
-        f"point {grid.ids[row]} {'XY'[axis]} (t {result.studentized[row, axis]:.3g},"
-        f" residual {result.residual[row, axis]:.4g})"
-        for row, axis in result.outliers
-    ]
-    where = f"{grid.title}, data set {grid.number}: ".lstrip(", ")
-    return f"{where}readings beyond the limit {result.limit:.2f} of their test: {listed(named)}"
 
 
 def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats, Floats]:
@@ -467,10 +452,6 @@ def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats,
 
     The ray of (x, y, -c) has the direction e = M^T (x, y, -c) and meets the height Z where X = Xc + t e, t =
     (Z - Zc) / e_Z.
-
-    Returns
-    -------
-    (n, 2) X, Y, and (n, 2, 2) their partials with respect to x, y: t (I - (e_X, e_Y) / e_Z k^T) M^T.
     """
     to_photo = rotation_matrix(attitude[np.newaxis])[0]
     plate = np.column_stack([grid.plate_xy, np.full(len(grid.ids), -grid.principal_distance)])

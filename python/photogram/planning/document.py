@@ -12,7 +12,7 @@ from photogram.planning.pattern import Pattern
 from photogram.planning.plot import plan_sketch
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
-from photogram.show.page import Document, Drawing, Fact, Judgement, Layers, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
 from photogram.statistics.reliability import TESTABLE, noncentrality
 from photogram.words import Phrase, phrase
@@ -210,7 +210,7 @@ def _layers(
     intro: str = "",
 ) -> Section:
     tables = [made for pattern in patterns if (made := table(pattern)) is not None]
-    return Section(key, title, [Layers(f"{key}-layers", tables)] if len(tables) > 1 else tables, intro)
+    return Section(key, title, layered_tables(key, tables), intro)
 
 
 def _comparison(patterns: Sequence[Pattern]) -> Phrase:

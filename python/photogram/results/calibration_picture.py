@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.errors import InputError
 from photogram.plots.distortion import side_by_side
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import distortion_curve, lens_field
@@ -15,6 +16,7 @@ from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Arrows, Ellipses, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -30,12 +32,12 @@ def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:
 
     Raises
     ------
-    ValueError
+    InputError
         The camera has no radial terms, or no images.
     """
     curve = distortion_curve(result, camera)
     if curve is None:
-        raise ValueError(f"{camera.name} has no radial distortion to draw")
+        raise InputError(phrase("plot.distortion"))
     return Plot(6.4, 7.5, side_by_side([curves_of(camera, curve)]), shared=True)
 
 
@@ -49,12 +51,12 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
 
     Raises
     ------
-    ValueError
+    InputError
         The camera has no such terms, or no images.
     """
     field = lens_field(result, camera)
     if field is None:
-        raise ValueError(f"{camera.name} has no terms beside the radial ones to draw")
+        raise InputError(phrase("plot.lens-field", camera=camera.name))
     unit = str(camera.camera.unit)
     factor, written = (1000.0, "µm") if unit == "mm" else (1.0, "px")
     longest = float(np.hypot(*field.vectors.T).max())

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
-from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section
+from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
     tables = [parameters_table(each, law_of(result)) for each in shown]
-    parts: list[Part] = [*_layers("camera-layers", tables)]
+    parts: list[Part] = [*layered_tables("camera", tables)]
     if groups := [(each.camera.name, group) for each in shown for group in each.groups]:
         parts.append(_terms_together(groups))
     curves = [
@@ -36,7 +36,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
         for each in shown
         if (curve := distortion_curve(result, each.camera)) is not None
     ]
-    parts += [*drawings, *_layers("curve-layers", curves)]
+    parts += [*drawings, *layered_tables("curve", curves)]
     remarks = [
         f"{each.camera.name}: {sentence}"
         for each in shown
@@ -61,10 +61,6 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
         parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
     intro = "The interior orientation: what was given, what was found, and what the images say about it."
     return Section("cameras", "Cameras", parts, intro if found else "")
-
-
-def _layers(name: str, tables: list[Table]) -> list[Layers] | list[Table]:
-    return [Layers(name, tables)] if len(tables) > 1 else tables
 
 
 def law_of(result: Result) -> str:

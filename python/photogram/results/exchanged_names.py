@@ -6,7 +6,7 @@ have put them. Images i and j of a photo are exchanged when T of both points as 
 
     T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
 
-(:mod:`photogram.statistics.exchanges`): the factor 3 stands for what photos are uncertain by.
+(:mod:`photogram.statistics.likelihood`): the factor 3 stands for what photos are uncertain by.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
-from photogram.statistics.exchanges import are_exchanged
+from photogram.statistics.likelihood import are_exchanged
 from photogram.words import Phrase
 
 MOST = 40  # Largest number of excluded images of a photo
@@ -56,13 +56,10 @@ class Exchange:
         return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
 
     @property
-    def reason(self) -> str:
-        """Why."""
-        named = f"T {self.as_named:.4g} as named" if math.isfinite(self.as_named) else "rays part as named"
-        return (
-            f"each image fits the other's place ({named}, T {self.exchanged:.4g} exchanged, dimension"
-            f" {self.dimension})"
-        )
+    def reason(self) -> Phrase:
+        """The test values as they are named and exchanged."""
+        fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
+        return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
 
 
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:

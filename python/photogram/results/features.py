@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest, unknown_name
+from photogram.messages import unknown_name
 from photogram.show import quantity
 from photogram.show.quantity import Axis
 from photogram.statistics.distributions import LEVEL
@@ -85,7 +85,7 @@ class Feature:
 
     def __getitem__(self, name: str) -> Quantity:
         """Return a quantity by its name."""
-        return _named(self.quantities, name, f"the {self.kind} {self.name} has no quantity")
+        return _named(self.quantities, name, "quantity")
 
     @property
     def form(self) -> str:
@@ -124,7 +124,7 @@ class Features:
 
     def __getitem__(self, name: str) -> Feature:
         """Return a feature by its name."""
-        return _named(self.features, name, "there is no feature")
+        return _named(self.features, name, "feature")
 
     def __iter__(self) -> Iterator[Feature]:
         """Go through the features."""
@@ -235,8 +235,8 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
     return list(found)
 
 
-def _named(all_: Sequence[T], name: str, lacking: str) -> T:
+def _named(all_: Sequence[T], name: str, kind: str) -> T:
     for each in all_:
         if each.name == name:
             return each
-    raise KeyError(f"{lacking} {name!r}{nearest(name, [each.name for each in all_])}")
+    raise KeyError(str(unknown_name(kind, name, [each.name for each in all_])))

@@ -35,6 +35,7 @@ from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
 from photogram.show.quantity import Quantities, Quantity, members, records
 from photogram.statistics.evidence import GLOBAL
+from photogram.words import phrase
 
 ORDERINGS = {
     "input": "in input order",
@@ -131,12 +132,12 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
     test = result.global_test
     problems = []
     if result.status != "converged":
-        problems.append(f"the adjustment has {result.status}: do not use these values")
+        problems.append(str(phrase("problem.status", status=result.status)))
     if test is not None and (failed := test.problem()):
         problems.append(failed)
     problems += [str(message) for message in (*result.verdict.outliers, *result.messages)]
     if result.variance_of_unit_weight is None:
-        problems.append("there are no degrees of freedom: covariances are scaled by 1")
+        problems.append(str(phrase("problem.no-redundancy")))
     return problems
 
 

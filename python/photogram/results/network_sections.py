@@ -25,7 +25,7 @@ from photogram.results.network_tables import (
 from photogram.results.tables import check_points, observations
 from photogram.results.weakest import WeakestPhoto, WeakestPoint
 from photogram.show.cells import unit_written
-from photogram.show.page import Layers, Part, Section, Text
+from photogram.show.page import Layers, Part, Section, Text, layered_tables
 from photogram.show.quantity import Link, Quantity, Table, named, of_each
 
 if TYPE_CHECKING:
@@ -127,24 +127,14 @@ def _check_summary(result: Result) -> Table:
     axes, checks = point_axes(result.block), result.check_points
     factors = np.array([axis.factor for axis in axes])
     differences, sd = checks.differences * factors, np.hypot(checks.sd, checks.given_sd) * factors
-    known = [np.isfinite(column) for column in differences.T]
-    rows = [
-        (
-            k,
-            own.sum(),
-            d.mean(),
-            np.sqrt((d**2).mean()),
-            d[np.abs(d).argmax()],
-            np.sqrt((s**2).mean()),
-            (d, s),
-        )
-        for k, own in enumerate(known)
-        if own.any()
-        for d, s in [(differences[own, k], sd[own, k])]
-    ]
-    of, counts, means, rms, largest, deviations, _ = zip(*rows, strict=True)
-    tests = [np.sqrt(((d / s) ** 2).mean()) for *_, (d, s) in rows]
-    names = [f"{axes[k].name}, {unit_written(axes[k].small)}" for k in of]
+    rows = []
+    for axis, d, s in zip(axes, differences.T, sd.T, strict=True):
+        if (known := np.isfinite(d)).any():
+            d, s = d[known], s[known]
+            squares = (np.sqrt((values**2).mean()) for values in (d, s, d / s))
+            name = f"{axis.name}, {unit_written(axis.small)}"
+            rows.append((name, len(d), d.mean(), d[np.abs(d).argmax()], *squares))
+    names, counts, means, largest, rms, deviations, tests = zip(*rows, strict=True)
     columns = [
         Quantity(names, kind="name", head="Component"),
         Quantity(counts, head="Points", decimals=0),
@@ -187,11 +177,7 @@ def stations_section(result: AdjustedNetwork) -> Section:
         tables += _observed(key, title, columns, own, result.photo_sd[:, of])
     *others, last = [caption.lower() for caption in layers]
     intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
-    return Section("stations", "Observed photos", _layers("stations", tables), intro)
-
-
-def _layers(name: str, tables: list[Table]) -> list[Layers] | list[Table]:
-    return [Layers(f"{name}-layers", tables)] if len(tables) > 1 else tables
+    return Section("stations", "Observed photos", layered_tables("stations", tables), intro)
 
 
 def beside_section(result: Result) -> Section:
@@ -203,7 +189,7 @@ def beside_section(result: Result) -> Section:
             title = kind[:1].upper() + kind[1:]
             tables += component_table(f"observations-{kind}", title, observations(observed), tests)
     intro = "Observations beside images: observed minus adjusted, with their tests."
-    return Section("observations", "Other observations", _layers("beside", tables), intro)
+    return Section("observations", "Other observations", layered_tables("beside", tables), intro)
 
 
 def images_section(result: AdjustedNetwork) -> Section:

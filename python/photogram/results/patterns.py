@@ -126,7 +126,6 @@ def _of_photos(
         value=float(statistics[worst]),
         probability=float(probabilities[worst]),
         level=bonferroni(LEVEL, tested),
-        large=False,
     )
 
 
@@ -156,7 +155,6 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
         if found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
         else max(found.probability, LEVEL_OF_PATTERNS),
         level=LEVEL_OF_PATTERNS,
-        large=False,
     )
 
 
@@ -166,10 +164,8 @@ def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systemat
     w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
     order = np.linspace(-1.0, 1.0, len(w))
     design = np.column_stack([np.ones(len(w)), order, order**2])
-    return [
-        _regressed("drift", regression(w[:, axis], design), axis=Phrase(f"axis.{name}"))
-        for axis, name in enumerate(names)
-    ]
+    axes = [Phrase(f"axis.{name}") for name in names]
+    return [_regressed("drift", regression(w[:, k], design), axis=axis) for k, axis in enumerate(axes)]
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
@@ -200,5 +196,4 @@ def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | N
         value=found.statistic,
         probability=found.probability,
         level=LEVEL_OF_PATTERNS,
-        large=False,
     )

@@ -140,16 +140,15 @@ def _kinds(found: Reliability) -> list[Quantity]:
     of_rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
     rows = []
     for kind, name in enumerate(suspects.kind_names):
-        groups, components = (
-            tests.active & (suspects.kinds == kind),
-            (of_rows == kind) & ~np.isnan(redundancy),
-        )
-        if groups.any():
-            unchecked = groups & found.untestable
-            one_sided = groups & found.invisible & ~unchecked
-            sums = [np.count_nonzero(each) for each in (groups, components, unchecked, one_sided)]
-            rows.append((name, *sums, float(redundancy[components].sum())))
-    names, groups, components, unchecked, one_sided, sums = zip(*rows, strict=True) if rows else ((),) * 6
+        active = tests.active & (suspects.kinds == kind)
+        tested = (of_rows == kind) & ~np.isnan(redundancy)
+        if active.any():
+            untestable = active & found.untestable
+            invisible = active & found.invisible & ~untestable
+            numbers = [np.count_nonzero(each) for each in (active, tested, untestable, invisible)]
+            rows.append((name, *numbers, float(redundancy[tested].sum())))
+    names, *counts, sums = zip(*rows, strict=True) if rows else ((),) * 6
+    groups, components, unchecked, one_sided = map(np.array, counts)
     mean = np.array(sums) / np.maximum(components, 1)
     return [
         Quantity(names, kind="name", member="kind", head="Kind"),

@@ -206,14 +206,12 @@ _COLUMNS = (
 
 
 def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of the table: what the document has, but for what each component has of its own."""
-    log_p = member["prediction_log10_p"]
+    """Return a row for each component: the member of the document with its own values."""
     common = {
-        **member,
+        **{name: math.nan if value is None else value for name, value in member.items()},
         "rivals": rivals_of(entry.rivals, 3),
-        "consequences": "; ".join(map(str, entry.consequences)),
-        "prediction_T": math.nan if entry.prediction is None else entry.prediction,
-        "prediction_log10_p": math.nan if log_p is None else log_p,
+        "consequences": "; ".join(member["consequences"]),
+        "returned": entry.returned,
         "kept": str(entry.kept),
     }
     names = ("component", "unit", "error", "error_sd", "predicted_error")

@@ -73,20 +73,29 @@ class Tests:
 
         return [
             _component_tests(
-                *(phrase("test.image_coordinates"), "image", terms.image_axes, image),
+                phrase("test.image_coordinates"),
+                "image",
+                terms.image_axes,
+                image,
                 of_network("", "image_given_sd"),
                 {"images": every},
                 of_photos,
                 of_points,
             ),
             _component_tests(
-                *(phrase("test.components_of_control"), "control", terms.point_axes, control),
+                phrase("test.components_of_control"),
+                "control",
+                terms.point_axes,
+                control,
                 of_network("point_", "point_given_sd"),
                 {"control": every},
                 points=np.arange(len(points)),
             ),
             _component_tests(
-                *(phrase("test.components_of_stations"), "station", terms.photo_axes, station),
+                phrase("test.components_of_stations"),
+                "station",
+                terms.photo_axes,
+                station,
                 of_network("photo_", "photo_given_sd"),
                 {"positions": slice(3), "attitudes": slice(3, None)},
                 photos=np.arange(len(photos)),

@@ -250,6 +250,11 @@ class Document:
         return next(table for table in self.tables(layers=True) if table.key == key)
 
 
+def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:
+    """Return several tables as layers, a single table as it is."""
+    return [Layers(f"{name}-layers", tables)] if len(tables) > 1 else tables
+
+
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
     """Return one document of several with the same tables: tables of one key are layers of a section.
 

@@ -147,7 +147,7 @@ class Systematic:
     probability: float  # p-value
     level: float
     # Whether the pattern is large enough to matter: with a small probability the model is likely wrong
-    large: bool
+    large: bool = False
     # By how much the weighted sum of squares would fall without it, where that was asked for
     fall: float = 0.0
     subject: Text = ""

@@ -112,7 +112,6 @@ class History:
             value=test.variance,
             probability=test.probability_above,
             level=self.level,
-            large=False,
         )
 
 

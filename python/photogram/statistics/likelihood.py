@@ -8,6 +8,14 @@ degrees of freedom. With an unknown unit weight the logarithm of the likelihood 
 A mistake is made out by trying it and improving much: Omega_h passes its global test or is 25 times smaller
 than Omega_0, Lambda exceeds 2 ln(n / 1e-4) for n hypotheses tried, and the next best is behind by 10. A
 parameter that is fitted besides costs ln f.
+
+With chi-square of two named things, and with their names exchanged, in a variance s^2 of unit weight, names
+are exchanged if
+
+    named - exchanged > 2 s^2 ln(k / 0.0001),    exchanged < u s^2 chi2(0.999; m)
+
+for k examined pairs and m degrees of freedom; u is the uncertainty of the compared values beyond their
+covariances.
 """
 
 from __future__ import annotations
@@ -17,12 +25,14 @@ import sys
 from collections.abc import Sequence
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.limits import global_test
 
 IMPROVEMENT = 25.0  # Required ratio of the sums of squares
 CHANCE = 1e-4  # Probability of an accepted wrong hypothesis, approximately
 RIVAL = 10.0  # Required difference of Lambda to all other hypotheses
 PASSES = 0.01  # Significance level of the global test of a hypothesis
+EXCHANGE_LEVEL = 0.001  # Significance level of exchanged names
 TESTED = 4.0  # Smallest degrees of freedom of an accepted hypothesis
 
 
@@ -94,3 +104,19 @@ def judged(
     equal = tuple(each for each in order if ratios[first] - ratios[each] <= RIVAL)
     fall = math.sqrt(given / max(least, sys.float_info.min))
     return Judged(equal, ratios[first], fall, f >= TESTED and ratios[first] > bound)
+
+
+def are_exchanged(
+    named: float,
+    exchanged: float,
+    dimension: int,
+    *,
+    pairs: int,
+    variance: float = 1.0,
+    uncertain: float = 1.0,
+) -> bool:
+    """Return whether two things are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
+    if not (math.isfinite(exchanged) and dimension > 0):
+        return False
+    fits = exchanged < uncertain * variance * critical_chi_square(EXCHANGE_LEVEL, dimension)
+    return fits and named - exchanged > 2 * variance * math.log(pairs / CHANCE)

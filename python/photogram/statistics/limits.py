@@ -30,6 +30,7 @@ from photogram.statistics.distributions import (
     log_chi_square,
     log_fisher,
 )
+from photogram.words import phrase
 
 NOTABLE_FACTOR = 1.25
 """With many degrees of freedom the test finds disagreements that harm nobody: residuals larger than the
@@ -106,14 +107,11 @@ class GlobalTest:
         return (float(log_p) + math.log(2)) / math.log(10)
 
     def problem(self) -> str | None:
-        """Return a sentence for the report when residuals are too large by a factor that matters."""
+        """Return a sentence for the report if residuals are too large by a factor that matters."""
         if not self.rejected_high or self.factor <= NOTABLE_FACTOR:
             return None
-        return (
-            f"the global test fails: residuals are {self.factor:.3g} times larger than their standard"
-            f" deviations allow (variance of unit weight {self.variance:.4g},"
-            f" expected {self.limits[0]:.3g} to {self.limits[1]:.3g}; level {100 * self.level:g} percent)"
-        )
+        limits = {"low": self.limits[0], "high": self.limits[1], "level": 100 * self.level}
+        return str(phrase("problem.global-test", factor=self.factor, variance=self.variance, **limits))
 
 
 def global_test(

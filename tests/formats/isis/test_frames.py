@@ -12,8 +12,7 @@ from photogram.formats import Wishes
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import FORMAT, ControlNetwork, measures_of, network_text, points_of
-from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.outcome import Outcome, contents_of
 
 
 def moved(document, kilometres, turn=0.0):

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from photogram import adjust
+from photogram.comparator import Place
 from photogram.formats.adjusted import adjusted
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
 from photogram.formats.isis import FORMAT, binary_network, read_network
-from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.points import full_matrices
 from photogram.formats.isis.reading import is_binary
 from photogram.network import geocentric_to_geographic
@@ -188,7 +188,7 @@ def test_velocities_of_support_data_are_those_of_their_tables(pair, way):
     slopes = (places[2:] - places[:-2]) / (times[2:] - times[:-2])[:, np.newaxis]
     np.testing.assert_allclose(np.array(own["velocities"])[1:-1], slopes, rtol=0, atol=2e-4)
     own = document["instrument_pointing"]
-    times, turned = np.array(own["ephemeris_times"]), of_quaternions(np.array(own["quaternions"]))
+    times, turned = np.array(own["ephemeris_times"]), of_quaternions(Place(), np.array(own["quaternions"]))
     # M' = -[w]x M of the camera's axes: w along inertial axes.
     middle = turned[1:-1].transpose(0, 2, 1) @ (turned[2:] - turned[:-2])
     slopes = -middle / (times[2:] - times[:-2])[:, np.newaxis, np.newaxis]
@@ -211,7 +211,7 @@ def test_quaternions_and_angles_come_back():
     matrices = of_angles(angles)
     np.testing.assert_allclose(to_angles(matrices), angles, atol=1e-12)
     found = to_quaternions(matrices)
-    np.testing.assert_allclose(of_quaternions(found), matrices, atol=1e-12)
+    np.testing.assert_allclose(of_quaternions(Place(), found), matrices, atol=1e-12)
     assert (np.einsum("ni,ni->n", found[1:], found[:-1]) > 0).all()
     axes, step = angle_axes(angles), 1e-6
     for k in range(3):

@@ -7,8 +7,7 @@ from lro_pair import LRO, SERIAL, SIDES, WEIGHTED, answers, project, with_coordi
 from ephemeris_seconds import added_to_ephemeris_seconds
 from golden_data import needs
 from photogram import adjust
-from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.outcome import Outcome, contents_of
 
 pytestmark = needs("moving", "lro")
 

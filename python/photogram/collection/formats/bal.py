@@ -19,12 +19,12 @@ from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
+from photogram.words import Phrase, phrase
 
 ROOM = 64
 """Characters that a number and the white space after it take at the most, in the mean over a file."""
 HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3
 """Numbers of the first line, of an image, of a photo, of a point."""
-COUNTS = "the numbers of photos, points and images"
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
@@ -37,7 +37,8 @@ def read(path: Path, pieces: Iterator[bytes]) -> Collection:
     for column, (name, count) in enumerate((("photo", photos), ("point", points))):
         bad = np.flatnonzero(~whole(rows[:, column]) | (rows[:, column] >= count))
         if len(bad):
-            message = f"{rows[bad[0], column]:g} is no {name}: they count from 0 to {count - 1}"
+            value = float(rows[bad[0], column])
+            message = phrase("collection.number", kind=name, last=count - 1, value=value)
             raise at(path, HEAD + IMAGE * int(bad[0]), message)
     return Collection(
         photo_parameters=numbers[first_photo:first_point].reshape(photos, PHOTO),
@@ -78,10 +79,11 @@ class _Counts:
         """Numbers of the whole file."""
         return HEAD + IMAGE * self.images + PHOTO * self.photos + POINT * self.points
 
-    def __str__(self) -> str:
-        return (
-            f"{self.numbers} numbers of {self.photos} photos, {self.points} points and {self.images} images"
-        )
+    @property
+    def phrase(self) -> Phrase:
+        """The content of the file for messages."""
+        sizes = {"photos": self.photos, "points": self.points, "images": self.images}
+        return phrase("collection.counts", numbers=self.numbers, **sizes)
 
 
 def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[_Counts, Floats]:
@@ -93,22 +95,22 @@ def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[_Counts, Floats]:
         numbers, good = _photocore.read_numbers(piece)
         if counts is None and len(numbers) >= HEAD:
             if not whole(numbers[:HEAD]).all():
-                raise at(path, 0, f"the first line is not {COUNTS}")
+                raise at(path, 0, phrase("collection.first-line"))
             counts = _Counts(*(int(count) for count in numbers[:HEAD]))
-        wanted = COUNTS if counts is None else str(counts)
+        wanted = phrase("collection.head") if counts is None else counts.phrase
         if counts is not None and read + len(numbers) > counts.numbers:
-            raise at(path, counts.numbers, f"numbers beyond the {wanted}")
+            raise at(path, counts.numbers, phrase("collection.beyond", content=wanted))
         read += len(numbers)
         if not good:
-            raise at(path, read, f"is not a finite number, where there should be {wanted}")
+            raise at(path, read, phrase("collection.not-finite", content=wanted))
         parts.append(numbers)
         length += len(piece)
         if length > PIECE + ROOM * (counts.numbers if counts is not None else HEAD):
-            raise InputError(f"is far longer than the {wanted} can be", file=path)
+            raise InputError(phrase("collection.too-long", content=wanted), file=path)
         # The parts, and what is made of them.
         require(4 * read * numbers.itemsize, f"{path}: {read} numbers")
     if counts is None or read < counts.numbers:
-        raise InputError(f"ends before {COUNTS if counts is None else counts}", file=path)
+        raise InputError(phrase("collection.ends", content=wanted), file=path)
     return counts, np.concatenate(parts)
 
 

@@ -21,6 +21,7 @@ from photogram.collection.formats.format import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
+from photogram.words import Phrase, phrase
 
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
@@ -38,10 +39,9 @@ class _Numbers:
         header = HEADER.match(first)
         if header is None or header[1] != VERSION:
             line = first.split(b"\n", 1)[0].decode("latin-1").strip()
-            raise InputError("is no Bundle file of version 0.3", file=path, record=1, text=line)
+            raise InputError(phrase("bundler.version"), file=path, record=1, text=line)
         self.path = path
-        self.words = len(header[0].split())
-        """Of the first line: what messages count from."""
+        self.words = len(header[0].split())  # Of the first line
         self.taken = 0
         self.values = self._all(first[header.end() :], pieces)
 
@@ -53,7 +53,7 @@ class _Numbers:
             numbers, good = _photocore.read_numbers(piece)
             read += len(numbers)
             if not good:
-                raise self.fault(read, "is not a finite number")
+                raise self.fault(read, phrase("bundler.number"))
             parts.append(numbers)
             # The parts, and what is made of them.
             require(4 * read * numbers.itemsize, f"{self.path}: {read} numbers")
@@ -64,11 +64,11 @@ class _Numbers:
         """Return the next numbers."""
         values = self.values[self.taken : self.taken + count]
         if len(values) < count:
-            raise InputError(f"ends before the {count} numbers of {what}", file=self.path)
+            raise InputError(phrase("bundler.ends", n=count, subject=what), file=self.path)
         self.taken += count
         return values
 
-    def fault(self, index: int, message: str) -> InputError:
+    def fault(self, index: int, message: Phrase) -> InputError:
         """Return an error at the line of a number."""
         return at(self.path, self.words + index, message)
 
@@ -78,21 +78,21 @@ def read(path: Path, pieces: Iterator[bytes]) -> Collection:
     numbers = _Numbers(path, pieces)
     counts = numbers.take(COUNTS, "the second line")
     if not whole(counts).all():
-        raise numbers.fault(0, "the second line is not the numbers of cameras and points")
+        raise numbers.fault(0, phrase("bundler.second-line"))
     cameras, points = (int(count) for count in counts)
     parameters = _parameters(numbers, cameras)
     positions, views, starts = _points(numbers, points)
     if numbers.taken < len(numbers.values):
-        raise numbers.fault(numbers.taken, f"numbers beyond the {points} points")
+        raise numbers.fault(numbers.taken, phrase("bundler.beyond", points=points))
     rows = numbers.values[starts[:, np.newaxis] + np.arange(VIEW)]
     bad = np.flatnonzero(~whole(rows[:, 0]) | (rows[:, 0] >= cameras))
     if len(bad):
-        message = f"{rows[bad[0], 0]:g} is no camera: they count from 0 to {cameras - 1}"
+        message = phrase("collection.number", kind="camera", last=cameras - 1, value=float(rows[bad[0], 0]))
         raise numbers.fault(int(starts[bad[0]]), message)
     photos = rows[:, 0].astype(np.int64)
     bad = np.flatnonzero(parameters[photos, 6] == 0)
     if len(bad):
-        message = f"camera {photos[bad[0]]} was not registered (f is 0) and can have no views"
+        message = phrase("bundler.not-registered", camera=int(photos[bad[0]]))
         raise numbers.fault(int(starts[bad[0]]), message)
     return Collection(
         photo_parameters=parameters,
@@ -114,23 +114,25 @@ def _parameters(numbers: _Numbers, cameras: int) -> Floats:
         bad = np.flatnonzero(~(apart < ORTHONORMAL) | ~(np.linalg.det(matrices) > 0))
     if len(bad):
         mirrored = apart[bad[0]] < ORTHONORMAL
-        what = "is mirrored" if mirrored else f"has rows that are not orthonormal to {ORTHONORMAL:g}"
-        raise numbers.fault(first + CAMERA * int(bad[0]) + 3, f"the rotation of camera {bad[0]} {what}")
+        code = "bundler.mirrored" if mirrored else "bundler.rotation"
+        message = phrase(code, camera=int(bad[0]), limit=ORTHONORMAL)
+        raise numbers.fault(first + CAMERA * int(bad[0]) + 3, message)
     return np.hstack([_photocore.rotation_vectors(matrices), rows[:, 12:], rows[:, :3]])
 
 
 def _points(numbers: _Numbers, points: int) -> tuple[Floats, Indices, Indices]:
     """Return (points, 3) positions, and for each view its point and the index of its first number."""
     if points * POINT > len(numbers.values):
-        raise InputError(f"ends before the {POINT * points} numbers of {points} points", file=numbers.path)
+        raise InputError(
+            phrase("bundler.ends", n=POINT * points, subject=f"{points} points"), file=numbers.path
+        )
     positions = np.empty((points, 3))
     firsts, counts = np.empty(points, np.int64), np.empty(points, np.int64)
     for point in range(points):
         own = numbers.take(POINT, f"point {point}")
         if not whole(own[-1:])[0]:
-            raise numbers.fault(
-                numbers.taken - 1, f"the number of views of point {point} cannot be {own[-1]:g}"
-            )
+            message = phrase("bundler.views", point=point, value=float(own[-1]))
+            raise numbers.fault(numbers.taken - 1, message)
         positions[point], firsts[point], counts[point] = own[:3], numbers.taken, own[-1]
         numbers.take(VIEW * int(own[-1]), f"the views of point {point}")
     views = np.repeat(np.arange(points), counts)

@@ -11,6 +11,7 @@ from photogram.collection.formats.format import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import packed, pieces
 from photogram.memory import turned
+from photogram.words import phrase
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.collection.formats.{name}").FORMAT
@@ -53,10 +54,10 @@ def to_bytes(collection: Collection, suffix: str = "", file_format: str = "bal")
         There is no such format, or it cannot hold the cameras.
     """
     if file_format not in FORMATS:
-        raise InputError(f"file_format is one of {', '.join(FORMATS)}, not {file_format!r}")
+        raise InputError(phrase("collection.format", names=list(FORMATS), value=file_format))
     chosen = FORMATS[file_format]
     if collection.camera != chosen.camera:
         raise InputError(
-            f"a {chosen.title} holds cameras of the model {chosen.camera}, not {collection.camera}"
+            phrase("collection.model", format=chosen.title, model=chosen.camera, camera=collection.camera)
         )
     return packed(chosen.to_bytes(collection), suffix)

@@ -12,20 +12,19 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
+from photogram.formats.images import Y_DOWN, checked_rotation
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project, Size, assembled
-from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Observation, Position
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
-GEOCENTRIC = 1e6
-"""Metres from the origin beyond which a world is geocentric."""
+GEOCENTRIC = 1e6  # Metres from the origin beyond which a world is geocentric
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -88,10 +87,10 @@ def read(path: Path, wishes: Wishes) -> Project:
 def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Element:
     chunks, taken = [*root.all("chunk"), *_members(root, "chunks", "chunk")], wanted or 0
     if taken >= len(chunks):
-        raise root.error(f"has {len(chunks)} chunks; there is no model {taken}" if chunks else "has no chunk")
+        raise root.error(phrase("format.models", n=len(chunks), model=taken))
     if len(chunks) > 1:
-        names = listed([each.attributes.get("label", "?") for each in chunks], 4)
-        messages.append(Message(f"{len(chunks)} chunks ({names}); taken is {taken} (--model N)"))
+        names = [each.attributes.get("label", "?") for each in chunks]
+        messages.append(Message(phrase("format.model-chosen", n=len(chunks), names=names, model=taken)))
     return chunks[taken]
 
 
@@ -130,7 +129,7 @@ def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
         with at_place(each):
             found[key] = _sensor(each, name, messages)
     if not found:
-        raise chunk.error("has no sensors")
+        raise chunk.error(phrase("format.missing", what="sensors"))
     return found
 
 
@@ -139,20 +138,27 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
     resolution = element.need("resolution")
     width, height = resolution.attribute("width"), resolution.attribute("height")
     if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise resolution.error("the pictures have no size")
+        raise resolution.error(phrase("format.size"))
     size = int(width), int(height)
     properties = _properties(element.all("property"), "pixel_width", "focal_length")
     pixel = properties.get("pixel_width") or None
     if kind == "spherical":
         return _Sensor(Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel)
     if kind not in ("frame", "fisheye"):
-        raise element.error(f"sensors of the type {kind} are not read")
+        raise element.error(
+            phrase(
+                "format.unknown",
+                what="type of the sensor",
+                value=kind,
+                names=["frame", "fisheye", "spherical"],
+            )
+        )
     by_class = {each.attributes.get("class", ""): each for each in element.all("calibration")}
     calibration = by_class.get("adjusted") or by_class.get("initial")
     values = {"w": width, "h": height}
     if calibration is None:
         if not pixel or "focal_length" not in properties:
-            raise element.error("has neither a calibration nor pixel_width and focal_length")
+            raise element.error(phrase("agisoft.calibration"))
         values["f"] = properties["focal_length"] / pixel
     elif calibration.child("fx") is not None:
         fx, fy = calibration.number("fx"), calibration.number("fy")
@@ -160,8 +166,7 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
         values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
         values |= {"cx": calibration.number("cx") - width / 2, "cy": calibration.number("cy") - height / 2}
         if values["p1"] or values["p2"]:
-            text = "documents of version 1.2 are said to have p1 and p2 exchanged: look at the residuals"
-            messages.append(Message(f"{name}: {text}"))
+            messages.append(Message(phrase("agisoft.exchanged", camera=name)))
     else:
         values |= {"f": calibration.number("f")} | {term: calibration.number(term, 0.0) for term in _TERMS}
     model = f"agisoft_{kind}"
@@ -179,18 +184,20 @@ def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message])
         if not label or "id" not in each.attributes:
             continue
         if each.attributes.get("sensor_id") not in sensors:
-            raise each.error(f"the sensor of {label} is not there")
+            raise each.error(
+                phrase("format.undefined", what="sensor", name=each.attributes.get("sensor_id", ""))
+            )
         if each.child("transform") is None:
             lost.append(label)
             continue
         if label in seen or not label.isprintable() or not label.strip():
-            raise each.error(f"the camera {label} is there twice, or has no name that prints")
+            raise each.error(phrase("format.name", what="camera", name=label))
         seen.add(label)
         found.append(each)
     if lost:
-        messages.append(Message(f"{len(lost)} cameras were not aligned and are left out: {listed(lost, 3)}"))
+        messages.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
     if not found:
-        raise chunk.error("has no aligned cameras")
+        raise chunk.error(phrase("format.missing", what="aligned cameras"))
     return found
 
 
@@ -219,7 +226,7 @@ def _similarity(element: Element | None) -> _Similarity | None:
         return None
     scale = element.number("scale", 1.0)
     if not scale > 0:
-        raise element.error("the scale is not positive")
+        raise element.error(phrase("format.positive", name="the scale", value=scale))
     shift = element.child("translation")
     translation = np.zeros(3) if shift is None else shift.numbers(3)
     return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
@@ -265,8 +272,7 @@ def _frame(
         frame = Frame()
         known = not reference or reference.upper().startswith(LOCAL)
         if given and not known:
-            text = f"the chunk has no place on the earth: {len(given)} references in its system are left out"
-            messages.append(Message(text))
+            messages.append(Message(phrase("agisoft.local", n=len(given))))
         return frame, _Positions(frame, "", known)
     from photogram.formats.crs import GEOCENTRIC as EARTH
     from photogram.formats.crs import GEOGRAPHIC, amid, to_frame, turn_to_frame
@@ -274,10 +280,9 @@ def _frame(
     frame = Frame("topocentric", "EPSG:4979", amid(EARTH, centres))
     matrices[:] = turn_to_frame(EARTH, centres, frame) @ matrices
     centres[:] = to_frame(EARTH, centres, np.zeros((len(centres), 3, 3)), frame)[0]
-    messages.append(Message(f"geocentric poses are adjusted in a frame that is {frame}"))
+    messages.append(Message(phrase("format.frame", crs=EARTH, frame=frame.phrase)))
     if not reference:
-        text = "the document names no system of its references: longitude, latitude, height"
-        messages.append(Message(text))
+        messages.append(Message(phrase("agisoft.references")))
     return frame, _Positions(frame, reference or GEOGRAPHIC)
 
 
@@ -331,14 +336,14 @@ def _markers(
     for row, each in enumerate(markers):
         name = each.attributes.get("label") or f"marker {row}"
         if name in names or not name.isprintable() or not name.strip():
-            raise each.error(f"the marker {name} is there twice, or has no name that prints")
+            raise each.error(phrase("format.name", what="marker", name=name))
         names.append(name)
         reference = positions.reference(each, default)
         if reference is None:
             continue
         enabled = _enabled(each)
         if enabled and not (reference[1] > 0).all():
-            raise each.error(f"the marker {name} has no accuracy: --sd control=...")
+            raise each.error(phrase("format.sd", name=name, option=option_sd("control")))
         found, turned = positions.carried(reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis])
         starts[row] = held[row] = found[0]
         if not enabled:
@@ -350,7 +355,7 @@ def _markers(
             held[row] = np.nan
             observed.append(Control(name, found[0], covariance=(turned[0] + turned[0].T) / 2))
         else:
-            raise each.error(f"the accuracies of the marker {name} cannot be")
+            raise each.error(phrase("agisoft.accuracy", name=name))
     return names, starts, held, sd, check_sd, observed
 
 

@@ -10,16 +10,17 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
-from photogram.formats.block_contents import correlated_control, lost_observations, posed
-from photogram.formats.images import to_corner
+from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.images import Y_DOWN, known_size, to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.losses import losses
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
-from photogram.formats.rotations import Y_DOWN
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
+from photogram.words import Phrase, phrase
 
 LOCAL = (
     'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
@@ -27,30 +28,24 @@ LOCAL = (
 _TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the file has no place for."""
-    block = project.block
-    marked = _marked(project)
-    ties = int(np.count_nonzero(~marked[block.image_points]))
-    found = ["standard deviations of images, poses and cameras"]
-    if ties:
-        found.append(f"{ties} images of tie points: export BlocksExchange for these")
-    if lost := int(np.count_nonzero(~posed(block))):
-        found.append(f"{lost} photos without a pose")
-    known = np.isfinite(block.point_positions).any(axis=1) & ~marked  # those with correlations are marked
-    if known.any():
-        found.append(f"{np.count_nonzero(known)} control points that are not known in all coordinates")
-    found += lost_observations(block, "correlations")
-    if project.frame.kind in ("topocentric", "geocentric"):
-        found.append("digits: geocentric positions are good to 1e-9 m, degrees of references to 1e-9 m")
-    return found
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the file cannot contain."""
+    block, marked = project.block, _marked(project)
+    partial = np.isfinite(block.point_positions).any(axis=1) & ~marked
+    counts = {
+        "lost.ties": np.count_nonzero(~marked[block.image_points]),
+        "lost.partial-control": np.count_nonzero(partial),
+        "lost.geocentric-digits": np.count_nonzero(project.frame.kind in ("topocentric", "geocentric")),
+    }
+    found = losses(project, "deviations", "unposed", "correlations", "observations", "gnss", "rigs", "boards")
+    return found + [phrase(code, n=int(count)) for code, count in counts.items() if count]
 
 
 def write(project: Project) -> Mapping[str, bytes]:
     """Return the file; a topocentric frame is written with its place on the earth."""
     block = project.block
     if not posed(block).any():
-        raise InputError("no photo has a pose, and the file holds nothing but photos with one")
+        raise InputError(phrase("format.poses"))
     world = _world(project.frame)
     cameras, which = known_cameras(block)
     sensors = enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True))
@@ -114,8 +109,7 @@ def _numbers(values: Floats) -> str:
 
 def _sensor(row: int, camera: Camera, size: Size | None, pixel: float | None) -> list[str]:
     kind, values = _calibration(camera, size)
-    if size is None:
-        raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
+    size = known_size(camera, size)
     extent = f'<resolution width="{size[0]}" height="{size[1]}"/>'
     lines = [f'<sensor id="{row}" label={quoteattr(camera.title)} type="{kind}">', extent]
     if pixel is not None:
@@ -137,9 +131,7 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
         return camera.model.split("_")[1], values
     lens = lens_of(camera, size)
     if lens is None or size is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
-        raise InputError(
-            f"the camera {camera.title} has the model {camera.model}, which Metashape does not have"
-        )
+        raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="Metashape"))
     # p1 belongs to r^2 + 2 x^2 there.
     return "frame", {
         "f": lens.fy,

@@ -14,8 +14,8 @@ from photogram.errors import InputError
 from photogram.formats.blocks_exchange import TITLE
 from photogram.formats.blocks_exchange.systems import PhotoRecord, PointRecord, Systems
 from photogram.formats.format import Wishes
+from photogram.formats.images import checked_rotation
 from photogram.formats.project import Project, Size, assembled
-from photogram.formats.rotations import checked_rotation
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
@@ -23,6 +23,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
+from photogram.words import option_sd, phrase
 
 ORIENTATIONS = {
     "XRightYDown": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
@@ -35,8 +36,7 @@ ORIENTATIONS = {
     "XUpYLeft": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
 }
 """Rows: the axes of a camera orientation in those of the house, x right, y up, z back."""
-CENTER = 0.5
-"""The middle of the first pixel is 0, 0: what is added to count from the corner."""
+CENTER = 0.5  # The middle of the first pixel is 0, 0: what is added to count from the corner
 _TERMS = ("K1", "K2", "K3", "P1", "P2")
 _READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
     "P1 and P2 exchanged": lambda own: {"p1": own["p2"], "p2": own["p1"]},
@@ -84,9 +84,9 @@ def read(path: Path, wishes: Wishes) -> Project:
     root = read_stream(path, take, "BlocksExchange")
     block = root.child("Block")
     if len(list(root.all("Block"))) > 1:
-        raise root.error("holds several blocks: export them one by one")
+        raise root.error(phrase("blocks-exchange.blocks"))
     if block is None or not found.photos:
-        raise root.error("holds no block with photos")
+        raise root.error(phrase("format.missing", what="a block with photos"))
     return _checked(_project(path, found, block.word("SRSId")))
 
 
@@ -94,13 +94,17 @@ def _group(found: _Found, element: Element) -> None:
     dimensions = element.need("ImageDimensions")
     size = dimensions.whole("Width"), dimensions.whole("Height")
     if not (0 < size[0] < 2**31 and 0 < size[1] < 2**31):
-        raise dimensions.error("the pictures have no size")
+        raise dimensions.error(phrase("format.size"))
     kind = element.word("CameraModelType", "Perspective")
     if kind != "Perspective":
-        raise element.error(f"cameras of the type {kind} are not read: their formula is not published")
+        raise element.error(
+            phrase("format.unknown", what="CameraModelType", value=kind, names=["Perspective"])
+        )
     orientation = element.word("CameraOrientation", "XRightYDown")
     if orientation not in ORIENTATIONS:
-        raise element.error(f"the camera orientation {orientation} is none of {', '.join(ORIENTATIONS)}")
+        raise element.error(
+            phrase("format.unknown", what="CameraOrientation", value=orientation, names=list(ORIENTATIONS))
+        )
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
     pixel = _pixel(element, size)
     name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
@@ -121,7 +125,7 @@ def _pixel(element: Element, size: Size) -> float | None:
     else:
         return None
     if not pixel > 0:
-        raise element.error("the size of the sensor is not positive")
+        raise element.error(phrase("format.positive", name="the size of the sensor", value=pixel))
     return pixel
 
 
@@ -131,12 +135,12 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
     elif pixel is not None:
         f = element.number("FocalLength") / pixel
     else:
-        raise element.error("has neither FocalLengthPixels nor the size of the sensor")
+        raise element.error(phrase("format.member", name="FocalLengthPixels, or FocalLength and SensorSize"))
     cx, cy = size[0] / 2, size[1] / 2
     point = element.child("PrincipalPoint")
     if point is not None and point.child("xmm") is not None:
         if pixel is None:
-            raise point.error("is in millimetres, and the sensor has no size")
+            raise point.error(phrase("format.sensor-size"))
         right, up = (axes[:2, :2].T @ [point.number("xmm"), point.number("ymm")]) / pixel
         cx, cy = cx + right, cy - up
     elif point is not None:
@@ -161,14 +165,16 @@ def _terms(element: Element) -> dict[str, float]:
         if each.name in _TERMS:
             found[each.name] = each.value
         elif each.text.strip() not in ("", "0", "0.0", "false"):
-            raise each.error(f"a distortion with {each.name} is not known")
+            raise each.error(
+                phrase("format.unknown", what="term of the distortion", value=each.name, names=list(_TERMS))
+            )
     return found
 
 
 def _photo(found: _Found, element: Element, srs: str) -> None:
     number = element.whole("Id")
     if number in found.photos:
-        raise element.error(f"the photo {number} is there twice")
+        raise element.error(phrase("format.repeated", what="photo", name=str(number)))
     pose = element.child("Pose")
     unknown = np.full(3, np.nan)
     centre, rotation, gnss, gnss_srs = unknown, np.full((3, 3), np.nan), None, srs
@@ -184,7 +190,7 @@ def _photo(found: _Found, element: Element, srs: str) -> None:
             gnss, gnss_srs = _position(metadata.need("Center")), metadata.word("SRSId") or srs
     path = element.word("ImagePath")
     if not path:
-        raise element.error(f"the photo {number} has no ImagePath")
+        raise element.error(phrase("format.member", name="ImagePath"))
     group = len(found.groups) - 1
     found.photos[number] = PhotoRecord(path, group, centre, rotation, srs, gnss, gnss_srs, element)
 
@@ -201,13 +207,10 @@ def _rotation(element: Element) -> Floats:
     if element.child("Omega") is not None:
         angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
         if np.abs(angles).max() > 1e4:
-            raise element.error("has angles that are no degrees")
+            raise element.error(phrase("format.angles"))
         found: Floats = Attitudes.of("omega_phi_kappa", angles).values("matrix_to_photo")[0]
         return found
-    raise element.error(
-        "is neither a matrix nor Omega, Phi, Kappa; conventions of other angles are not certain: export"
-        " matrices"
-    )
+    raise element.error(phrase("blocks-exchange.rotation"))
 
 
 def _control(found: _Found, element: Element) -> None:
@@ -220,13 +223,17 @@ def _control(found: _Found, element: Element) -> None:
     elif category == "Vertical":
         position[:2] = np.nan
     elif category != "Full":
-        raise element.error(f"the category {category} is none of Full, Horizontal, Vertical")
+        raise element.error(
+            phrase(
+                "format.unknown", what="Category", value=category, names=["Full", "Horizontal", "Vertical"]
+            )
+        )
     default = np.broadcast_to(found.wishes.sd.get("control", (np.nan,)), 3)
     horizontal = element.number("HorizontalAccuracy", float(default[0]))
     sd = np.array([horizontal, horizontal, element.number("VerticalAccuracy", float(default[2]))])
     check = element.word("CheckPoint").lower() in ("true", "1")
     if not check and not (sd[~np.isnan(position)] > 0).all():
-        raise element.error(f"the control point {name} has no accuracy: --sd control=...")
+        raise element.error(phrase("format.sd", name=name, option=option_sd("control")))
     found.points.append(PointRecord(name, element, position, element.word("SRSId"), sd, check))
     _measurements(found, element)
 
@@ -258,13 +265,13 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
     centres, matrices = frames.poses(photos, centres, matrices)
     images = [each for each in found.images if each[0] in rows]
     if lost := len(found.images) - len(images):
-        messages.append(Message(f"{lost} measurements are on photos that are not there"))
+        messages.append(Message(phrase("format.unknown-images", n=lost)))
     names = [each.path.replace("\\", "/").rsplit("/", 1)[-1] for each in photos]
     if len(set(names)) < len(names):
         names = [each.path for each in photos]
     for name, photo in zip(names, photos, strict=True):
         if not name.strip() or not name.isprintable():
-            raise photo.place.error("the ImagePath is no name")
+            raise photo.place.error(phrase("format.name", what="ImagePath", name=name))
     points = _names(found)
     starts, positions, sd, check_sd, observed = frames.points(found.points, points)
     of_photo = np.array([each.group for each in photos], dtype=np.int64)
@@ -301,10 +308,10 @@ def _names(found: _Found) -> list[str]:
         name = each.name
         while name in taken:
             if each.sd is not None:
-                raise each.place.error(f"the control point {name} is there twice")
+                raise each.place.error(phrase("format.repeated", what="control point", name=name))
             name += "'"
         if not name.strip() or not name.isprintable():
-            raise each.place.error("the point has no name that prints")
+            raise each.place.error(phrase("format.name", what="point", name=name))
         taken.add(name)
         names.append(name)
     return names
@@ -320,7 +327,7 @@ def _corner(found: _Found, images: list[tuple[int, int, float, float, bool]], gr
         if not own.any():
             continue
         if group.pixel is None:
-            raise found.measured[0].error("measurements are in millimetres, and the sensor has no size")
+            raise found.measured[0].error(phrase("format.sensor-size"))
         right, up = (xy[own] @ group.axes[:2, :2] / group.pixel).T
         values = group.camera.parameters
         cx, cy = values["cx"], values["cy"]
@@ -343,8 +350,7 @@ def _checked(project: Project) -> Project:
         other = agreement(project.replace(block=project.block.replace(cameras=cameras))).median
         if other * BETTER < as_read:
             raise InputError(
-                f"the median residual is {as_read:.3g} px by the published distortion, {other:.3g} px with"
-                f" {name}: the program that wrote the file means something else",
+                phrase("blocks-exchange.distortion", as_read=as_read, other=other, reading=name),
                 file=project.path,
             )
     return project

@@ -13,9 +13,9 @@ from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame
 from photogram.formats.xml_stream import Element
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.observations import Control, Observation, Position
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "local"
 
@@ -66,10 +66,11 @@ class Systems:
                 centres = np.array([each.centre for each in photos])
                 known = centres[np.isfinite(centres).all(axis=1)]
                 if not len(known):
-                    raise InputError(f"no photo has a position in {definition}", file=photos[0].place.file)
+                    raise InputError(
+                        phrase("blocks-exchange.centres", crs=definition), file=photos[0].place.file
+                    )
                 self.frame = Frame("topocentric", "EPSG:4979", amid(definition, known))
-                text = f"positions in {definition} are adjusted in a frame that is {self.frame}"
-                messages.append(Message(text))
+                messages.append(Message(phrase("format.frame", crs=definition, frame=self.frame.phrase)))
         self.same = definition
 
     def definition(self, srs: str) -> str:
@@ -82,14 +83,12 @@ class Systems:
         if definition == self.same and (definition == LOCAL or definition.upper().startswith("ENU:")):
             return xyz, covariances
         if LOCAL in (definition, self.same):
-            raise InputError(
-                f"positions in {definition} have no place in the frame of the block, {self.same}"
-            )
+            raise InputError(phrase("blocks-exchange.systems", crs=definition, frame=self.same))
         from photogram.formats.crs import to_frame
 
         found, turned, remarks = to_frame(definition, xyz, covariances, self.frame)
-        known = {each.text for each in self.messages}
-        self.messages += [Message(text) for text in remarks if text not in known]
+        known = {message.phrase for message in self.messages}
+        self.messages += [Message(remark) for remark in remarks if remark not in known]
         return found, turned
 
     def poses(self, photos: list[PhotoRecord], centres: Floats, matrices: Floats) -> tuple[Floats, Floats]:
@@ -124,8 +123,7 @@ class Systems:
             local = self.definition(srs) == self.same and self.frame.kind == "cartesian"
             for k, row in enumerate(rows):
                 if not local and points[row].sd is not None and not whole[k]:
-                    text = "a part of a position cannot be carried into another system"
-                    raise points[row].place.error(text)
+                    raise points[row].place.error(phrase("blocks-exchange.part"))
             deviation = np.array([np.zeros(3) if points[row].sd is None else points[row].sd for row in rows])
             found, turned = given.copy(), covariances_of(np.nan_to_num(deviation))
             if whole.any():
@@ -170,5 +168,5 @@ class Systems:
                 continue
             found.append(Position(names[row], own[0], covariance=(turned[0] + turned[0].T) / 2))
         if lost:
-            self.messages.append(Message(f"GNSS positions in another system are left out: {listed(lost, 3)}"))
+            self.messages.append(Message(phrase("blocks-exchange.gnss", n=len(lost), names=lost)))
         return found

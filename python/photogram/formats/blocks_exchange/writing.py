@@ -9,28 +9,25 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.block_contents import correlated_control, lost_observations
+from photogram.formats.block_contents import correlated_control
 from photogram.formats.blocks_exchange import FILE
 from photogram.formats.blocks_exchange.reading import CENTER
-from photogram.formats.images import sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, sizes_of, to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.losses import losses
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
-from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
+from photogram.words import Phrase, phrase
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the file has no place for."""
-    block = project.block
-    found = ["standard deviations of images, poses and cameras"]
-    sd = block.point_sd[np.isfinite(block.point_sd).all(axis=1)]
-    if (sd[:, 0] != sd[:, 1]).any():
-        found.append(
-            "standard deviations of control that differ in x and y: their root mean square stands for both"
-        )
-    return found + lost_observations(block, "standard deviations")
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the file cannot contain."""
+    sd = project.block.point_sd
+    sd = sd[np.isfinite(sd).all(axis=1)]
+    unequal = ["horizontal-deviations"] if (sd[:, 0] != sd[:, 1]).any() else []
+    return losses(project, "deviations", *unequal, "correlations", "observations", "gnss", "rigs", "boards")
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -78,7 +75,7 @@ def _camera(camera: Camera, size: Size) -> list[str]:
     lens = lens_of(camera, size)
     if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
         raise InputError(
-            f"the camera {camera.title} has the model {camera.model}, which BlocksExchange does not have"
+            phrase("format.model", camera=camera.title, model=camera.model, title="BlocksExchange")
         )
     terms = {"K1": lens.k1, "K2": lens.k2, "K3": lens.k3, "P1": lens.p2, "P2": lens.p1}
     return [

@@ -32,8 +32,7 @@ MODELS: dict[str, int] = {
 """Names in the order of their numbers, and their number of parameters; camera models have small letters."""
 NO_POINT = -1
 CAMERA = "CAMERA"
-SENSORS = (CAMERA, "IMU")
-"""Types of sensors in the order of their numbers."""
+SENSORS = (CAMERA, "IMU")  # Types of sensors in the order of their numbers
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,7 @@ class _Line(_Record):
 
     def word(self, name: str, words: Iterable[str] = ()) -> str:
         if self.at >= len(self.words):
-            raise self.place.error(phrase("colmap.end", name=name))
+            raise self.place.error(phrase("format.end", name=name))
         self.at += 1
         return self.words[self.at - 1]
 
@@ -168,7 +168,7 @@ class _Bytes(_Record):
     def title(self) -> str:
         end = self.data.find(b"\0", self.at, self.at + _MAX_NAME)
         if end < 0:
-            raise self.place.error(phrase("colmap.end", name="NAME"))
+            raise self.place.error(phrase("format.end", name="NAME"))
         name, self.at = self.data[self.at : end].decode("utf-8", "replace"), end + 1
         return name
 

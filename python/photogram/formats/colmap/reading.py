@@ -13,10 +13,10 @@ from photogram.errors import InputError
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Model, Pose
 from photogram.formats.colmap.files import read_model
 from photogram.formats.format import Wishes
+from photogram.formats.images import Y_DOWN
 from photogram.formats.names import NAMES, Colours, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
-from photogram.formats.rotations import Y_DOWN
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.cameras import Camera as HouseCamera
@@ -109,7 +109,7 @@ def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
         if not name.strip() or not name.isprintable():
             raise place.error(phrase("format.name", what="image", name=name))
         if camera not in cameras:
-            raise place.error(_unknown("image", name, "camera", camera))
+            raise place.error(phrase("format.undefined", what="camera", name=str(camera)))
     xy = np.isfinite(images.xy).all(axis=1)
     if not xy.all():
         row = int(np.searchsorted(np.cumsum(images.counts), np.argmin(xy), side="right"))
@@ -130,10 +130,6 @@ def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
         if len(first) < len(names):
             row = int(np.setdiff1d(np.arange(len(names)), first)[0])
             raise places[row].error(phrase("format.repeated", what=what, name=str(names[row])))
-
-
-def _unknown(owner: str, name: object, what: str, other: object) -> Phrase:
-    return phrase("format.reference", owner=owner, name=str(name), what=what, other=str(other))
 
 
 def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, Indices]:
@@ -175,12 +171,12 @@ def _composed(
     for frame in model.frames:
         place = frame.place
         if frame.rig not in numbers:
-            raise place.error(_unknown("frame", frame.number, "rig", frame.rig))
+            raise place.error(phrase("format.undefined", what="rig", name=str(frame.rig)))
         turn, shift = _rigid(frame.pose, place)
         photos: dict[str, int] = {}
         for sensor, image in ((sensor, image) for kind, sensor, image in frame.data if kind == CAMERA):
             if image not in rows:
-                raise place.error(_unknown("frame", frame.number, "image", image))
+                raise place.error(phrase("format.undefined", what="image", name=str(image)))
             row = rows[image]
             if (frame.rig, sensor) not in sensors or model.images.cameras[row] != sensor:
                 raise place.error(phrase("colmap.sensor", frame=frame.number, image=image, camera=sensor))
@@ -212,7 +208,7 @@ def _mounted_sensors(
         sensors: dict[str, Sensor] = {}
         for number, pose in ((number, pose) for kind, number, pose in rig.sensors if kind == CAMERA):
             if number not in cameras:
-                raise rig.place.error(_unknown("rig", rig.number, "camera", number))
+                raise rig.place.error(phrase("format.undefined", what="camera", name=str(number)))
             rigid = poses[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
             if rigid is not None:
                 name = f"rig {rig.number}, camera {number}"

@@ -12,43 +12,29 @@ from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, text_files
-from photogram.formats.images import sizes_of, to_corner
+from photogram.formats.images import Y_DOWN, sizes_of, to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
-from photogram.formats.rotations import Y_DOWN
 from photogram.io.json import to_json
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.rigs import Mount
 from photogram.results.result import Result
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 
-def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project a COLMAP model has no place for."""
-    block = project.block
-    found = ["standard deviations and correlations", f"the frame ({project.frame}) and its unit"]
-    held = int(np.count_nonzero(np.isfinite(block.point_sd).any(axis=1)))
-    if held or project.checks:
-        found.append(
-            f"what control is: {held} held and {len(project.checks)} check points are points as others"
-        )
-    if block.observations:
-        found.append(f"{len(block.observations)} observations beside images")
-    if unposed := int(np.count_nonzero(~posed(block))):
-        found.append(f"{unposed} photos without a pose")
-    lost = int(np.count_nonzero(~np.isfinite(complete_positions(project)).all(axis=1)))
-    if lost:
-        found.append(f"{lost} points without a position: their images are features without a point")
-    cameras, which = known_cameras(block)
-    if any(each.deviations.any() for each in cameras):
-        found.append("which parameters of cameras are unknown")
-    if not _told_by_cameras(block.mounts, dict(zip(block.photo_ids, which, strict=True))):
-        found.append("rigs whose sensors are not told by their cameras: photos have their poses")
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that a COLMAP model cannot contain."""
+    kinds = ("deviations", "frame", "control", "all-observations", "unposed", "unplaced", "unknowns")
+    found = losses(project, *kinds)
+    which = known_cameras(project.block)[1]
+    if not _told_by_cameras(project.block.mounts, dict(zip(project.block.photo_ids, which, strict=True))):
+        found.append(phrase("lost.rigs"))
     return found
 
 

@@ -7,16 +7,21 @@ from typing import NamedTuple
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.io.places import Failing
 from photogram.network.attitudes import Attitudes
+from photogram.words import phrase
 
-RECORDS = 64
-"""Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
-BEYOND = 4
-"""Records beyond either end: as many as count on a side."""
+RECORDS = 64  # Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits
+MAX_LENGTH_DIFFERENCE = 1e-3
+BEYOND = 4  # Records beyond either end: as many as count on a side
 
 
-def of_quaternions(quaternions: Floats) -> Floats:
-    """Return the (n, 3, 3) matrices of (n, 4) quaternions w, x, y, z of any length, applied as C v."""
+def of_quaternions(place: Failing, quaternions: Floats) -> Floats:
+    """Return the (n, 3, 3) matrices of (n, 4) unit quaternions w, x, y, z of a file, applied as C v."""
+    lengths = np.linalg.norm(quaternions, axis=1)
+    if not (np.abs(lengths - 1) < MAX_LENGTH_DIFFERENCE).all():
+        worst = float(lengths[np.argmax(np.abs(lengths - 1))])
+        raise place.error(phrase("format.length", length=worst))
     return Attitudes.of("quaternion", quaternions).matrices
 
 

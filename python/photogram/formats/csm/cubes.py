@@ -1,4 +1,4 @@
-"""ISIS cubes after spiceinit as support data: labels, keywords of instruments, tables of pose behind them."""
+"""ISIS cubes after spiceinit as support data, and lists of images."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.cards import filled_lines
 from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
 from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
-from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, transformed
+from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, read_isd, transformed
 from photogram.io.files import reading
 from photogram.io.json import Tree
 from photogram.io.places import at_place
@@ -24,11 +25,10 @@ from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation, increasing, rotations
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 PIECE = 1 << 16
-LONGEST = 1 << 26
-"""Bytes of a label, at most."""
+LONGEST = 1 << 26  # Bytes of a label, at most
 KM = 1000.0
 
 _END = re.compile(rb"(?mi)^[ \t]*End[ \t]*\r?$")
@@ -43,8 +43,8 @@ _POLYNOMIALS = (("J2000SVX", "J2000SVY", "J2000SVZ"), ("J2000Ang1", "J2000Ang2",
 
 _LRO, _APOLLO = "LUNAR RECONNAISSANCE ORBITER", re.compile(r"APOLLO[ _]?(1[567])")
 _NAC = ("NACL", "NACR")
-_CHANGED = {"AlphaCube": "a part of another cube, or made smaller", "Mapping": "a map"}
-"""Groups of cubes whose samples and lines are not those of their camera."""
+_CHANGED = ("AlphaCube", "Mapping")
+"""Groups of cubes whose samples and lines are not those of their camera: parts of other cubes, and maps."""
 
 
 def is_cube(path: Path) -> bool:
@@ -60,7 +60,7 @@ def read_label(path: Path) -> Group:
         while (end := _END.search(text)) is None:
             piece = file.read(PIECE)
             if not piece or len(text) > LONGEST:
-                raise InputError("has no label with an End", file=path)
+                raise InputError(phrase("csm.label"), file=path)
             text += piece
     label = parsed(text[: end.end()].decode("utf-8", "replace"), path)
     _group(label, "IsisCube", path)
@@ -71,7 +71,7 @@ def _group(within: Group, name: str, path: Path) -> Group:
     """Return the group of a name; an error where there is none."""
     found = within.groups(name)
     if not found:
-        raise InputError(f"the label has no {name}", file=path, record=within.line)
+        raise InputError(phrase("format.member", name=name), file=path, record=within.line)
     return found[0]
 
 
@@ -92,40 +92,42 @@ class _Table:
     def __init__(self, label: Group, name: str, path: Path) -> None:
         own = [each for each in label.groups("Table") if each.get("Name") == name]
         if not own:
-            raise InputError(f"has no table {name}: run spiceinit on it", file=path)
+            raise InputError(phrase("csm.no-table", name=name), file=path)
         self.label, self.path, self.name = own[0], path, name
         self.keys = replace(_members(own[0], path), path=name)
         fields = [_members(each, path) for each in own[0].groups("Field")]
         self.columns = [each["Name"].text() for each in fields]
         for each in fields:
             if each["Type"].text().lower() != "double" or each["Size"].whole() != 1:
-                raise self.error(f"the column {each['Name'].value} is none of single doubles")
+                raise self.error(phrase("csm.column", name=each["Name"].value))
         self.rows = self._rows()
 
     def error(self, message: str | Phrase) -> InputError:
-        return InputError(f"the table {self.name}: {message}", file=self.path, record=self.label.line)
+        return InputError(
+            phrase("error.at", what=phrase("csm.table", name=self.name), message=message),
+            file=self.path,
+            record=self.label.line,
+        )
 
     def _rows(self) -> Floats:
         records, width = self.keys["Records"].whole(1), len(self.columns)
         order = self.keys.get("ByteOrder", "Lsb").text().lower()
         if order not in ("lsb", "msb"):
-            raise self.error(f"has the byte order {order}, which is neither Lsb nor Msb")
+            raise self.error(phrase("format.unknown", what="ByteOrder", value=order, names=["Lsb", "Msb"]))
         if "^Table" in self.keys:
-            raise self.error("stands in another file, which is not read")
+            raise self.error(phrase("csm.elsewhere"))
         size = 8 * width * records
         if self.keys["Bytes"].whole() != size:
-            raise self.error(
-                f"has {self.keys['Bytes'].value} bytes, {records} records of {width} doubles {size}"
-            )
+            raise self.error(phrase("csm.bytes", n=self.keys["Bytes"].value, size=size))
         begin = self.keys["StartByte"].whole(1, 1 << 62) - 1
         with reading(self.path), self.path.open("rb") as file:
             if begin + size > file.seek(0, SEEK_END):
-                raise self.error("goes on beyond the end of the file")
+                raise self.error(phrase("csm.short"))
             file.seek(begin)
             data = file.read(size)
         found = np.frombuffer(data, dtype="<f8" if order == "lsb" else ">f8").astype(float)
         if not np.isfinite(found).all():
-            raise self.error("has numbers that are not finite")
+            raise self.error(phrase("format.finite", name="the table"))
         return found.reshape(records, width)
 
     def has(self, columns: Sequence[str]) -> bool:
@@ -135,7 +137,7 @@ class _Table:
         """Return (k, n) numbers of columns."""
         missing = [each for each in columns if each not in self.columns]
         if missing:
-            raise self.error(f"has no column {missing[0]}, but {', '.join(self.columns)}")
+            raise self.error(phrase("format.member", name=missing[0]))
         return np.asarray(self.rows[:, [self.columns.index(each) for each in columns]])
 
     @property
@@ -148,10 +150,10 @@ class _Table:
         coefficients = self.of(columns)
         (reference, scale, degree), own = coefficients[-1], coefficients[:-1]
         if len(own) != degree + 1 or not scale:
-            raise self.error(f"is no polynomial: {len(own)} coefficients of the degree {degree:g}")
+            raise self.error(phrase("csm.polynomial", n=len(own), degree=degree))
         first, last = (self.keys[f"{kernel}Table{end}Time"].number() for end in ("Start", "End"))
         if not last > first:
-            raise self.error(f"reaches from {first!r} to {last!r}")
+            raise self.error(phrase("csm.span", first=first, last=last))
         return Polynomials(own.T, float(reference), float(scale)).sampled(first, last)
 
     @property
@@ -172,10 +174,12 @@ def read_positions(label: Group, path: Path) -> Positions:
         times, places = table.sampled(_POLYNOMIALS[0], "Spk")
         return Positions(times, KM * places, None, "lagrange")
     if joined not in _JOINED:
-        raise table.error(f"its CacheType {joined} is not known: give an ISD")
+        raise table.error(
+            phrase("format.unknown", what="CacheType", value=joined, names=[*_JOINED, _POLYNOMIAL])
+        )
     speeds = KM * table.of(_SPEEDS) if table.has(_SPEEDS) else None
     if speeds is None and _JOINED[joined] == "hermite":
-        raise table.error("has no velocities, which its CacheType needs")
+        raise table.error(phrase("csm.velocities"))
     return Positions(table.times, KM * table.of(_PLACES), speeds, _JOINED[joined])
 
 
@@ -185,10 +189,8 @@ def read_turns(label: Group, name: str, path: Path) -> Turns:
     if table.has(_POLYNOMIALS[1]):
         times, angles = table.sampled(_POLYNOMIALS[1], "Ck")
         return Turns(times, table.constant @ of_angles(angles), "lagrange")
-    quaternions = table.of(_QUATERNIONS)
-    if not (np.abs(np.linalg.norm(quaternions, axis=1) - 1) < 1e-3).all():
-        raise table.error("has quaternions that are not of the length 1")
-    return Turns(table.times, table.constant @ of_quaternions(quaternions), "linear")
+    quaternions = of_quaternions(table, table.of(_QUATERNIONS))
+    return Turns(table.times, table.constant @ quaternions, "linear")
 
 
 def _named(instrument: Tree) -> tuple[str, str]:
@@ -206,8 +208,7 @@ def serial_number(label: Group, path: Path) -> str:
     if apollo and name == "METRIC":
         return f"APOLLO{apollo[1]}/METRIC/{instrument['StartTime'].text()}"
     raise InputError(
-        f"no rule for serial numbers of {name} of {spacecraft} is known: write it before the path, with a"
-        " comma",
+        phrase("csm.serial", instrument=name, spacecraft=spacecraft),
         file=path,
     )
 
@@ -220,15 +221,15 @@ def read_cube(path: Path) -> Isd:
     """
     label = read_label(path)
     cube = _group(label, "IsisCube", path)
-    for name, what in _CHANGED.items():
+    for name in _CHANGED:
         if cube.groups(name):
-            raise InputError(f"is {what} ({name}): take the cube that was made into it", file=path)
+            raise InputError(phrase("csm.derived", name=name), file=path)
     instrument = _members(_group(cube, "Instrument", path), path)
     known = _CAMERAS.get(_named(instrument))
     if known is None:
         spacecraft, name = _named(instrument)
         raise InputError(
-            f"{name} of {spacecraft} is not known by its label: make an ISD of it (isd_generate of ALE)",
+            phrase("csm.instrument", instrument=name, spacecraft=spacecraft),
             file=path,
         )
     return known(label, cube, instrument, path)
@@ -267,7 +268,9 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
     summing = instrument["SpatialSumming"].number()
     centre = [keywords[f"{code}_BORESIGHT_{axis}"].number() for axis in ("SAMPLE", "LINE")]
     if not summing > 0:
-        raise instrument["SpatialSumming"].error("is not positive")
+        raise instrument["SpatialSumming"].error(
+            phrase("format.positive", name="the sum of pixels", value=summing)
+        )
     return Detector(
         np.array(centre),
         np.array([instrument["SampleFirstPixel"].number(), 0.0]),
@@ -285,7 +288,7 @@ def _radii(keywords: Tree) -> tuple[float, float]:
     name = f"BODY{keywords['BODY_CODE'].whole()}_RADII"
     a, other, b = KM * keywords[name].numbers(3)
     if a != other or not 0 < b <= a:
-        raise keywords[name].error("are not those of a spheroid")
+        raise keywords[name].error(phrase("csm.radii", a=a, b=b))
     return float(a), float(b)
 
 
@@ -303,11 +306,69 @@ def _start(instrument: Tree, keywords: Tree) -> float:
             try:
                 return float(struct.unpack("<d", bytes.fromhex(str(value.value)))[0])
             except (ValueError, struct.error):
-                raise value.error("is no time in sixteen hexadecimal digits") from None
-    raise keywords.error("has no CLOCK_ET of the clock at which the image begins")
+                raise value.error(phrase("csm.time")) from None
+    raise keywords.error(phrase("csm.clock"))
 
 
 _CAMERAS: dict[tuple[str, str], Callable[[Group, Group, Tree, Path], Isd]] = {
     (_LRO, name): _nac for name in _NAC
 }
 """How cubes are read, by spacecraft and instrument."""
+
+
+def read_support(path: Path) -> Isd:
+    """Read the support data of an image, of a cube or an ISD.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_cube` and :func:`read_isd` have it.
+    """
+    return read_cube(path) if is_cube(path) else read_isd(path)
+
+
+def read_list(path: Path) -> dict[str, Path]:
+    """Return the files of a list of images by the serial numbers of these.
+
+    Parameters
+    ----------
+    path
+        A line an image: a path, or its serial number, a comma and a path; relative ones are within the
+        folder of the list. Empty lines and those that begin with # do not count.
+
+    Raises
+    ------
+    InputError
+        Files that are not there; ISDs without a serial number; one that stands there twice; an empty list.
+    """
+    found: dict[str, Path] = {}
+    for place in filled_lines(path):
+        try:
+            serial, file = _of_line((place.text or "").strip(), path.parent)
+        except InputError as error:
+            message = error.phrase or error.message
+            if error.file is not None:
+                message = phrase("error.at", what=str(error.file), message=message)
+            raise place.error(message) from None
+        if serial in found:
+            raise place.error(phrase("format.repeated", what="serial number", name=serial))
+        found[serial] = file
+    if not found:
+        raise InputError(phrase("format.missing", what="images"), file=path)
+    return found
+
+
+def _of_line(text: str, folder: Path) -> tuple[str, Path]:
+    """Return serial number and file of a line."""
+    serial, comma, rest = text.partition(",")
+    alone = folder / text
+    if comma and not alone.is_file():
+        file = folder / rest.strip()
+        if not file.is_file():
+            raise InputError(phrase("csm.file", name=rest.strip()))
+        return serial.strip(), file
+    if not alone.is_file():
+        raise InputError(phrase("csm.file", name=text))
+    if not is_cube(alone):
+        raise InputError(phrase("csm.isd-serial"))
+    return serial_number(read_label(alone), alone), alone

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation
@@ -19,8 +19,7 @@ from photogram.words import Phrase
 
 Pixels = Literal["isis", "csm"]
 """How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
-HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}
-"""What the corner of the first pixel is counted as."""
+HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}  # What the corner of the first pixel is counted as
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +183,7 @@ class Isd:
     lines: Lines | None = None
     framelets: Framelets | None = None
     jitter: Jitter | None = None
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[Phrase, ...] = ()
     look: Literal[1, -1] = 1
 
     @property

@@ -17,15 +17,13 @@ from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
+from photogram.words import phrase
 
-_DOWN = np.array([1.0, -1.0])
-"""Factors of x, y, between y up and y down."""
+_DOWN = np.array([1.0, -1.0])  # Factors of x, y, between y up and y down
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
 """How records are joined where they do not say it themselves."""
-_STEPS = 5
-"""Until a shift no longer changes the line that it is of: shifts are less than a line."""
-_EDGE = 1e-6
-"""Rows beyond a framelet that are rounding at its edge."""
+_STEPS = 5  # Until a shift no longer changes the line that it is of: shifts are less than a line
+_EDGE = 1e-6  # Rows beyond a framelet that are rounding at its edge
 
 
 def trajectory_of(
@@ -47,7 +45,7 @@ def trajectory_of(
     places, pointing, joined = isd.position, isd.pointing, _JOINED[interpolation]
     own = places.interpolation or joined
     if own == "hermite" and places.velocities is None:
-        raise isd.error("the table of positions has no velocities, which its interpolation needs")
+        raise isd.error(phrase("csm.velocities"))
     table = Table(
         places.times,
         places.places,
@@ -72,9 +70,7 @@ def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
     """
     own = isd.pointing
     if not 0 <= degree < len(own.times):
-        raise isd.error(
-            f"{len(own.times)} records of the pointing do not give polynomials of degree {degree}"
-        )
+        raise isd.error(phrase("csm.degree", n=len(own.times), degree=degree))
     fit = fitted_angles(own.times, own.matrices, degree)
     times, angles = fit.sampled(float(own.times[0]), float(own.times[-1]))
     return replace(isd, pointing=Turns(times, of_angles(angles), "lagrange"))
@@ -172,7 +168,9 @@ class SupportedImage:
         """
         own = [np.atleast_1d(numbers(name, each)) for name, each in (("samples", samples), ("lines", lines))]
         if own[0].ndim != 1 or own[0].shape != own[1].shape:
-            raise InputError(f"samples and lines have the shapes {own[0].shape} and {own[1].shape}")
+            raise InputError(
+                phrase("format.shape", name="lines", required=str(own[0].shape), got=str(own[1].shape))
+            )
         image = np.column_stack(own) - HALF[self.pixels]
         photos = np.zeros(len(image), dtype=np.int64)
         if self.isd.lines is not None:
@@ -242,8 +240,14 @@ class SupportedImage:
         if beyond.any():
             row = int(np.argmax(beyond))
             raise self.isd.error(
-                f"line {lines[row]:g} of {self.name} is at {float(times[row])!r} s, the tables reach from"
-                f" {first!r} to {last!r} s"
+                phrase(
+                    "csm.reach",
+                    line=lines[row],
+                    image=self.name,
+                    time=float(times[row]),
+                    first=first,
+                    last=last,
+                )
             )
 
     def to_image(self, xyz: ArrayLike) -> Floats:

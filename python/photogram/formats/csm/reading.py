@@ -1,8 +1,9 @@
-"""Support data in JSON (ISDs, as ALE writes them for the Community Sensor Model), and what cubes share."""
+"""Support data in JSON (ISDs, as ALE writes them for the Community Sensor Model), and missing values."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -11,13 +12,13 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
-from photogram.formats.csm.missing_values import completed
 from photogram.io.json import Tree, read_json, unknown
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import increasing, rotations
+from photogram.words import Phrase, phrase
 
 _TRANSX = re.compile(r"(INS-?\d+)_TRANSX")
 _KINDS = {
@@ -25,8 +26,7 @@ _KINDS = {
     "USGS_ASTRO_FRAME_SENSOR_MODEL": "frame",
     "USGS_ASTRO_PUSH_FRAME_SENSOR_MODEL": "push frame",
 }
-FRAMELETS = 100_000
-"""At most in an image: each is a photo."""
+FRAMELETS = 100_000  # At most in an image: each is a photo
 _MEMBERS = {
     "radial": ("coefficients",),
     "transverse": ("x", "y"),
@@ -36,10 +36,8 @@ _MEMBERS = {
     "radtan": ("coefficients",),
 }
 """Where the coefficients of each lens are; all of them may also stand in `coefficients`."""
-UNITS = {"m": 1.0, "km": 1000.0}
-"""Metres; km where nothing is said."""
-APART = 0.01
-"""Of the span of a table: by how much that of the lines may differ."""
+UNITS = {"m": 1.0, "km": 1000.0}  # Metres; km where nothing is said
+APART = 0.01  # Of the span of a table: by how much that of the lines may differ
 
 
 def read_isd(path: Path) -> Isd:
@@ -61,7 +59,7 @@ def read_isd(path: Path) -> Isd:
     look = _look(kind, focal_length, detector, position, pointing)
     own: dict[str, Any] = {"look": look}
     if kind != "frame" and "jitter" in tree:
-        raise tree["jitter"].error("is known of frames alone")
+        raise tree["jitter"].error(phrase("csm.jitter"))
     if kind == "line":
         lines = read_lines(tree, center)
         own["lines"], of_lines = fitting(lines, size[1], pointing.times, read_drift(keywords, code))
@@ -110,9 +108,7 @@ def _check_frames(tree: Tree) -> None:
     tables = [tree[name] for name in ("instrument_position", "instrument_pointing", "body_rotation")]
     frames = {each["reference_frame"].whole(-(2**31)) for each in tables if "reference_frame" in each}
     if len(frames) > 1:
-        raise tables[0].error(
-            f"reference_frame of position, pointing and body differ: {', '.join(map(str, sorted(frames)))}"
-        )
+        raise tables[0].error(phrase("csm.frames", names=sorted(frames)))
 
 
 def _unit(tree: Tree) -> float:
@@ -126,7 +122,7 @@ def _radii(tree: Tree) -> tuple[float, float]:
     """Return semi-axes in metres."""
     a, b = (tree[name].number() * _unit(tree) for name in ("semimajor", "semiminor"))
     if not 0 < b <= a:
-        raise tree.error(f"are no semi-axes with 0 < semiminor <= semimajor: {a}, {b} m")
+        raise tree.error(phrase("csm.radii", a=a, b=b))
     return a, b
 
 
@@ -140,7 +136,7 @@ def _rows(tree: Tree, width: int) -> Floats:
         # Row by row, so that the message names the one that is at fault.
         found = np.array([row.numbers(width) for row in tree])
     if not len(found):
-        raise tree.error("is empty")
+        raise tree.error(phrase("format.empty"))
     return found
 
 
@@ -155,7 +151,7 @@ def _positions(tree: Tree) -> Positions:
     places = _rows(tree["positions"], 3)
     velocities = _rows(tree["velocities"], 3) if tree.get("velocities", []).value else None
     if velocities is not None and len(velocities) != len(places):
-        raise tree["velocities"].error(f"has {len(velocities)} records, positions {len(places)}")
+        raise tree["velocities"].error(phrase("format.count", n=len(velocities), required=len(places)))
     unit = _unit(tree)
     speeds = None if velocities is None else unit * velocities
     return Positions(_times(tree, len(places)), unit * places, speeds)
@@ -164,17 +160,13 @@ def _positions(tree: Tree) -> Positions:
 def _turns(tree: Tree, name: str) -> Turns:
     """Return K R(t): rotations of records, then the constant one."""
     own = tree[name]
-    quaternions = _rows(own["quaternions"], 4)
-    lengths = np.linalg.norm(quaternions, axis=1)
-    if not (np.abs(lengths - 1) < 1e-3).all():
-        worst = int(np.argmax(np.abs(lengths - 1)))
-        raise own["quaternions"].error(f"record {worst} has the length {lengths[worst]:.6g}, not 1")
+    matrices = of_quaternions(own["quaternions"], _rows(own["quaternions"], 4))
     constant = np.eye(3)
     if "constant_rotation" in own:
         given = own["constant_rotation"]
         with at_place(given):
             constant = rotations("constant_rotation", given.numbers(9).reshape(1, 3, 3), 1)[0]
-    return Turns(_times(own, len(quaternions)), constant @ of_quaternions(quaternions))
+    return Turns(_times(own, len(matrices)), constant @ matrices)
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
@@ -182,16 +174,16 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     height = tree["framelet_height"].number() / summing
     every = tree["interframe_delay"].number()
     if not (height > 0 and every > 0):
-        raise tree["framelet_height"].error("is not positive, or interframe_delay is not")
-    if lines % height or lines / height > FRAMELETS:
         raise tree["framelet_height"].error(
-            f"does not divide the {lines} lines of the image, or into more than {FRAMELETS} framelets"
+            phrase("format.positive", name="framelet_height and interframe_delay", value=min(height, every))
         )
+    if lines % height or lines / height > FRAMELETS:
+        raise tree["framelet_height"].error(phrase("csm.framelets", lines=lines, most=FRAMELETS))
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
     switches = [tree.get(name, False) for name in ("framelet_order_reversed", "framelets_flipped")]
     for each in switches:
         if not isinstance(each.value, bool):
-            raise each.error("is neither true nor false")
+            raise each.error(phrase("format.boolean"))
     return Framelets(height, round(lines / height), first, every, *(each.value for each in switches))
 
 
@@ -201,7 +193,7 @@ def _jitter(tree: Tree) -> Jitter:
     ]
     times = np.array([each.number() for each in tree["lineExposureTimes"]])
     if len(coefficients[0]) != len(coefficients[1]) or not len(times):
-        raise tree.error("has not as many coefficients of samples as of lines, or no lineExposureTimes")
+        raise tree.error(phrase("csm.coefficients"))
     return Jitter(np.array(coefficients), times)
 
 
@@ -210,7 +202,7 @@ def _lens(tree: Tree, focal_length: float) -> Lens | None:
     optics = tree["optical_distortion"]
     models = [name for name, _ in optics.items()]
     if len(models) != 1:
-        raise optics.error(f"has {len(models)} models, not one")
+        raise optics.error(phrase("format.count", n=len(models), required=1))
     model = models[0]
     if model not in _MEMBERS:
         raise unknown(Tree(model, optics.file, optics.path), "the lens", _MEMBERS)
@@ -239,7 +231,9 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
     centre = tree["detector_center"]
     summing = pair("detector_{}_summing")
     if not (summing > 0).all():
-        raise tree["detector_sample_summing"].error("is not positive, or that of lines is not")
+        raise tree["detector_sample_summing"].error(
+            phrase("format.positive", name="the sum of pixels", value=float(summing.min()))
+        )
     csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
     planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
     if code is not None:
@@ -262,7 +256,7 @@ def from_pixels(samples: Tree, lines: Tree) -> Plane:
 def _affine(first: Tree, second: Tree) -> Floats:
     rows = np.array([first.numbers(3), second.numbers(3)])
     if not 0 < abs(np.linalg.det(rows[:, 1:])) < np.inf:
-        raise first.error(f"has no inverse, together with {second.path}")
+        raise first.error(phrase("csm.inverse", other=second.path))
     return rows
 
 
@@ -272,7 +266,7 @@ def _instrument(tree: Tree, keywords: Tree) -> str | None:
     frames = tree["instrument_pointing"].get("time_dependent_frames", []).value
     named = [code for code in codes if isinstance(frames, list) and frames and code == f"INS{frames[0]}"]
     if len(codes) > 1 and not named:
-        raise keywords.error(f"has several instruments, {', '.join(codes)}, none that of the pointing")
+        raise keywords.error(phrase("csm.instruments", names=codes))
     return (named or [*codes, None])[0]
 
 
@@ -286,7 +280,7 @@ def not_zero(tree: Tree) -> float:
     """Return a number that is not zero."""
     found = tree.number()
     if not found:
-        raise tree.error("is zero")
+        raise tree.error(phrase("format.zero"))
     return found
 
 
@@ -311,7 +305,7 @@ def read_lines(tree: Tree, center: float) -> Lines:
     rates = tree["line_scan_rate"]
     rows = np.array([row.numbers(3) for row in rates])
     if not len(rows):
-        raise rates.error("is empty")
+        raise rates.error(phrase("format.empty"))
     with at_place(rates):
         return Lines(rows - [0.5, -center, 0.0])
 
@@ -326,7 +320,7 @@ def read_drift(keywords: Tree, code: str | None) -> Drift | None:
     return Drift(*(keywords[name].number() for name in names))
 
 
-def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[str, ...]]:
+def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[Phrase, ...]]:
     """Return the times of lines that fit the pointing of the same file, and what there is to say of them.
 
     `drift` is added where the lines then begin and end nearer to the ends of `table`, the (k,) times of the
@@ -340,15 +334,86 @@ def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tup
     remarks = []
     if drift is not None and misfit(drift.of(lines)) < misfit(lines):
         lines = drift.of(lines)
-        remarks.append(
-            "line_scan_rate lacks what the keywords MULTIPLI_LINE_ERROR, ADDITIVE_LINE_ERROR and"
-            f" ADDITIONAL_PREROLL say, which was added: {np.asarray(lines.table)[0, 2]:.10g} s a line"
-        )
+        remarks.append(phrase("csm.drift", rate=float(np.asarray(lines.table)[0, 2])))
     span, known = float(abs(np.diff(lines.times([0.0, count]))[0])), float(ends[1] - ends[0])
     if known > 0 and abs(span - known) > APART * known:
-        short = "the lines are" if span < known else "the table is"
-        remarks.append(
-            f"the {count} lines take {span:.6g} s by line_scan_rate, the table of instrument_pointing"
-            f" {known:.6g} s: {short} short by {100 * abs(span - known) / max(span, known):.1f} %"
-        )
+        percent = 100 * abs(span - known) / max(span, known)
+        remarks.append(phrase("csm.duration", lines=count, span=span, table=known, percent=percent))
     return lines, tuple(remarks)
+
+
+_FRAME = "USGS_ASTRO_FRAME_SENSOR_MODEL"
+_SUMMING = "the number of detector {} that one {} of the image combines"
+_START = "the {} of the detector, from 0, at which the image begins"
+_CENTER = "the {} of the detector at which the axis of the camera meets it, in pixels"
+_PLANE = "three numbers: the {} of the detector at x = y = 0 mm, and its change for 1 mm of x and of y"
+
+
+def _middle(axis: str) -> Callable[[Tree], float | None]:
+    """Return what derives the middle of a whole frame; of a part of a frame there is none."""
+
+    def derive(tree: Tree) -> float | None:
+        if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
+            return None
+        return tree[f"image_{axis}s"].whole(1) * tree[f"detector_{axis}_summing"].number() / 2
+
+    return derive
+
+
+def _only_time(tree: Tree) -> Any:
+    """Return the time of the only record of the pointing."""
+    times = tree["instrument_pointing"].get("ephemeris_times", []).value
+    return times[0] if isinstance(times, list) and len(times) == 1 else None
+
+
+def _none(_: Tree) -> None:
+    return None
+
+
+_RULES: tuple[tuple[str, str, Callable[[Tree], Any], str], ...] = (
+    ("focal_length_model/focal_length", "FOCAL_LENGTH", _none, "the focal length in millimetres"),
+    ("focal2pixel_samples", "ITRANSS", _none, _PLANE.format("sample")),
+    ("focal2pixel_lines", "ITRANSL", _none, _PLANE.format("line")),
+    ("detector_sample_summing", "", _none, _SUMMING.format("samples", "sample")),
+    ("detector_line_summing", "", _none, _SUMMING.format("lines", "line")),
+    ("starting_detector_sample", "", _none, _START.format("sample")),
+    ("starting_detector_line", "", _none, _START.format("line")),
+    ("detector_center/sample", "BORESIGHT_SAMPLE", _middle("sample"), _CENTER.format("sample")),
+    ("detector_center/line", "BORESIGHT_LINE", _middle("line"), _CENTER.format("line")),
+    ("center_ephemeris_time", "", _only_time, "the time of the exposure in ephemeris seconds"),
+)
+"""Path of a value, keyword of the instrument that has it, derivation from other fields, meaning."""
+
+
+def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple[Phrase, ...]]:
+    """Return support data with the values that other fields determine, and remarks on these.
+
+    `code` is the prefix of the instrument's keywords.
+    """
+    remarks = []
+    for path, keyword, derive, meaning in _RULES:
+        group, _, name = path.rpartition("/")
+        holder = tree.get(group, {}).value if group else tree.value
+        if not isinstance(holder, dict) or holder.get(name) is not None:
+            continue
+        known = f"{code}_{keyword}"
+        value = keywords[known].value if known in keywords else derive(tree)
+        if value is None:
+            if name in holder or tree.value.get(group or name, 0) is None:
+                raise Tree(None, tree.file, f"/{path}").error(phrase("csm.null", meaning=meaning))
+            continue
+        origin = "csm.from-keyword" if known in keywords else "csm.from-fields"
+        remarks.append(phrase(origin, name=path, value=str(value), keyword=known))
+        own = {**holder, name: value}
+        tree = Tree({**tree.value, group: own} if group else own, tree.file)
+    return tree, (*remarks, *_center_in_corner(tree))
+
+
+def _center_in_corner(tree: Tree) -> list[Phrase]:
+    """Return a remark on a whole frame whose axis meets the detector in its corner."""
+    offsets = (tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line"))
+    middle = _middle("sample")(tree), _middle("line")(tree)
+    center = tree["detector_center"]
+    if None in middle or any(offsets) or any(center[axis].number() for axis in ("sample", "line")):
+        return []
+    return [phrase("csm.corner", sample=middle[0], line=middle[1])]

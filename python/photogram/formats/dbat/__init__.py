@@ -6,8 +6,13 @@ from pathlib import Path
 
 from photogram.formats.dbat.content import project_of
 from photogram.formats.dbat.export import is_export, read_export
-from photogram.formats.dbat.folder import is_folder, is_measurements, read_folder, read_measurements
-from photogram.formats.dbat.script import read_script
+from photogram.formats.dbat.script import (
+    is_folder,
+    is_measurements,
+    read_folder,
+    read_measurements,
+    read_script,
+)
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project
 from photogram.formats.xml_stream import root_of

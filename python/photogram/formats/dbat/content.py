@@ -19,10 +19,10 @@ from photogram.formats.format import Wishes
 from photogram.formats.images import by_camera
 from photogram.formats.project import Options, Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,7 @@ def sensors_of_table(
     for camera, size, pixel in zip(cameras, sizes, pixels, strict=True):
         if size is None or pixel is None or camera.image_y != "up":
             raise InputError(
-                f"the camera {camera.title} needs c, width, height and pixel_mm: measurements are in pixels,"
-                " its lens in mm",
+                phrase("dbat.camera", camera=camera.title),
                 file=path,
             )
         found[camera.name] = Sensor(camera, size, pixel)
@@ -117,7 +116,7 @@ class Content:
 def project_of(content: Content, wishes: Wishes) -> Project:
     """Return the project; standard deviations of measurements that a user gives are in pixels, as these."""
     if not content.image_photos:
-        raise InputError("has no measurements in photos", file=content.path)
+        raise InputError(phrase("format.missing", what="image observations"), file=content.path)
     order = {number: row for row, number in enumerate(content.photos)}
     centres, matrices = np.full((len(order), 3), np.nan), np.full((len(order), 3, 3), np.nan)
     posed = [number for number in order if number in content.poses]
@@ -188,7 +187,5 @@ def _names(content: Content) -> list[str]:
         return short
     if all(whole) and len(set(whole)) == len(whole):
         return whole
-    content.messages.append(
-        Message(f"photos have their numbers as names: {listed(sorted(set(short)), 3)} do not tell them apart")
-    )
+    content.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
     return [str(number) for number in content.photos]

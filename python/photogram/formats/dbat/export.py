@@ -22,11 +22,10 @@ from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 TITLE = "PhotoModeler export"
-_HEAD = (2, 9, 10, 10)
-"""Numbers of lines 2 to 5, at least."""
+_HEAD = (2, 9, 10, 10)  # Numbers of lines 2 to 5, at least
 _PHOTO = ("centre and angles", "standard deviations", "covariances", "camera", "standard deviations of it")
 _CAMERA = "c px py width height K1 K2 K3 P1 P2"
 
@@ -64,7 +63,7 @@ class _Lines:
     def take(self, what: str) -> Card:
         """Return the next line."""
         if self._next >= len(self._lines):
-            raise InputError(f"ends before {what}", file=self.path, record=self._next)
+            raise InputError(phrase("format.end", name=what), file=self.path, record=self._next)
         self._next += 1
         return Card(Place(self.path, self._next, self._lines[self._next - 1]))
 
@@ -98,19 +97,16 @@ def read_export(path: Path, wishes: Wishes) -> Content:
 
 def _number(card: Card, index: int) -> int:
     if index >= len(card.words):
-        raise card.place.error("ends before a number of a photo or point")
+        raise card.place.error(phrase("format.end", name="the number of a photo or point"))
     return card.place.whole(card.words[index], highest=2**53)
 
 
 def _size(card: Card) -> Size:
     if len(card.words) < 4:
-        raise card.place.error(
-            "does not say how many pixels the pictures have: write their width and height behind the number"
-            " of iterations"
-        )
+        raise card.place.error(phrase("dbat.size"))
     width, height = (_number(card, k) for k in (2, 3))
     if not (0 < width < 2**31 and 0 < height < 2**31):
-        raise card.place.error(f"pictures of {width} x {height} pixels")
+        raise card.place.error(phrase("format.size"))
     return width, height
 
 
@@ -118,9 +114,7 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
     c, px, py, width, height, *terms = card.numbers(first, _CAMERA).tolist()
     sides = width / size[0], height / size[1]
     if not (c > 0 and min(sides) > 1e-5 and max(sides) < 1 and 0.5 < sides[0] / sides[1] < 2):
-        raise card.place.error(
-            f"a principal distance of {c:g} mm and pixels of {sides[0]:.3g} x {sides[1]:.3g} mm cannot be"
-        )
+        raise card.place.error(phrase("dbat.distance", c=c, across=sides[0], down=sides[1]))
     with at_place(card.place):
         named = dict(zip(("K1", "K2", "K3", "P1", "P2"), terms, strict=True))
         return sensor_of(name, size, sides, (c, px, py), named)
@@ -147,19 +141,19 @@ class _Cameras:
         if words not in self.others:
             name = self.others[words] = f"camera of photo {number}"
             self.content.sensors[name] = _sensor(card, 1, name, self.size)
-            text = f"photo {number} has another camera than the head: {' '.join(words)}"
-            self.content.messages.append(Message(text, card.place.file))
+            remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
+            self.content.messages.append(Message(remark, card.place.file))
         return self.others[words]
 
 
 def _photo(head: Card, lines: _Lines, cameras: _Cameras) -> None:
     number, content = _number(head, 0), cameras.content
     if number in content.photos:
-        raise head.place.error(f"the photo {number} is there twice")
+        raise head.place.error(phrase("format.repeated", what="photo", name=str(number)))
     pose, _, _, camera, _ = (lines.take(f"the {what} of photo {number}") for what in _PHOTO)
     for card in (pose, camera):
         if _number(card, 0) != number:
-            raise card.place.error(f"is of photo {card.words[0]}, not of {number}")
+            raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
     content.photos[number] = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
     kappa, phi, omega = np.radians(pose.numbers(4, "kappa phi omega")).tolist()
     content.poses[number] = pose.numbers(1, "X Y Z"), np.array([omega, phi, kappa])
@@ -171,7 +165,7 @@ def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
     for card in lines.until_empty():
         number = _number(card, 0)
         if number in content.control or number in content.checks:
-            raise card.place.error(f"the control point {number} is there twice")
+            raise card.place.error(phrase("format.repeated", what="control point", name=str(number)))
         sd: Floats = card.numbers(4, "sx sy sz") if given is None else np.broadcast_to(given, 3)
         position = card.numbers(1, "X Y Z")
         if (sd < 0).all():
@@ -182,13 +176,7 @@ def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
         fields = {"number": len(content.checks), "option": option_sd("control")}
         content.lacks.append(Phrase("read.negative", fields))
     if content.control:
-        content.messages.append(
-            Message(
-                "positions and standard deviations of control are those after PhotoModeler's own adjustment;"
-                " --control FILE gives them as they were surveyed",
-                content.path,
-            )
-        )
+        content.messages.append(Message(phrase("dbat.control"), content.path))
 
 
 def _measurements(lines: _Lines, content: Content) -> None:
@@ -196,7 +184,7 @@ def _measurements(lines: _Lines, content: Content) -> None:
     for card in lines.until_empty():
         photo = _number(card, 0)
         if photo not in content.photos:
-            raise card.place.error(f"there is no photo {photo}")
+            raise card.place.error(phrase("format.undefined", what="photo", name=str(photo)))
         content.image_photos.append(photo)
         content.image_points.append(_number(card, 1))
         pixels.append(card.numbers(2, "x y"))

@@ -1,4 +1,4 @@
-"""Scripts of DBAT: cameras, which tables there are, what their columns are, what is unknown."""
+"""Scripts and folders of DBAT: cameras, tables with their columns, unknowns."""
 
 from __future__ import annotations
 
@@ -6,18 +6,26 @@ import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from photogram.formats.dbat.content import Content, Sensor, sensor_of
-from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, untitled
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.formats.dbat.content import Content, Sensor, sensor_of, sensors_of_table
+from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, titled, untitled
 from photogram.formats.format import Wishes
+from photogram.formats.plain.cameras import read_cameras
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Options, Size
-from photogram.formats.xml_stream import Element, read_stream
+from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.column_table import ColumnTable
-from photogram.io.places import at_place
-from photogram.messages import Message, quoted
+from photogram.io.files import read_beginning, read_lines
+from photogram.io.places import Place, at_place
+from photogram.io.rows import cells
+from photogram.messages import Message
+from photogram.words import phrase
 
 TITLE = "DBAT script"
-PLAIN, AFFINE = 1, 3
-"""Models: Brown's terms of measured coordinates; the same after an affinity."""
+PLAIN, AFFINE = 1, 3  # Models: Brown's terms of measured coordinates; the same after an affinity
 _TERMS = ("K1", "K2", "K3"), ("P1", "P2")
 _GROUPS = {
     "cc": ("c",),
@@ -73,7 +81,7 @@ def read_camera_file(path: Path, messages: list[Message]) -> dict[str, Sensor]:
 def _path(element: Element, base: Path) -> Path:
     word = element.text.strip()
     if not word:
-        raise element.error("names no file")
+        raise element.error(phrase("format.member", name="file"))
     return base / _known(element, word)
 
 
@@ -83,7 +91,7 @@ def _known(element: Element, word: str) -> str:
     if own.startswith("$HERE"):
         own = own.removeprefix("$HERE").removeprefix("/")
     if own.startswith("$") or not own.isprintable():
-        raise element.error(f"{quoted(word)}: only $HERE and paths are known here")
+        raise element.error(phrase("dbat.path", value=word))
     return own
 
 
@@ -91,11 +99,11 @@ def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]
     """Yield the tables that an element names, with the elements that do."""
     files = list(parent.all("file"))
     if not files:
-        raise parent.error("names no file")
+        raise parent.error(phrase("format.member", name="file"))
     for each in files:
         columns = each.attributes.get("format", "")
         if not columns:
-            raise each.error("does not say what its columns are (format)")
+            raise each.error(phrase("format.member", name="format"))
         yield each, untitled(_path(each, base), columns.split(","))
 
 
@@ -107,7 +115,7 @@ def _filter(points: Element) -> Callable[[int], bool]:
     numbers = {found.place.whole(word.strip()) for word in found.attributes.get("id", "").split(",")}
     how = found.text.strip()
     if how not in ("keep", "remove"):
-        raise found.error(f"{quoted(how)} is neither keep nor remove")
+        raise found.error(phrase("format.unknown", what="filter", value=how, names=["keep", "remove"]))
     return lambda number: (number in numbers) == (how == "keep")
 
 
@@ -117,7 +125,7 @@ def _deviation(element: Element) -> float:
         return math.nan
     value = element.place.number(word.strip(), "sxy")
     if not value > 0:
-        raise element.error(f"sxy: {value:g} is no standard deviation")
+        raise element.error(phrase("format.positive", name="sxy", value=value))
     return value
 
 
@@ -138,7 +146,9 @@ def _estimates(operations: Element, content: Content) -> None:
             if word not in words:
                 continue
             if word not in _GROUPS and word != "all":
-                raise words[word].error(f"there is no parameter {word}: {', '.join(_GROUPS)}")
+                raise words[word].error(
+                    phrase("format.unknown", what="parameter", value=word, names=list(_GROUPS))
+                )
             names = {own for group in _GROUPS.values() for own in group} if word == "all" else _GROUPS[word]
             value = words[word].text.strip().lower()
             if value == "true":
@@ -147,7 +157,7 @@ def _estimates(operations: Element, content: Content) -> None:
                 content.free -= set(names)
             else:
                 content.messages.append(
-                    Message(f"io {word}: {quoted(value)} is not read: held", content.path, words[word].line)
+                    Message(phrase("dbat.estimate", name=word, value=value), content.path, words[word].line)
                 )
 
 
@@ -159,7 +169,7 @@ def _datum(operations: Element, content: Content) -> None:
         word = each.attributes.get("ref_cam", "1")
         number = each.place.whole(word, "ref_cam")
         if number not in content.poses:
-            raise each.error(f"there is no photo {number} with a pose")
+            raise each.error(phrase("format.undefined", what="photo with a pose", name=word))
         content.held.add(number)
         content.options = Options(datum="minimum")
 
@@ -170,11 +180,11 @@ def _cameras(parent: Element, messages: list[Message]) -> dict[str, Sensor]:
     for row, each in enumerate(parent.all("camera"), 1):
         number = each.word("id", str(row))
         if number in found:
-            raise each.error(f"the camera {number} is there twice")
+            raise each.error(phrase("format.repeated", what="camera", name=number))
         with at_place(each):
             found[number] = _sensor(each, number, messages)
     if not found:
-        raise parent.error("has no camera")
+        raise parent.error(phrase("format.missing", what="a camera"))
     return found
 
 
@@ -182,25 +192,27 @@ def _numbers(element: Element, name: str, count: int) -> list[float]:
     own = element.need(name)
     words = [word.strip() for word in own.text.split(",")]
     if len(words) != count:
-        raise own.error(f"has {len(words)} numbers, not {count}")
+        raise own.error(phrase("format.count", n=len(words), required=count))
     return [own.place.number(word) for word in words]
 
 
 def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
     if (unit := element.word("unit", "mm")) != "mm":
-        raise element.error(f"a camera in {unit} is not read: mm is")
+        raise element.error(phrase("format.unknown", what="unit", value=unit, names=["mm"]))
     width, height = _numbers(element, "image", 2)
     if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
-        raise element.need("image").error("is no number of pixels")
+        raise element.need("image").error(phrase("format.size"))
     size = int(width), int(height)
     sides = _sides(element, size)
     model = element.whole("model") if element.child("model") else PLAIN
     terms = _terms(element)
     skew = element.number("skew", 0.0)
     if model not in (PLAIN, AFFINE) and (any(terms.values()) or skew or sides[0] != sides[1]):
-        raise element.need("model").error(f"model {model} is not read: {PLAIN} and {AFFINE} are, backward")
+        raise element.need("model").error(
+            phrase("format.unknown", what="model", value=str(model), names=[str(PLAIN), str(AFFINE)])
+        )
     if model == PLAIN and skew:
-        raise element.need("skew").error(f"model {PLAIN} has no skew")
+        raise element.need("skew").error(phrase("dbat.skew", model=PLAIN))
     c = _principal_distance(element, messages)
     px, py = _principal_point(element, size, sides, terms, messages)
     name = element.word("name") or f"camera {number}"
@@ -212,15 +224,15 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
     sensor = element.need("sensor")
     first, comma, second = (word.strip() for word in sensor.text.partition(","))
     if not comma:
-        raise sensor.error("has not both width and height")
+        raise sensor.error(phrase("dbat.sensor"))
     down = sensor.place.number(second) / size[1]
     aspect = element.word("aspect", "1" if first == "auto" else "auto")
     own = element.child("aspect") or sensor
     if aspect == "auto" and first == "auto":
-        raise sensor.error("neither the width of the sensor nor the aspect of pixels is a number")
+        raise sensor.error(phrase("dbat.sensor"))
     across = sensor.place.number(first) / size[0] if aspect == "auto" else own.place.number(aspect) * down
     if not (1e-5 < down < 1 and 1e-5 < across < 1):
-        raise sensor.error(f"pixels of {across:.3g} x {down:.3g} mm cannot be")
+        raise sensor.error(phrase("dbat.pixels", across=across, down=down))
     return across, down
 
 
@@ -232,7 +244,7 @@ def _terms(element: Element) -> dict[str, float]:
             continue
         words = own.text.replace(",", " ").split()
         if len(words) > len(names):
-            raise own.error(f"has {len(words)} terms; {len(names)} are the most")
+            raise own.error(phrase("format.count", n=len(words), required=f"at most {len(names)}"))
         found |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
     return found
 
@@ -240,12 +252,12 @@ def _terms(element: Element) -> dict[str, float]:
 def _principal_distance(element: Element, messages: list[Message]) -> float:
     word = element.word("cc", "focal")
     if word == "focal":
-        messages.append(Message(f"{element.word('name', 'camera')}: cc is the focal length", element.file))
+        messages.append(Message(phrase("dbat.focal", camera=element.word("name", "camera")), element.file))
         c = element.number("focal")
     else:
         c = element.number("cc")
     if not c > 0:
-        raise element.error(f"a principal distance of {c:g} mm")
+        raise element.error(phrase("format.positive", name="the principal distance", value=c))
     return c
 
 
@@ -258,16 +270,102 @@ def _principal_point(
 ) -> tuple[float, float]:
     middle = size[0] / 2 * sides[0], size[1] / 2 * sides[1]
     if element.word("pp", "default") == "default":
-        messages.append(Message(f"{element.word('name', 'camera')}: pp is the middle", element.file))
+        messages.append(Message(phrase("dbat.middle", camera=element.word("name", "camera")), element.file))
         return middle
     px, py = _numbers(element, "pp", 2)
     if py < 0:
         # DBAT wrote y up, and the terms with the other sign, before its version 0.9.
         if any(terms.values()):
-            raise element.need("pp").error(
-                "is of an older version of DBAT, with y up and K and P of the other sign: turn them all"
-            )
+            raise element.need("pp").error(phrase("dbat.old"))
         py = -py
     if not (math.hypot(px - middle[0], py - middle[1]) < max(middle)):
-        raise element.need("pp").error("lies outside of the picture")
+        raise element.need("pp").error(phrase("dbat.outside"))
     return px, py
+
+
+IMAGES, PHOTOS, POSES, CONTROL = "markpts.txt", "images.txt", "stations.txt", "control.txt"
+MEASURED, COMPUTED = "-2dpts.txt", "-3dpts.txt"
+_HEADER = "object point id,photo #,"
+_FREE = 10  # Lines in which a header is looked for
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a folder has DBAT's tables."""
+    return (path / IMAGES).is_file() and (path / PHOTOS).is_file()
+
+
+def is_measurements(path: Path) -> bool:
+    """Whether a file is a table of measurements of PhotoModeler."""
+    try:
+        begin = read_beginning(path).lower()
+    except InputError:
+        return False
+    return any(line.startswith(_HEADER) for line in begin.splitlines()[:_FREE])
+
+
+def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, Sensor]:
+    """Return cameras: of a table that a user gives, else of a file of cameras in the folder."""
+    if wishes.cameras is not None:
+        table = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}, image="mm"), messages))
+        return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, wishes.cameras)
+    folder = path if path.is_dir() else path.parent
+    files = [each for each in sorted(folder.glob("*.xml")) if "dbat_camera_version" in root_of(each)[1]]
+    if len(files) != 1:
+        raise InputError(phrase("format.cameras"), file=path)
+    return read_camera_file(files[0], messages)
+
+
+def read_folder(path: Path, wishes: Wishes) -> Content:
+    """Read `images.txt`, `markpts.txt`, and `stations.txt` and `control.txt` where they are there."""
+    content = Content(path, "tables of DBAT")
+    content.sensors = _sensors(path, wishes, content.messages)
+    take_photos(titled(path / PHOTOS), content)
+    if (path / POSES).is_file():
+        take_poses(titled(path / POSES), content)
+    if (path / CONTROL).is_file():
+        take_points(titled(path / CONTROL), content, wishes.sd.get("control"))
+    take_images(titled(path / IMAGES), content)
+    return content
+
+
+def read_measurements(path: Path, wishes: Wishes) -> Content:
+    """Read `NAME-2dpts.txt`, with the positions of `NAME-3dpts.txt` to begin with where it lies beside."""
+    content = Content(path, "PhotoModeler measurements")
+    content.sensors = _sensors(path, wishes, content.messages)
+    if len(content.sensors) > 1:
+        raise InputError(phrase("format.camera-column", n=len(content.sensors)), file=path)
+    camera = next(iter(content.sensors))
+    pixels = []
+    for place, own in _cells(path, _HEADER, 4):
+        point, photo = (place.whole(cell, highest=2**53) for cell in own[:2])
+        content.photos[photo], content.cameras[photo] = str(photo), camera
+        content.image_photos.append(photo)
+        content.image_points.append(point)
+        pixels.append([place.number(cell) for cell in own[2:4]])
+    content.photos = dict(sorted(content.photos.items()))
+    content.pixels = np.array(pixels).reshape(-1, 2)
+    content.image_sd = np.full_like(content.pixels, np.nan)
+    beside = path.with_name(path.name.removesuffix(MEASURED) + COMPUTED)
+    if path.name.endswith(MEASURED) and beside.is_file():
+        for place, own in _cells(beside, "id,name,photos (used),", 6):
+            position = np.array([place.number(cell) for cell in own[3:6]])
+            content.starts[place.whole(own[0], highest=2**53)] = position
+    return content
+
+
+def _cells(path: Path, header: str, least: int) -> list[tuple[Place, list[str]]]:
+    """Return the rows below a header, which stands after some free lines."""
+    lines = read_lines(path)
+    first = next((k for k, line in enumerate(lines[:_FREE]) if line.lower().startswith(header)), None)
+    if first is None:
+        raise InputError(phrase("dbat.header", header=header, n=_FREE), file=path)
+    found = []
+    for record, line in enumerate(lines[first + 1 :], first + 2):
+        if not line.strip():
+            continue
+        place = Place(path, record, line)
+        own = cells(place)
+        if len(own) < least:
+            raise place.error(phrase("format.count", n=len(own), required=f"at least {least}"))
+        found.append((place, own))
+    return found

@@ -13,7 +13,7 @@ from photogram.formats.dbat.content import Content
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 _KNOWN = {
     "image": "im",
@@ -55,7 +55,7 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
             try:
                 known[text] = whole_number(text, highest=2**53)
             except ValueError as error:
-                raise table.error(row, f"column {column}: {error}") from None
+                raise table.error(row, phrase("error.at", what=column, message=str(error))) from None
         found.append(known[text])
     return found
 
@@ -64,13 +64,13 @@ def _once(table: ColumnTable, numbers: Sequence[int], kind: str) -> None:
     seen: dict[int, int] = {}
     for row, number in enumerate(numbers):
         if seen.setdefault(number, row) != row:
-            raise table.error(row, f"the {kind} {number} is there already, in {table.records[seen[number]]}")
+            raise table.error(row, phrase("format.repeated", what=kind, name=str(number)))
 
 
 def _check_photos(table: ColumnTable, numbers: Sequence[int], content: Content) -> None:
     for row, number in enumerate(numbers):
         if number not in content.photos:
-            raise table.error(row, f"there is no photo {number}")
+            raise table.error(row, phrase("format.undefined", what="photo", name=str(number)))
 
 
 def take_photos(table: ColumnTable, content: Content) -> None:
@@ -80,18 +80,19 @@ def take_photos(table: ColumnTable, content: Content) -> None:
     _once(table, numbers, "photo")
     known = list(content.sensors)
     if "cam" not in table and len(known) > 1:
-        raise table.head.error(f"no column says which of {len(known)} cameras took a photo")
+        raise table.head.error(phrase("format.camera-column", n=len(known)))
     cameras = table.texts("cam", known[0] if len(known) == 1 else "")
     for row, (number, path, camera) in enumerate(zip(numbers, table.texts("path"), cameras, strict=True)):
         if camera not in content.sensors:
-            raise table.error(row, f"there is no camera {camera!r}, but {', '.join(known)}")
+            raise table.error(row, phrase("format.undefined", what="camera", name=camera))
         content.photos[number], content.cameras[number] = path, camera
 
 
 def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> None:
     """Take centres and angles omega, phi, kappa."""
     if unit not in _RADIANS:
-        raise table.head.error(f"angles in {unit!r}: {', '.join(_RADIANS)} are read")
+        names = list(_RADIANS)
+        raise table.head.error(phrase("format.unknown", what="unit of angles", value=unit, names=names))
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     numbers = _whole(table, "id")
     _once(table, numbers, "photo")
@@ -138,7 +139,7 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
         [np.where(np.isnan(each), default, each) for each, default in zip(own, defaults, strict=False)]
     )
     if (found < 0).any():
-        raise table.error(int(np.argwhere(found < 0)[0][0]), "a standard deviation is negative")
+        raise table.error(int(np.argwhere(found < 0)[0][0]), phrase("format.negative"))
     return found
 
 
@@ -150,7 +151,8 @@ def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> N
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
     if (own == 0).any():
-        raise table.error(int(np.argwhere(own == 0)[0][0]), "a standard deviation is 0")
+        name = "the standard deviation"
+        raise table.error(int(np.argwhere(own == 0)[0][0]), phrase("format.positive", name=name, value=0))
     content.image_photos += photos
     content.image_points += _whole(table, "id")
     content.pixels = np.vstack([content.pixels, table.given(("x", "y"))])

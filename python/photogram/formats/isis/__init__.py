@@ -10,8 +10,7 @@ from photogram.formats.format import Format, later
 from photogram.formats.isis.reading import TITLE, is_network
 from photogram.io.files import reading
 
-HEAD = 1 << 16
-"""Bytes that tell a network."""
+HEAD = 1 << 16  # Bytes that tell a network
 
 
 def _recognises(path: Path) -> bool:
@@ -27,7 +26,7 @@ FORMAT = Format(
     recognises=_recognises,
     read=later(f"{__name__}.assembling", "read"),
     results=later(f"{__name__}.writing", "results"),
-    adjusting=later(f"{__name__}.rejection", "rejecting"),
+    adjusting=later(f"{__name__}.outcome", "rejecting"),
 )
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,31 +10,29 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
-from photogram.formats.csm.lists import read_list, read_support
+from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
-from photogram.formats.isis.contents import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.network import ControlNetwork
-from photogram.formats.isis.observations import observations_of, one_flight
+from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import given_starts, known_points
 from photogram.formats.isis.reading import TITLE, read_network
 from photogram.formats.isis.settings import Settings, read_settings
-from photogram.formats.isis.solving import solving
+from photogram.formats.isis.solving import observations_of, one_flight, solving
 from photogram.formats.project import Project, assembled
 from photogram.io.places import Place
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a control network, and the support data of the images that a list names."""
     if wishes.cubes is None:
         raise InputError(
-            "has no images: --cubes FILE names them, a line each: the path of a cube, or serial number, comma"
-            " and path of an ISD",
+            phrase("isis.cubes"),
             file=path,
         )
     settings = read_settings(wishes.jigsaw or "")
@@ -47,7 +45,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     starts[seen.points] = _starts(network, images, seen, Place(path))
     contents = PlanetaryContents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
-    remarks = [Message(text, each.path) for each in images for text in each.supported.isd.remarks]
+    remarks = [Message(remark, each.path) for each in images for remark in each.supported.isd.remarks]
     return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *remarks])
 
 
@@ -57,14 +55,14 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
     seen = [network.measures.serials[row] for row in rows]
     for serial in seen:
         if serial not in files:
-            raise InputError(f"names no image {serial}, which has measures", file=cubes)
+            raise InputError(phrase("isis.image", name=serial), file=cubes)
     held, there, found = _held(settings, files), set(seen), {}
     # The first image of an observation is that of the list.
     observations = observations_of([each for each in files if each in there], shared=settings.observations)
     for number, serials in observations.items():
         known = {serial in held for serial in serials}
         if len(known) > 1:
-            raise InputError(f"names some images of the observation {number}, not all", file=settings.held)
+            raise InputError(phrase("isis.observation", number=number), file=settings.held)
         isds = [read_support(files[serial]) for serial in serials]
         own = solving(one_flight(isds), number, settings, held=True in known, first=isds[0])
         for serial, isd in zip(serials, isds, strict=True):
@@ -83,7 +81,7 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
         text = (place.text or "").strip()
         serial = text if text in files else names.get(str((settings.held.parent / text).resolve()))
         if serial is None:
-            raise place.error("is no image of --cubes")
+            raise place.error(phrase("isis.held"))
         found.add(serial)
     return found
 
@@ -103,11 +101,11 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
     """Return the measures of all images."""
     rows, own = np.flatnonzero(~network.is_ignored), network.measures
     if not len(rows):
-        raise InputError("has no measures that count", file=path)
+        raise InputError(phrase("format.missing", what="measures that are not ignored"), file=path)
     bad = rows[~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))]
     if len(bad):
         point = network.points.ids[network.point_of_measure[bad[0]]]
-        raise InputError(f"a measure of {point} has no Sample or no Line", file=path)
+        raise InputError(phrase("isis.measure", point=point), file=path)
     points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
     photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
     of_serial = dict(zip(own.serials, rows_of_each(own.serial[rows], len(own.serials)), strict=True))
@@ -152,10 +150,9 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
     centres, matrices = _poses(contents, spheroid)
-    said = list(contents.settings.told)
+    remarks = [*contents.settings.remarks]
     if contents.settings.rejects:
-        call = "`photogram adjust`, in Python by `formats.adjusting(project, adjust)`"
-        said.append(f"OUTLIER_REJECTION: done by {call}")
+        remarks.append(phrase("isis.rejection"))
     cameras, of_photos = _cameras(contents)
     return assembled(
         path=contents.path,
@@ -180,7 +177,7 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         timed=timed,
         spheroid=spheroid,
         lacks=[Phrase("read.images", {"number": PITCHES, "unit": "px", "option": option_sd("images")})],
-        messages=[*messages, *known.messages, *map(Message, said)],
+        messages=[*messages, *known.messages, *map(Message, remarks)],
         details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )
 
@@ -216,12 +213,13 @@ def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
 def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
     """Return what does not count: what is ignored, images without measures; and what counts again."""
     measures, points = network.measures, network.points
-    counts = {"ignored point": int(points.ignore.sum()), "ignored measure": int(network.is_ignored.sum())}
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
-    texts = [f"{counted(n, what)}: left out, and written as read" for what, n in counts.items() if n]
-    if again.any():
-        texts.append(f"{counted(int(again.sum()), 'measure')} that were rejected before: taken in again")
-    found = [Message(text) for text in texts]
+    counts = {
+        "isis.ignored-points": points.ignore.sum(),
+        "isis.ignored-measures": network.is_ignored.sum(),
+        "isis.rejected-measures": again.sum(),
+    }
+    found = [Message.of(code, n=int(n)) for code, n in counts.items() if n]
     if unused:
-        found.append(Message(f"images without measures, left out: {listed(unused, 3)}", cubes))
+        found.append(Message(phrase("isis.unused", n=len(unused), names=unused), cubes))
     return found

@@ -11,9 +11,8 @@ from photogram.arguments.types import Floats
 from photogram.formats.csm.angles import to_angles
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.photos import to_camera
-from photogram.formats.isis.contents import Image
 from photogram.formats.isis.network import POINT_TYPES
-from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.outcome import Image, Outcome
 from photogram.formats.isis.settings import PARAMETERS, Settings
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass

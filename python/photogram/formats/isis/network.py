@@ -12,6 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.pvl import Group
 from photogram.lazy_dataclasses import dataclass, field, fields
+from photogram.words import phrase
 
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
 """What types of points mean; `Tie` and `Ground` are what old networks have for `Free` and `Fixed`."""
@@ -56,8 +57,7 @@ _WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_cova
 _TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
 _CODES = {"types", "apriori_source", "apriori_radius_source"}
 _NO_COLUMNS = ("serials", "rest")
-_NAMES = ("ids", "serial", *_NO_COLUMNS)
-"""What is handed to the core apart from the columns of numbers."""
+_NAMES = ("ids", "serial", *_NO_COLUMNS)  # What is handed to the core apart from the columns of numbers
 
 
 class _Columns:
@@ -76,9 +76,11 @@ class _Columns:
             shape = (rows, _WIDTHS[each.name]) if each.name in _WIDTHS else (rows,)
             found = np.shape(getattr(self, each.name))
             if found != shape:
-                raise InputError(f"{each.name} has the shape {found}, not {shape}")
+                raise InputError(phrase("format.shape", name=each.name, required=str(shape), got=str(found)))
         if self.rest[1].shape != (rows + 1,):
-            raise InputError(f"rest begins in {len(self.rest[1])} places, not {rows + 1}")
+            raise InputError(
+                phrase("format.shape", name="rest[1]", required=str((rows + 1,)), got=str(self.rest[1].shape))
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +192,14 @@ class ControlNetwork:
 
     def __post_init__(self) -> None:
         if self.firsts.shape != (len(self.points) + 1,):
-            raise InputError(f"firsts has the shape {self.firsts.shape}, not {(len(self.points) + 1,)}")
+            raise InputError(
+                phrase(
+                    "format.shape",
+                    name="firsts",
+                    required=str((len(self.points) + 1,)),
+                    got=str(self.firsts.shape),
+                )
+            )
 
     @property
     def point_of_measure(self) -> NDArray[np.int64]:

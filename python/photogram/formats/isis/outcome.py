@@ -1,18 +1,32 @@
-"""What an adjustment has found, in the terms of control networks: pixels, axes of the body, measures."""
+"""Adjusted control networks: contents, outcome in pixels and axes of the body, rejection of measures."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
+from itertools import count
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
+from photogram.errors import AdjustmentError, InputError
+from photogram.formats.csm.photos import SupportedImage
+from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.points import per_metre
+from photogram.formats.isis.settings import Settings
+from photogram.formats.isis.solving import Solving
+from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, local_frames
 from photogram.network.motion import focal_images
 from photogram.results.result import Result
+from photogram.words import phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,3 +159,141 @@ def spherical(xyz: Floats) -> Floats:
     radius = np.linalg.norm(xyz, axis=1)
     latitude = np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))
     return np.column_stack([latitude, np.arctan2(xyz[:, 1], xyz[:, 0]) % (2 * np.pi), radius])
+
+
+DETAILS = "control network"
+PITCHES = 1.4  # Standard deviation of image coordinates, in pixels of the detector
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image of a network: its serial number, file, support data with photos, and what is adjusted."""
+
+    serial: str
+    path: Path
+    supported: SupportedImage
+    solving: Solving
+
+    @property
+    def pitch(self) -> float:
+        """The side of a pixel of the detector in millimetres."""
+        (x, y), _ = self.supported.isd.detector.planes["isis"].matrix.T
+        return float((x * x + y * y) ** 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class PlanetaryContents:
+    """A network as it was read, its images that have measures by the names of photos, and how it is adjusted.
+
+    `starts` are (N, 3) X, Y, Z in metres where all its points begin; NaN for those that do not count.
+    """
+
+    network: ControlNetwork
+    path: Path
+    images: Mapping[str, Image]
+    settings: Settings
+    starts: Floats
+
+    @property
+    def different(self) -> list[Image]:
+        """The images, each once: a push frame camera has several photos in one."""
+        return list(dict.fromkeys(self.images.values()))
+
+
+def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
+    """Return where each of the whole numbers below `count` stands among values."""
+    order = np.argsort(values, kind="stable")
+    return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
+
+
+def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
+    """Return the contents of a project; an error where it was not read from a control network."""
+    found = details.get(DETAILS)
+    if not isinstance(found, PlanetaryContents):
+        raise InputError(phrase("isis.project"))
+    return found
+
+
+NORMAL = 1.4826  # Standard deviations of normal errors in their median absolute deviation
+FEWEST = 2  # Measures of a point that stay
+FAINT = 1e6
+"""What the standard deviations of rejected measures are multiplied by, so that they have residuals all the
+same, and may come back."""
+MOST_ROUNDS = 30
+
+
+def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
+    """Return a call that adjusts the block of a control network, as its settings have measures rejected.
+
+    A block is adjusted, measures are rejected or taken in again (:func:`flagged`), and it is adjusted anew,
+    until none is rejected and none comes back; then without those that are out.
+    """
+    contents = contents_of(project.details)
+    if not contents.settings.rejects:
+        return adjust
+
+    def rejected(block: Block, **options: Any) -> Result:
+        if not isinstance(block, Block):
+            raise InputError(phrase("isis.rejection-poses"))
+        return _rejected(contents, block, lambda own: adjust(own, **options))
+
+    return rejected
+
+
+def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block], Result]) -> Result:
+    """Return the adjusted block without rejected measures, with a remark on what they were."""
+    multiplier = contents.settings.multiplier
+    out = np.zeros(len(block.image_xy), dtype=bool)
+    for rounds in count(1):
+        result = adjust(block.replace(image_sd=block.image_sd * np.where(out, FAINT, 1.0)[:, np.newaxis]))
+        if not result.converged:
+            return result
+        residuals = Outcome(contents, result).residuals
+        lengths = np.where(result.used_images, np.hypot(*residuals.T), np.nan)
+        limit = rejection_limit(lengths[~out], multiplier)
+        now = flagged(lengths, out, block.image_points, limit)
+        if (now == out).all():
+            break
+        out = now
+        if rounds == MOST_ROUNDS:
+            raise AdjustmentError(phrase("isis.rejection-rounds", n=rounds))
+    kept = np.flatnonzero(~out)
+    if out.any():
+        result = adjust(
+            block.replace(
+                image_photos=block.image_photos[kept],
+                image_points=block.image_points[kept],
+                image_xy=block.image_xy[kept],
+                image_sd=block.image_sd[kept],
+            )
+        )
+    counts = {"n": int(out.sum()), "total": len(out), "rounds": rounds, "least": FEWEST}
+    remark = Message.of("isis.rejected", **counts, multiplier=multiplier, factor=NORMAL, limit=limit)
+    return replace(result, messages=[remark, *result.messages])
+
+
+def rejection_limit(lengths: Floats, multiplier: float) -> float:
+    """Return median + multiplier x 1.4826 x median absolute deviation of (n,) lengths; NaN do not count."""
+    median = float(np.nanmedian(lengths))
+    return median + multiplier * NORMAL * float(np.nanmedian(np.abs(lengths - median)))
+
+
+def flagged(lengths: Floats, out: Bools, points: Indices, limit: float) -> Bools:
+    """Return which measures are rejected after an adjustment, as jigsaw has it.
+
+    What is rejected stays so while it is longer than the limit; of all others of a point the longest goes, if
+    it is longer and two stay. `lengths` are (m,) of residuals, NaN of measures that took no part, `out` (m,)
+    which were rejected before, `points` (m,) the point of each.
+    """
+    long = lengths > limit
+    stay = out & long
+    count = int(points.max(initial=-1)) + 1
+    left = np.bincount(points[np.isfinite(lengths)], minlength=count)
+    left -= np.bincount(points[stay], minlength=count)
+    # The last of each point, by length, is its longest.
+    fresh = np.flatnonzero(long & ~out)
+    order = fresh[np.lexsort((lengths[fresh], points[fresh]))]
+    last = np.append(points[order][1:] != points[order][:-1], True)[: len(order)]
+    longest = order[last]
+    stay[longest[left[points[longest]] > FEWEST]] = True
+    return stay

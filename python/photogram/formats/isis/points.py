@@ -11,12 +11,12 @@ from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.geometry import Cartesian, Spheroid, local_frames
 from photogram.network.observations import Control
+from photogram.words import phrase
 
-_LOCAL = [1, 0, 2]
-"""Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius."""
+_LOCAL = [1, 0, 2]  # Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +90,12 @@ def _constrain(
     points, own = network.points, np.flatnonzero(network.points.is_constrained[rows])
     covariances = full_matrices(points.apriori_covariance[rows[own]])
     given = np.isfinite(covariances).all(axis=(1, 2))
-    _tell(known, "have no covariance and are weighted as free ones", points.ids, rows[own[~given]])
+    _report(known, "isis.no-covariance", points.ids, rows[own[~given]])
     own, covariances = own[given], covariances[given]
     bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
     if len(bad):
         name = points.ids[rows[own[bad[0]]]]
-        raise place.error(f"the AprioriCovarianceMatrix of {name} is not positive definite")
+        raise place.error(phrase("isis.covariance", point=name))
     if spheroid:
         axes = local_frames(known.starts[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
@@ -107,14 +107,13 @@ def _constrain(
     deviations = np.sqrt(np.einsum("nkk->nk", covariances)) * metres[own]
     parts = np.flatnonzero(~whole)
     known.sd[own[parts]] = np.where(single[parts], deviations[parts], known.sd[own[parts]])
-    text = "have single coordinates constrained: these by their own standard deviations, without correlations"
-    _tell(known, text, points.ids, rows[own[parts]])
+    _report(known, "isis.single-coordinates", points.ids, rows[own[parts]])
 
 
-def _tell(known: KnownPoints, text: str, ids: Sequence[str], rows: Indices) -> None:
+def _report(known: KnownPoints, code: str, ids: Sequence[str], rows: Indices) -> None:
     if len(rows):
-        names = listed([ids[row] for row in rows.tolist()], 3)
-        known.messages.append(Message(f"{counted(len(rows), 'constrained point')} {text}: {names}"))
+        names = [ids[row] for row in rows.tolist()]
+        known.messages.append(Message.of(code, n=len(rows), names=names))
 
 
 def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
@@ -128,5 +127,5 @@ def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats
     found: Floats = np.where(there, apriori, adjusted)
     missing = ~np.isfinite(found).all(axis=1) & (points.is_fixed | points.is_constrained)[rows]
     if missing.any():
-        raise place.error(f"the point {points.ids[rows[np.argmax(missing)]]} is held, but has no coordinates")
+        raise place.error(phrase("isis.coordinates", point=points.ids[rows[np.argmax(missing)]]))
     return found

@@ -16,16 +16,15 @@ from photogram.formats.isis.network import HEADER, MESSAGE, ControlNetwork, meas
 from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import phrase
 
 TITLE = "control network (ISIS)"
-LABEL_BYTES = 65536
-"""Bytes of the label of a binary network; zeros follow what it says."""
+LABEL_BYTES = 65536  # Bytes of the label of a binary network; zeros follow what it says
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
 _BINARY, _TEXT = "protobuffer", "controlnetwork"
 _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
-_OLDEST = "1"
-"""The version of a network that does not say it."""
+_OLDEST = "1"  # The version of a network that does not say it
 _HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 
@@ -64,9 +63,7 @@ def read_network(path: Path) -> ControlNetwork:
     elif kind == _TEXT:
         network = _text(data, path)
     else:
-        raise InputError(
-            "is no control network: its first object is no ProtoBuffer or ControlNetwork", file=path
-        )
+        raise InputError(phrase("isis.network"), file=path)
     _check_names(network.points.ids, path)
     return network
 
@@ -77,16 +74,13 @@ def _check_names(ids: Sequence[str], path: Path) -> None:
     first: dict[str, int] = {}
     for number, name in enumerate(ids, 1):
         if first.setdefault(name, number) != number:
-            raise InputError(
-                f"point {number} has the name {name}, as point {first[name]} has", file=path, record=number
-            )
+            raise InputError(phrase("format.repeated", what="point", name=name), file=path, record=number)
 
 
 def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) -> None:
     if version not in known:
         raise InputError(
-            f"is a control network of version {version}; {what} ones are read in version "
-            f"{', '.join(known[:-1])} or {known[-1]}",
+            phrase("isis.version", kind=what, version=version, names=list(known)),
             file=path,
         )
 
@@ -106,13 +100,13 @@ class _Label:
         if value is None:
             return None
         if not isinstance(value, str) or re.fullmatch(r"\d{1,18}", value) is None:
-            raise InputError(f"{key} is no whole number", file=self.path, record=group.line)
+            raise InputError(phrase("format.whole", name=key), file=self.path, record=group.line)
         return int(value)
 
     def place(self, key: str) -> int:
         """Return a place or a number of bytes of the core."""
         if (place := self.whole(self.core, key)) is None:
-            raise InputError(f"its label has no {key}", file=self.path, record=self.core.line)
+            raise InputError(phrase("format.member", name=key), file=self.path, record=self.core.line)
         return place
 
 
@@ -135,7 +129,7 @@ def _label(data: bytes, path: Path) -> _Label:
 
 def _only(group: Group, name: str, path: Path) -> Group:
     if not (found := group.groups(name)):
-        raise InputError(f"its label has no {name}", file=path, record=group.line)
+        raise InputError(phrase("format.member", name=name), file=path, record=group.line)
     return found[0]
 
 
@@ -159,7 +153,7 @@ def _binary(data: bytes, path: Path) -> ControlNetwork:
         (label.whole(label.info, "NumberOfMeasures"), len(network.measures), "measures"),
     ):
         if said is not None and said != found:
-            raise InputError(f"says that it has {said} {what}, and has {found}", file=path)
+            raise InputError(phrase("isis.count", count=said, what=what, n=found), file=path)
     return network
 
 
@@ -178,7 +172,7 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
     for key, value in network.items:
         if (name := _HEADER.get(key.lower())) is not None:
             if not isinstance(value, str):
-                raise InputError(f"{key} is no text", file=path, record=network.line)
+                raise InputError(phrase("format.text", name=key), file=path, record=network.line)
             header[name] = value
         elif key.lower() == "targetradii":
             header["radii"] = _radii(value, network, path)
@@ -198,5 +192,5 @@ def _radii(value: Value, network: Group, path: Path) -> Floats:
         if not np.isfinite(radii).all():
             raise ValueError
     except ValueError:
-        raise InputError("TargetRadii are no metres", file=path, record=network.line) from None
+        raise InputError(phrase("isis.radii"), file=path, record=network.line) from None
     return radii

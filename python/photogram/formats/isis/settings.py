@@ -11,8 +11,9 @@ from typing import Any, Literal, NamedTuple
 
 from photogram.errors import InputError
 from photogram.io.files import read_lines
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
+from photogram.words import Phrase, phrase
 
 Solved = Literal["none", "first", "second", "third", "all"]
 """Which coefficients are unknown: none, that of degree 0, those to degree 1, to degree 2, all."""
@@ -20,8 +21,7 @@ Sigmas = tuple[float | None, float | None, float | None]
 """Standard deviations of three things, None where they are not weighted."""
 Axes = Literal["latitudinal", "rectangular"]
 
-MOST = 8
-"""The highest degree of a polynomial."""
+MOST = 8  # The highest degree of a polynomial
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Settings:
     # Whether measures with long residuals are rejected, and how many of their deviations these are long
     rejects: bool = False
     multiplier: float = 3.0
-    told: tuple[str, ...] = field(default=())  # What was said and has another form here, in sentences
+    remarks: tuple[Phrase, ...] = ()  # Settings that are replaced by something else
 
     @property
     def angle_coefficients(self) -> int:
@@ -79,12 +79,12 @@ def _yes(text: str) -> bool:
         return True
     if text.lower() in ("no", "n", "false", "f", "off", "0"):
         return False
-    raise InputError("is neither yes nor no")
+    raise InputError(phrase("format.unknown", what="value", value=text, names=["yes", "no"]))
 
 
 def _degree(text: str) -> int:
     if not re.fullmatch(r"\d+", text) or int(text) > MOST:
-        raise InputError(f"is no degree from 0 to {MOST}")
+        raise InputError(phrase("isis.degree", most=MOST))
     return int(text)
 
 
@@ -94,7 +94,7 @@ def _positive(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0 < value < math.inf:
-        raise InputError("is no positive number")
+        raise InputError(phrase("format.positive", name="the number", value=text))
     return value
 
 
@@ -105,7 +105,9 @@ def _sigma(text: str) -> float | None:
 def _word(**words: str) -> Callable[[str], str]:
     def found(text: str) -> str:
         if text.lower() not in words:
-            raise InputError(f"is none of {', '.join(word.upper() for word in words)}")
+            raise InputError(
+                phrase("format.unknown", what="value", value=text, names=[word.upper() for word in words])
+            )
         return words[text.lower()]
 
     return found
@@ -152,19 +154,17 @@ PARAMETERS: Mapping[str, _Parameter] = {
 }
 """What each name of jigsaw is here."""
 
-_FILES = "PATH, --cubes and --out say what is read and written"
 OTHERWISE: Mapping[str, str] = {
-    "MAXITS": "the adjustment ends by itself, after 50 iterations at the latest",
-    "SIGMA0": "the adjustment ends where no unknown changes by 1e-5 of its standard deviation",
-    "ERRORPROPAGATION": "the covariance of everything is always computed",
-    "CONTROL_POINT_COORDINATE_TYPE_REPORTS": "points.csv has latitude, longitude, radius and X, Y, Z",
-    "UPDATE": "the labels of cubes are left as they are; adjusted support data are written beside",
-    **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "it is always written"),
-    **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), _FILES),
+    "MAXITS": "iterations",
+    "SIGMA0": "convergence",
+    "ERRORPROPAGATION": "covariance-computed",
+    "CONTROL_POINT_COORDINATE_TYPE_REPORTS": "coordinates-written",
+    "UPDATE": "labels",
+    **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "written"),
+    **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), "paths"),
 }
-"""What has another form here."""
-REFUSED = {"SOLVETARGETBODY": "how the body turns is taken as known"}
-"""What cannot be asked for."""
+"""Remarks on settings that are replaced by something else."""
+REFUSED = ("SOLVETARGETBODY",)
 
 
 def read_settings(text: str) -> Settings:
@@ -174,16 +174,18 @@ def read_settings(text: str) -> Settings:
     a file with such lines, in which # begins a comment. A later value counts in place of an earlier one.
     """
     given: dict[str, Any] = {}
-    told: dict[str, str] = {}
+    remarks: dict[str, Phrase] = {}
     for name, value, where in _said(text):
         try:
             if name in PARAMETERS:
                 _put(given, PARAMETERS[name], value)
             else:
-                told |= _elsewhere(name, value)
+                remarks |= _elsewhere(name, value)
         except InputError as error:
-            raise InputError(f"{name}={value} {error.message}", **where) from None
-    return Settings(**given, told=tuple(f"{name}: {sentence}" for name, sentence in told.items()))
+            raise InputError(
+                phrase("error.at", what=f"{name}={value}", message=error.phrase or error.message), **where
+            ) from None
+    return Settings(**given, remarks=tuple(remarks.values()))
 
 
 def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -195,14 +197,14 @@ def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
         try:
             # `NAME = value` is one setting, as jigsaw has it.
             words = shlex.split(re.sub(r"\s*=\s*", "=", line), comments=path is not None)
-        except ValueError as error:
-            raise InputError(f"settings of jigsaw: {error}", **where) from None
+        except ValueError:
+            raise InputError(phrase("isis.syntax", value=line), **where) from None
         for word in words:
             name, equals, value = word.partition("=")
             if not equals:
                 if word.lower() == "jigsaw":
                     continue
-                raise InputError(f"settings of jigsaw are NAME=value, not {word}", **where)
+                raise InputError(phrase("isis.syntax", value=word), **where)
             yield name.upper(), value, where
 
 
@@ -215,13 +217,13 @@ def _put(given: dict[str, Any], own: _Parameter, value: str) -> None:
     given[own.field] = found
 
 
-def _elsewhere(name: str, value: str) -> dict[str, str]:
-    """Return what is told of a setting that has another form here; nothing of one that asks for nothing."""
+def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
+    """Return a remark on a setting that is replaced; none for a setting that asks for nothing."""
     if name in OTHERWISE:
-        return {name: OTHERWISE[name]}
+        return {name: phrase("error.at", what=name, message=phrase(f"isis.{OTHERWISE[name]}"))}
     if name not in REFUSED:
         known = [*PARAMETERS, *OTHERWISE, *REFUSED]
-        raise InputError(f"is no setting of jigsaw that is known{nearest(name, known)}")
+        raise InputError(phrase("isis.setting", hint=nearest(name, known)))
     if _yes(value):
-        raise InputError(f"is not done: {REFUSED[name]}")
+        raise InputError(phrase("isis.refused"))
     return {}

@@ -16,17 +16,15 @@ from photogram.formats.csm.cubes import is_cube
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS
-from photogram.formats.isis.contents import Image
+from photogram.formats.isis.outcome import Image
 from photogram.io.json import read_json
 from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.trajectories import AdjustedTrajectory
+from photogram.words import phrase
 
-CLOSE = 0.01
-"""Pixels: how far what is seen with the new tables may be from what the trajectory sees."""
-GRID = 32
-"""Samples, and lines, at which both are compared: about a thousand points."""
-HALVINGS = 8
-"""Of the intervals of a table, at most."""
+CLOSE = 0.01  # Pixels: how far what is seen with the new tables may be from what the trajectory sees
+GRID = 32  # Samples, and lines, at which both are compared: about a thousand points
+HALVINGS = 8  # Of the intervals of a table, at most
 
 
 def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
@@ -51,7 +49,7 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
         if not np.nanmax(np.abs(apart), initial=0.0) > CLOSE:
             corrected.put(document, halvings)
             return orjson.dumps(document, option=orjson.OPT_INDENT_2)
-    raise InputError("records of adjusted tables do not agree with their polynomials", file=image.path)
+    raise InputError(phrase("isis.tables", limit=CLOSE, n=HALVINGS), file=image.path)
 
 
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:

@@ -9,7 +9,6 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.errors import InputError
-from photogram.formats.isis.contents import contents_of
 from photogram.formats.isis.jigsaw_files import jigsaw_files
 from photogram.formats.isis.network import (
     HEADER,
@@ -18,12 +17,13 @@ from photogram.formats.isis.network import (
     columns_of_measures,
     columns_of_points,
 )
-from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.reading import LABEL_BYTES, is_binary
 from photogram.formats.isis.support import updated_support
 from photogram.formats.project import Project
 from photogram.io.pvl import Group, Value, label_text
 from photogram.results.result import Result
+from photogram.words import phrase
 
 _VERSION = 5
 _END = "End_Object\nEnd\n"
@@ -68,9 +68,7 @@ def binary_network(network: ControlNetwork) -> bytes:
     buffer = Group("ProtoBuffer", "object", inside=[*inside, *network.others.inside])
     label = label_text(Group("", "label", inside=[buffer])).encode()
     if len(label) > LABEL_BYTES:
-        raise InputError(
-            f"the header has {len(label)} bytes, and a binary network has room for {LABEL_BYTES}"
-        )
+        raise InputError(phrase("isis.label", n=len(label), size=LABEL_BYTES))
     return label.ljust(LABEL_BYTES, b"\0") + header + points
 
 
@@ -84,7 +82,7 @@ def network_text(network: ControlNetwork) -> bytes:
         message names it, and the point.
     """
     if network.header_rest:
-        raise InputError("the header has fields of a binary network that have no key in text")
+        raise InputError(phrase("isis.fields"))
     columns = columns_of_points(network.points), columns_of_measures(network.measures)
     points = _photocore.control_point_text(*columns, network.firsts)
     items = _header(network)

@@ -28,8 +28,7 @@ __all__ = ["Layer", "chosen_crs", "map_layers"]
 
 MOST_ELLIPSES = 20_000
 """Error ellipses of points at most, unless more are asked for: where there are more they cover each other."""
-SUSPICIOUS = 3.0
-"""Test values beyond are on the map."""
+SUSPICIOUS = 3.0  # Test values beyond are on the map
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("e", "n", "u")
 
@@ -169,8 +168,7 @@ def map_layers(
     return layers
 
 
-_Part = tuple[Any, Mapping[str, Any]]
-"""Geometries and columns."""
+_Part = tuple[Any, Mapping[str, Any]]  # Geometries and columns
 
 
 def _photos(found: Placed) -> _Part:
@@ -309,8 +307,7 @@ def _suspicious(found: Placed) -> _Part:
     return shapely.points(np.array([at for at, _ in rows])) if rows else [], columns
 
 
-_Suspect = tuple[Floats, dict[str, Any]]
-"""The place of an observation, and what is said of it."""
+_Suspect = tuple[Floats, dict[str, Any]]  # The place of an observation, and what is said of it
 
 
 def _images(result: Result, tests: Floats, places: Floats) -> Iterator[_Suspect]:

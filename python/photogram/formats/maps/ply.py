@@ -11,6 +11,7 @@ from photogram.network.rays import local_axes
 from photogram.results.ellipses import metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.words import phrase
 
 __all__ = ["point_cloud"]
 
@@ -55,7 +56,7 @@ def point_cloud(
     if found is None:
         rows, places, covariances, what = _own(result)
     elif found.units[0] == "deg":
-        raise InputError(f"point clouds are in metres, and {found.crs} has degrees")
+        raise InputError(phrase("maps.degrees", crs=found.crs))
     else:
         rows, places, covariances, what = found.rows, found.points, found.point_covariances, found.crs
     vertices = np.zeros(len(rows), dtype=_VERTEX)

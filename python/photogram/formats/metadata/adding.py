@@ -10,26 +10,32 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import GnssFile, PhotoFiles, Wishes
-from photogram.formats.metadata.gnss_file import read_gnss_file
-from photogram.formats.metadata.merged import WITHOUT, Metadata, counts, read_metadata, remarks_on, told
+from photogram.formats.metadata.merged import (
+    WITHOUT,
+    Metadata,
+    counts,
+    read_gnss_file,
+    read_metadata,
+    remarks_on,
+    told,
+)
 from photogram.formats.metadata.record import ELLIPSOIDAL
-from photogram.formats.metadata.rtklib import SOURCE as EVENTS
+from photogram.formats.metadata.record import SOURCE as EVENTS
 from photogram.formats.metadata.search import Photos
 from photogram.formats.metadata.systems import GNSS_CRS, LEVER_SD, PHOTOS_CRS, SHIFT_SD, Located, located
 from photogram.formats.models import carried, is_free
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
 SIMILAR = 10.0
 """How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
-DETERMINED = 3.0
-"""How much wider than their misfit positions must spread across their line to turn a model."""
+DETERMINED = 3.0  # How much wider than their misfit positions must spread across their line to turn a model
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
@@ -58,13 +64,10 @@ def with_gnss_file(
     ]
     messages = list(project.messages)
     if replaced := len(project.block.observations) - len(others):
-        text = f"{counted(replaced, 'observed position')} of the project are replaced by those of this file"
-        messages.append(Message(text, file.path))
+        messages.append(Message(phrase("photos.replaced", n=replaced), file.path))
     if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
-        text = "events belong to photos in their order"
-        if file.antenna is None:
-            text += "; they are antenna positions, and --gnss-antenna X,Y,Z gives the lever arm (assumed: 0)"
-        messages.append(Message(text, file.path))
+        code = "photos.events" if file.antenna else "photos.events-without-lever"
+        messages.append(Message.of(code, file.path))
     project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
     return _with_positions(project, metadata, keys, file.crs, sd, GNSS_CRS, file.antenna)
 
@@ -135,14 +138,14 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
             continue
         if len(keys) > 1:
             raise InputError(
-                f"the photo {name} may be {listed(keys, 3)}: photos need the names of their folders",
+                phrase("photos.ambiguous", photo=name, names=keys),
                 file=metadata.directory,
             )
         if name not in observed:
             found[name] = keys[0]
     if len(strange) == len(block.photo_ids):
         raise InputError(
-            f"holds none of the photos {listed(strange, 3)}, but {listed(list(metadata.photos), 3)}",
+            phrase("photos.none", names=strange, known=list(metadata.photos)),
             file=metadata.directory,
         )
     return found
@@ -153,23 +156,16 @@ def _told(
 ) -> list[Message]:
     """Return what is said of positions that are observations: their sources, and what they have in common."""
     records = known.records
-    count = counted(len(records), "position")
     positions = told(counts(each.position for each in records))
-    deviations = counts(each.deviations for each in records)
-    given = deviations.pop(WITHOUT, 0)
-    said = [*([told(deviations)] if deviations else []), *([f"{given} given (--sd gnss)"] if given else [])]
-    text = f"{count} of photos are observations ({positions}); standard deviations: {', '.join(said)}"
-    found = [Message(text, metadata.directory)]
-    if flights := {each for each in known.flights if each}:
-        arm = f"a lever arm ({LEVER_SD:g} m)" if antenna is None else "the lever arm of the antenna"
-        found.append(
-            Message(
-                f"{counted(len(flights), 'flight')} of RTK: a shift ({SHIFT_SD:g} m a priori) and {arm}"
-                " for each, as standard deviations of receivers leave out the base and the"
-                " shutter's time"
-            )
-        )
-    return found
+    sources = counts(each.deviations for each in records)
+    specified = sources.pop(WITHOUT, 0)
+    deviations = [told(sources)] * bool(sources) + [f"{specified} of --sd gnss"] * bool(specified)
+    fields = {"n": len(records), "positions": positions, "deviations": deviations}
+    messages = [Message.of("photos.observed", metadata.directory, **fields)]
+    if flights := {flight for flight in known.flights if flight}:
+        code = "photos.flights" if antenna is None else "photos.flights-antenna"
+        messages.append(Message.of(code, n=len(flights), shift=SHIFT_SD, lever=LEVER_SD))
+    return messages
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
@@ -178,11 +174,11 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
     frame = project.frame
     if project.block.linear_unit != "m":
-        raise InputError("with positions of photos the unit of length is the metre", file=project.path)
+        raise InputError(phrase("photos.metres"), file=project.path)
     if not known.systems[0]:
         if frame.kind == "geographic":
-            raise InputError(f"positions of photos need their system of coordinates: {GNSS_CRS} CRS")
-        xyz, covariances, remarks = known.xyz, covariances_of(known.sd), list[str]()
+            raise InputError(phrase("photos.crs", option=GNSS_CRS))
+        xyz, covariances, remarks = known.xyz, covariances_of(known.sd), list[Phrase]()
         if is_free(project) and not np.isfinite(project.block.point_sd).any():
             project = _placed(project, photos, xyz, frame)
     elif frame.kind == "cartesian" and frame.crs:
@@ -193,8 +189,7 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
     else:
         if not is_free(project) or np.isfinite(project.block.point_sd).any():
             raise InputError(
-                "has control or positions in axes that have no place on the earth: positions of photos cannot"
-                " be carried there; a crs of its control, or [frame] with an origin, gives it one",
+                phrase("photos.place"),
                 file=project.path,
             )
         crs = known.systems[0]
@@ -203,12 +198,8 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
         )
         xyz, covariances, remarks = known.in_frame(frame)
         project = _placed(project, photos, xyz, frame)
-    said = [Message(text) for text in remarks]
-    return (
-        project.replace(messages=(*project.messages, *said)),
-        xyz,
-        (covariances + covariances.transpose(0, 2, 1)) / 2,
-    )
+    project = project.replace(messages=(*project.messages, *map(Message, remarks)))
+    return project, xyz, (covariances + covariances.transpose(0, 2, 1)) / 2
 
 
 def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) -> Project:
@@ -224,18 +215,16 @@ def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) 
             return project
         across = np.linalg.svd(xyz[posed] - xyz[posed].mean(axis=0), compute_uv=False)[1]
         if DETERMINED * misfit * np.sqrt(3 * np.count_nonzero(posed)) < across:
-            text = f"the model is carried onto {np.count_nonzero(posed)} positions of photos by a similarity:"
-            text += f" scale {scale:.6g}, {misfit:.3g} m rms left; frame: {frame}"
-            return carried(project, (scale, turn, shift), frame, Message(text))
-    text = f"positions of photos are adjusted in a frame that is {frame}"
-    if posed.any():
-        text += "; poses of the model do not fit them by a similarity, and are found anew"
+            fields = {"n": int(np.count_nonzero(posed)), "scale": scale, "rms": misfit}
+            message = Message.of("photos.transformed", **fields, frame=frame.phrase)
+            return carried(project, (scale, turn, shift), frame, message)
+    message = Message.of("photos.new-poses" if posed.any() else "photos.frame", frame=frame.phrase)
     lost = np.full_like(block.photo_positions, np.nan)
     return project.replace(
         block=block.replace(photo_positions=lost, photo_attitudes=lost.copy()),
         starts=np.full_like(project.starts, np.nan),
         frame=frame,
-        messages=(*project.messages, Message(text)),
+        messages=(*project.messages, message),
     )
 
 

@@ -5,14 +5,32 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from itertools import pairwise
+from pathlib import Path, PurePosixPath
 
-from photogram.formats.metadata.record import FIXED, Said
-from photogram.formats.metadata.search import found_in
+import numpy as np
+
+from photogram.arguments.arrays import natural_order
+from photogram.errors import InputError
+from photogram.formats.cards import filled_lines
+from photogram.formats.control_lists import SYSTEMS
+from photogram.formats.metadata.pictures import ENDINGS, time_of_picture
+from photogram.formats.metadata.record import (
+    FIXED,
+    Event,
+    Said,
+    is_events,
+    number_of,
+    read_events,
+    read_exposures,
+)
+from photogram.formats.metadata.reference import is_reference, read_geo_txt, read_reference
+from photogram.formats.metadata.search import EXPOSURES, files_of, found_in
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message, counted
 from photogram.show.sections import Section
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 __all__ = [
     "WITHOUT",
@@ -175,7 +193,7 @@ def metadata_of(
     remarks = list(messages)
     if without_height:
         remarks.append(
-            Message(f"positions without a height are not taken: {listed(without_height, 3)}", path)
+            Message(phrase("photos.heightless", n=len(without_height), names=without_height), path)
         )
     return Metadata(path, photos, tuple(tables), tuple(pictures), tuple(remarks))
 
@@ -193,9 +211,108 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
         if fix != FIXED:
             fixes.setdefault(fix, []).append(each.photo)
     found = [
-        Message(
-            f"the solution of the receiver was {fix} for {counted(len(photos), 'photo')}: {listed(photos, 3)}"
-        )
-        for fix, photos in fixes.items()
+        Message(phrase("photos.fix", fix=fix, n=len(photos), names=photos)) for fix, photos in fixes.items()
     ]
-    return found + [Message(f"{text} ({counted(count, 'photo')})") for text, count in remarks.items()]
+    return found + [Message(phrase("photos.remark", remark=text, n=count)) for text, count in remarks.items()]
+
+
+MAX_INTERVAL_DIFFERENCE = 2.0
+"""Seconds between two pictures by their EXIF, which has whole seconds, and by the events."""
+
+
+def read_gnss_file(
+    path: Path, photos: Sequence[str], directory: Path | None = None, *, mrk_antenna: bool = False
+) -> Metadata:
+    """Read the positions of a file by the names of photos.
+
+    `directory`: folder of all photographs; None: those of the project are all. Events belong to photos in
+    their order; `mrk_antenna`: whether positions of .MRK files are antenna positions.
+    """
+    messages: list[Message] = []
+    first = next((place.text or "" for place in filled_lines(path)), "").strip()
+    if path.suffix.lower() == EXPOSURES:
+        said = _of_exposures(path, photos, messages, antenna=mrk_antenna)
+    elif is_events(path):
+        said = _of_events(path, photos, directory)
+    elif first.upper().startswith(SYSTEMS):
+        said = read_geo_txt(path)
+    elif is_reference(path):
+        said = read_reference(path, messages)
+    else:
+        raise InputError(
+            phrase("photos.positions"),
+            file=path,
+        )
+    flights = dict.fromkeys(said, path.stem)
+    return metadata_of(path, {name: [one] for name, one in said.items()}, flights, [path], [], messages)
+
+
+def _of_exposures(
+    path: Path, photos: Sequence[str], messages: list[Message], *, antenna: bool
+) -> Mapping[str, Said]:
+    """Return exposures of an .MRK file by the photos whose names contain their numbers."""
+    exposures = read_exposures(path)
+    if not exposures:
+        raise InputError(phrase("format.missing", what="exposures"), file=path)
+    names: dict[int, str] = {}
+    for photo in photos:
+        number = number_of(PurePosixPath(photo).stem)
+        if number is None or number not in exposures:
+            continue
+        if number in names:
+            raise InputError(
+                phrase("photos.exposure", number=number, names=[names[number], photo]),
+                file=path,
+            )
+        names[number] = photo
+    if not names:
+        raise InputError(
+            phrase("photos.numbers", numbers=list(exposures), names=list(photos)),
+            file=path,
+        )
+    if left := len(exposures) - len(names):
+        messages.append(Message(phrase("photos.unused", n=left, total=len(exposures)), path))
+    return {photo: exposures[number].said(antenna) for number, photo in names.items()}
+
+
+def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Mapping[str, Said]:
+    """Return events by photos: both in order of time, or photos in order of their names."""
+    events = read_events(path)
+    names, times = _in_order(photos, directory)
+    if len(names) != len(events):
+        counts = {"events": len(events), "photos": len(names)}
+        source = phrase("photos.project") if directory is None else directory.name
+        raise InputError(phrase("photos.events-count", **counts, source=source), file=path)
+    if times:
+        _check_intervals(path, events, names, times)
+    return {name: event.said for name, event in zip(names, events, strict=True)}
+
+
+def _in_order(photos: Sequence[str], directory: Path | None) -> tuple[list[str], list[float]]:
+    """Return photos in the order of their exposures, and their times in seconds; none without EXIF."""
+    if directory is None:
+        return sorted(photos, key=natural_order), []
+    pictures = {
+        path.relative_to(directory).as_posix(): path
+        for path in files_of(directory)
+        if path.suffix.lower() in ENDINGS
+    }
+    names = sorted(pictures, key=natural_order)
+    times = [time_of_picture(pictures[name]) for name in names]
+    known = [time for time in times if time is not None]
+    if len(known) < len(times):
+        return names, []
+    order = np.argsort(known, kind="stable").tolist()
+    return [names[row] for row in order], [known[row] for row in order]
+
+
+def _check_intervals(
+    path: Path, events: Sequence[Event], names: Sequence[str], times: Sequence[float]
+) -> None:
+    """Reject events whose intervals are not the intervals between the pictures."""
+    for (first, second), (before, after), name in zip(
+        pairwise(events), pairwise(times), names[1:], strict=True
+    ):
+        elapsed, taken = second.seconds - first.seconds, after - before
+        if abs(elapsed - taken) > MAX_INTERVAL_DIFFERENCE:
+            raise second.said.place.error(phrase("photos.interval", elapsed=elapsed, photo=name, taken=taken))

@@ -28,11 +28,10 @@ from photogram.formats.metadata.record import (
 )
 from photogram.io.files import reading
 from photogram.io.places import Place
-from photogram.messages import quoted
+from photogram.words import phrase
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
-GPS = 0x8825
-"""The tag of EXIF that leads to those of GPS."""
+GPS = 0x8825  # The tag of EXIF that leads to those of GPS
 _EXIF, _TAKEN, _FRACTION = 0x8769, 0x9003, 0x9291
 """Tags of EXIF: to its own tags, and of these DateTimeOriginal and SubSecTimeOriginal."""
 
@@ -44,10 +43,8 @@ RADIAL = (
 )
 DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
 DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
-LARGEST = 1 << 20
-"""Bytes of a packet at most; those of cameras have a few thousand."""
-_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}
-"""What older cameras write."""
+LARGEST = 1 << 20  # Bytes of a packet at most; those of cameras have a few thousand
+_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # What older cameras write
 
 
 def said_by_picture(path: Path) -> list[Said]:
@@ -76,9 +73,7 @@ def _head(path: Path, group: int) -> tuple[bytes | None, Mapping[int, Any]]:
         from PIL.JpegImagePlugin import JpegImageFile
         from PIL.TiffImagePlugin import TiffImageFile
     except ImportError:
-        raise InputError(
-            "heads of pictures need pillow: pip install 'photogram[photos]'", file=path
-        ) from None
+        raise InputError(phrase("photos.pillow"), file=path) from None
     kind = JpegImageFile if path.suffix.lower() in (".jpg", ".jpeg") else TiffImageFile
     with reading(path):
         file = path.open("rb")
@@ -89,7 +84,7 @@ def _head(path: Path, group: int) -> tuple[bytes | None, Mapping[int, Any]]:
                 packet = picture.info.get("xmp")
                 tags = dict(picture.getexif().get_ifd(group))
         except Exception as error:  # whatever a damaged file makes the library raise
-            raise InputError(f"cannot be read as a picture: {error}", file=path) from None
+            raise InputError(phrase("photos.picture", reason=str(error)), file=path) from None
     return (packet if isinstance(packet, bytes) else None), tags
 
 
@@ -122,9 +117,9 @@ def _as_tag(value: Any, place: Place, tag: int) -> float:
     try:
         found = float(value)
     except (TypeError, ValueError, OverflowError, ZeroDivisionError):
-        raise place.error(f"GPS tag {tag} of its EXIF is no number: {quoted(str(value))}") from None
+        raise place.error(phrase("photos.tag", tag=tag, value=str(value))) from None
     if math.isinf(found):
-        raise place.error(f"GPS tag {tag} of its EXIF is no finite number")
+        raise place.error(phrase("photos.tag", tag=tag, value=str(value)))
     return found
 
 
@@ -134,7 +129,7 @@ def _reference(tags: Mapping[int, Any], place: Place) -> int:
     if isinstance(value, bytes) and len(value) == 1:
         value = value[0]
     if value not in (0, 1, 2, 3):
-        raise place.error(f"its EXIF has the altitude reference {quoted(str(value))}: 0 to 3 are known")
+        raise place.error(phrase("photos.altitude-reference", value=str(value)))
     return int(value)
 
 
@@ -156,11 +151,11 @@ def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> flo
     if value is None:
         return math.nan
     if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) != 3:
-        raise place.error(f"GPS tag {tag} of its EXIF is not degrees, minutes and seconds")
+        raise place.error(phrase("photos.angle", tag=tag))
     degrees, minutes, seconds = (_as_tag(each, place, tag) for each in value)
     letter = str(tags.get(tag - 1, "")).strip("\0 ").upper()
     if letter not in tuple(letters):
-        raise place.error(f"GPS tag {tag - 1} of its EXIF is {quoted(letter)}: {' or '.join(letters)} is")
+        raise place.error(phrase("photos.letter", tag=tag - 1, value=letter, names=list(letters)))
     size = degrees + minutes / 60 + seconds / 3600
     return -size if letter == letters[1] else size
 
@@ -176,13 +171,13 @@ def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
     """Return the simple properties of a packet by namespace (without a slash at its end) and name."""
     place = Place(path)
     if len(data) > LARGEST:
-        raise place.error(f"a packet of XMP of {len(data)} bytes: {LARGEST} are the most")
+        raise place.error(phrase("photos.packet", n=len(data), most=LARGEST))
     try:
         root = ElementTree.fromstring(
             data.strip(b"\0 \t\r\n"), ElementTree.XMLParser(target=_WithoutDoctype())
         )
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise place.error(f"its XMP cannot be read: {error}") from None
+        raise place.error(phrase("photos.xmp", reason=str(error))) from None
     found: dict[tuple[str, str], str] = {}
     for element in root.iter():
         for name, value in (*element.attrib.items(), (element.tag, element.text or "")):
@@ -190,7 +185,7 @@ def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
             key = space.rstrip("/"), _SPELLINGS.get(own, own)
             text = value.strip()
             if key[0] in (DJI, PIX4D) and text and found.setdefault(key, text) != text:
-                raise place.error(f"its XMP has {own} twice: {quoted(found[key])} and {quoted(text)}")
+                raise place.error(phrase("photos.repeated", name=own, first=found[key], second=text))
     return found
 
 

@@ -33,14 +33,12 @@ from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.messages import Message
+from photogram.words import phrase
 
 SOURCE = "reference"
-GEO_TXT = "geo.txt"
-"""Of OpenDroneMap: positions in the system of the first line."""
-WORDS = (3, 4, 7, 9)
-"""How many a line of it may have; what follows the ninth is of no use here."""
-HEAD = 40
-"""Lines in which a header, a row or the name of a system is looked for."""
+GEO_TXT = "geo.txt"  # Of OpenDroneMap: positions in the system of the first line
+WORDS = (3, 4, 7, 9)  # How many a line of it may have; what follows the ninth is of no use here
+HEAD = 40  # Lines in which a header, a row or the name of a system is looked for
 _KNOWN = (*TABLES["gnss"].columns, "enabled")
 _NUMBERS = TABLES["gnss"].numbers
 _REQUIRED = ("photo", *AXES)
@@ -168,14 +166,14 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
     each. Without the two columns nothing is said of standard deviations: those of another source stay.
     """
     if not (places := list(filled_lines(path))):
-        raise Place(path).error("names no system of coordinates in its first line")
+        raise Place(path).error(phrase("format.crs"))
     head, *rest = places
     crs = system_of((head.text or "").strip(), head)
     found: dict[str, Said] = {}
     for place in rest:
         name, *words = (place.text or "").split()
         if name in found:
-            raise place.error(f"the photo {name} is there already, in record {found[name].place.record}")
+            raise place.error(phrase("format.repeated", what="photo", name=name))
         found[name] = _said_of_line(words, crs, place)
     return found
 
@@ -183,7 +181,9 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
 def _said_of_line(words: list[str], crs: str, place: Place) -> Said:
     count = len(words) + 1
     if count not in WORDS and count < WORDS[-1]:
-        raise place.error(f"has {count} words: name x y [z [yaw pitch roll [sd_h sd_v]]]")
+        raise place.error(
+            phrase("format.words", n=count, required="name x y [z [yaw pitch roll [sd_h sd_v]]]")
+        )
     values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
     x, y, z, yaw, pitch, roll, horizontal, vertical = values
     position: Triple | None = (x, y, z)

@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from photogram.errors import InputError
-from photogram.formats.metadata.mrk import Exposure, number_of, prefix_of, read_exposures
 from photogram.formats.metadata.pictures import ENDINGS, said_by_picture
-from photogram.formats.metadata.record import Said
+from photogram.formats.metadata.record import Exposure, Said, number_of, prefix_of, read_exposures
 from photogram.formats.metadata.reference import GEO_TXT, is_reference, read_geo_txt, read_reference
 from photogram.formats.plain.schema import TABLES
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, counted, listed, quoted
+from photogram.messages import Message
+from photogram.words import phrase
 
 _TEXTS = (".csv", ".txt")
 EXPOSURES = ".mrk"
@@ -42,7 +42,7 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
     """
     with reading(directory):
         if not directory.is_dir():
-            raise InputError("is no folder of photographs", file=directory)
+            raise InputError(phrase("photos.folder"), file=directory)
         files = list(files_of(directory))
     found = Found()
     pictures = {_key(directory, path): path for path in files if path.suffix.lower() in ENDINGS}
@@ -51,9 +51,8 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
     exposures = {path: read_exposures(path) for path in files if path.suffix.lower() == EXPOSURES}
     found.tables += exposures
     if not (pictures or given or exposures):
-        endings = ", ".join((*ENDINGS, "*_Timestamp.MRK"))
         raise InputError(
-            f"holds nothing that says where photos were taken: {endings}, {GEO_TXT}", file=directory
+            phrase("photos.sources", names=[*ENDINGS, "*_Timestamp.MRK", GEO_TXT]), file=directory
         )
     for key in dict.fromkeys([*pictures, *given]):
         found.said[key] = [given[key]] if key in given else []
@@ -121,13 +120,12 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
         for name, said in rows.items():
             keys = photos.meant(name, folder)
             if len(keys) > 1:
-                raise said.place.error(f"the photo {quoted(name)} may be {listed(keys, 3)}: write its folder")
+                raise said.place.error(phrase("photos.ambiguous", photo=name, names=keys))
             key = keys[0] if keys else (PurePosixPath(folder) / name).as_posix()
             if given.setdefault(key, said) is not said:
                 again[path] = again.get(path, 0) + 1
     for path, count in again.items():
-        text = f"positions of {counted(count, 'photo')} are those of another table, not of this one"
-        found.messages.append(Message(text, path))
+        found.messages.append(Message(phrase("photos.other-table", n=count), path))
     return given
 
 
@@ -153,8 +151,7 @@ def _add_exposures(
             used[own].add(number)
     for path, numbers in used.items():
         if left := len(exposures[path]) - len(numbers):
-            text = f"{left} of {counted(len(exposures[path]), 'exposure')} have no photo here"
-            found.messages.append(Message(text, path))
+            found.messages.append(Message(phrase("photos.unused", n=left, total=len(exposures[path])), path))
 
 
 def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
@@ -172,9 +169,8 @@ def _of_flight(
     named = [each for each in paths if PurePosixPath(key).name.startswith(f"{prefix_of(each)}_")]
     likely = named or [each for each in paths if number in exposures[each]]
     if len(likely) > 1:
-        names = listed([each.name for each in likely], 3)
         raise InputError(
-            f"the photo {key} may be of {names}: put the photos of each flight into a folder of their own",
+            phrase("photos.flight", photo=key, names=[path.name for path in likely]),
             file=paths[0].parent,
         )
     return likely[0] if likely else None

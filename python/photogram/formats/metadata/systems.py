@@ -18,18 +18,14 @@ from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import listed
 from photogram.network.geometry import Spheroid
+from photogram.words import Phrase, phrase
 
-SHIFT_SD = 0.05
-"""Metres: a priori standard deviation of the shift that positions of a flight have in common."""
-LEVER_SD = 0.01
-"""Metres: that of a lever arm which is already applied."""
+SHIFT_SD = 0.05  # Metres: a priori standard deviation of the shift that positions of a flight have in common
+LEVER_SD = 0.01  # Metres: that of a lever arm which is already applied
 ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
-PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"
-"""Options that name the system of positions."""
-_SEA_LEVEL = "EPSG:4326+geoid=46.5 (heights above sea level, and the geoid above the ellipsoid)"
-_UNKNOWN = "above the geoid (as mostly) or above the ellipsoid"
+PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"  # Options that name the system of positions
+_UNKNOWN = "above the geoid or above the ellipsoid"
 GROUPS = "gnss_groups.csv"
 _COMMENT = (
     "longitude and latitude (degrees), height above the ellipsoid (metres) of WGS 84, standard deviations of"
@@ -56,12 +52,12 @@ class Located:
         """The flight of each position that has a shift and a lever arm in common with others; else empty."""
         return [each.flight if each.rtk else "" for each in self.records]
 
-    def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[str]]:
+    def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
         """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it."""
         from photogram.formats.crs import to_frame
 
         turned = covariances_of(self.sd)
-        xyz, remarks = np.empty_like(self.xyz), list[str]()
+        xyz, remarks = np.empty_like(self.xyz), list[Phrase]()
         for crs in dict.fromkeys(self.systems):
             own = np.array([each == crs for each in self.systems])
             xyz[own], turned[own], said = to_frame(crs, self.xyz[own], turned[own], frame)
@@ -118,17 +114,11 @@ def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
 
     if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
         first = next(each for each in said if each.crs and each.heights)
-        raise first.place.error(
-            f"its position is longitude and latitude of WGS 84, which {crs} is not: {_ways(option)}"
-        )
+        raise first.place.error(phrase("photos.wgs84", crs=crs, option=option))
     for each in said:
         if not each.crs and crs is None:
-            raise each.place.error(f"its file names no system of coordinates: {option} CRS (EPSG:25832 ...)")
+            raise each.place.error(phrase("photos.crs", option=option))
     return [each.crs if each.crs and not each.heights else crs or "" for each in said]
-
-
-def _ways(option: str) -> str:
-    return f"{option} {_SEA_LEVEL} or {option} {ELLIPSOIDAL} (heights above the ellipsoid) says it"
 
 
 def _check_heights(
@@ -139,18 +129,12 @@ def _check_heights(
         kinds.setdefault(_kind(own, system), []).append(f"{record.photo} ({own.source})")
     if len(kinds) > 1:
         (one, first), (other, second), *_ = kinds.items()
-        raise InputError(
-            f"heights of two kinds: those of {listed(first, 3)} are {one}, those of {listed(second, 3)} are"
-            f" {other}; give one kind (a table geo.txt, or a folder for each)"
-        )
+        raise InputError(phrase("photos.heights", one=one, first=first, other=other, second=second))
     for own, system in zip(said, systems, strict=True):
         if own.heights == SEA_LEVEL and not _is_above_geoid(system):
-            but = f"heights of {system} are above the ellipsoid" if system else "nothing says where that is"
-            raise own.place.error(
-                f"its height is above sea level by its file, but {but}: {option} {_SEA_LEVEL}"
-            )
+            raise own.place.error(phrase("photos.sea-level", option=option))
     if "" in systems:
-        raise said[0].place.error(f"its height is {_UNKNOWN}, and nothing says which: {_ways(option)}")
+        raise said[0].place.error(phrase("photos.height-kind", option=option))
 
 
 def _kind(said: Said, system: str) -> str:
@@ -172,7 +156,7 @@ def gnss_files(
     """Return a table `gnss` of a plain project, and `gnss_groups` beside it where positions need it."""
     known = located(list(metadata.photos.values()), crs, sd)
     if not known.records:
-        raise InputError("holds no positions of photos", file=metadata.directory)
+        raise InputError(phrase("format.missing", what="positions of photos"), file=metadata.directory)
     files = {path: csv_text(_positions(known), [_COMMENT])}
     flights = list(dict.fromkeys(each for each in known.flights if each))
     if flights:

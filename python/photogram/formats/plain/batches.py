@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import ASSUMED_SD, Project
+from photogram.io.parquet import coded
 from photogram.messages import missing_columns, unknown_name
 from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
@@ -203,8 +205,8 @@ class Streamed:
             try:
                 for batch in file.iter_batches(BATCH):
                     table = pyarrow.Table.from_batches([batch])
-                    photos, of_photos = _names(table.column(self._columns["photo"]))
-                    points, of_points = _names(table.column(self._columns["point"]))
+                    photos, of_photos = _stripped(table.column(self._columns["photo"]))
+                    points, of_points = _stripped(table.column(self._columns["point"]))
                     known = np.array([rows.get(each, -1) for each in photos], dtype=np.int64)
                     for each, row in zip(photos, known.tolist(), strict=True):
                         if row < 0 and each not in unused:
@@ -342,15 +344,7 @@ def read_head(path: Path) -> list[str]:
     return list(read_columns(path).columns)
 
 
-def _names(column: object) -> tuple[list[str], Indices]:
-    """Return the different names of a column, without blanks at both ends, and which each row has."""
-    import pyarrow
-    import pyarrow.compute
-
-    whole = column.combine_chunks()  # type: ignore[attr-defined]
-    # A batch may come with all names that the file has.
-    if not pyarrow.types.is_dictionary(whole.type) or len(whole.dictionary) > len(whole):
-        whole = pyarrow.compute.dictionary_encode(whole.cast(pyarrow.string()))
-    return [str(each).strip() for each in whole.dictionary.to_pylist()], whole.indices.to_numpy(
-        zero_copy_only=False
-    ).astype(np.int64)
+def _stripped(column: Any) -> tuple[list[str], Indices]:
+    """Return the names of a column without blanks at both ends, and the name of each row."""
+    names, rows = coded(column)
+    return [str(name).strip() for name in names], rows

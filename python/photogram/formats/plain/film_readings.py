@@ -203,7 +203,7 @@ class MarkReadings:
         xy = table.given(names)
         own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
         sd = self.tables.deviations(table, "fiducial_images", own)
-        table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")
+        table.check_given(sd, own, "fiducial_images")
         known = {name: row for row, name in enumerate([*photos.names, *photos.unused])}
         listed_photos = list(known)
         of = indices_of(table, "photo", known, "photo").tolist()

@@ -70,10 +70,6 @@ class WrittenFilms:
         """Whether readings are columns and rows."""
         return any(each.readings.pitch != 1.0 for each in self.films.values())
 
-    def settings(self) -> list[str]:
-        """Return the lines of the section of films; none where it says what goes without saying."""
-        return ["", "[film]", 'interior = "before"'] if self.before else []
-
     def tables(self) -> dict[str, dict[str, Any]]:
         """Return the four tables; none without films."""
         if not self.films:

@@ -1,10 +1,10 @@
-"""The tables of groups: what positions and velocities, or attitudes and rates, have in common."""
+"""The tables of groups: unknowns that positions and velocities, or attitudes and rates, have in common."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,133 +23,140 @@ from photogram.network.trajectories import Clock, GyroBias
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
 from photogram.words import phrase
 
-_Group = TypeVar("_Group", "Antenna", "Inertial")
+SHARED: Mapping[type, tuple[str, ...]] = {
+    Position: ("lever_arm", "shift", "drift"),
+    Velocity: ("lever_arm",),
+    Attitude: ("boresight",),
+    Rate: ("boresight", "bias"),
+}
+"""Fields that a group gives to its observations, besides their clock."""
+_ANTENNA = {kind: tuple(f"{kind}_{axis}" for axis in AXES) for kind in ("lever", "shift", "drift")}
 
 
 @dataclass(frozen=True)
-class Antenna:
-    """What the positions and velocities of a group have in common; known lever arms are three numbers."""
+class Group:
+    """The unknowns of a group; a fixed lever arm is three numbers, a fixed boresight a matrix."""
 
-    lever: LeverArm | tuple[float, ...] = (0.0, 0.0, 0.0)
+    lever_arm: LeverArm | tuple[float, ...] = (0.0, 0.0, 0.0)
     shift: Shift | None = None
     drift: Drift | None = None
-    clock: Clock | None = None
-
-
-@dataclass(frozen=True)
-class Inertial:
-    """What the attitudes and rates of a group have in common."""
-
     boresight: Boresight | ArrayLike | None = None
-    clock: Clock | None = None
     bias: GyroBias | None = None
+    clock: Clock | None = None
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What equal groups have in common."""
+        known = self.boresight is None or isinstance(self.boresight, Boresight)
+        boresight = self.boresight if known else np.asarray(self.boresight).tobytes()
+        return self.lever_arm, self.shift, self.drift, boresight, self.bias, self.clock
 
 
-def grouped(
-    tables: Tables, table: ColumnTable, groups: Mapping[str, _Group], what: str
-) -> list[_Group | None]:
-    """Return the group of each row; None of rows of no group."""
+def group_of(observation: Any) -> Group:
+    """Return the group of an observation."""
+    members = {name: getattr(observation, name) for name in SHARED[type(observation)]}
+    if not isinstance(lever := members.get("lever_arm"), LeverArm | None):
+        members["lever_arm"] = tuple(np.broadcast_to(np.asarray(lever, dtype=float), 3).tolist())
+    return Group(**members, clock=None if observation.moment is None else observation.clock)
+
+
+def grouped(tables: Tables, table: ColumnTable, groups: Mapping[str, Group], name: str) -> list[Group]:
+    """Return the group of each row. Groups of antennas without a table are names only."""
     names = table.texts("group")
-    if what in tables.settings.tables or what == "attitude_groups":
-        for row, name in enumerate(names):
-            if name and name not in groups:
-                raise table.unknown_error(row, "group", "group", name, groups)
-    return [groups.get(name) for name in names]
+    if name in tables.settings.tables or name == "attitude_groups":
+        for row, text in enumerate(names):
+            if text and text not in groups:
+                raise table.unknown_error(row, "group", "group", text, groups)
+    alone = Group()
+    return [groups.get(text, alone) for text in names]
 
 
-def antennas(tables: Tables) -> dict[str, Antenna]:
-    """Read the table `gnss_groups`, by the names of groups."""
-    table = tables.rows("gnss_groups")
-    values = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
-    values |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
+def read_groups(tables: Tables, name: str) -> dict[str, Group]:
+    """Read the table `gnss_groups` or `attitude_groups`, by the names of groups."""
+    table = tables.rows(name)
+    antenna = name == "gnss_groups"
+    names = table.texts("group")
+    titles = [text or ("GNSS" if antenna else "IMU") for text in names]
+    clocks = scalars(tables, table, Clock, titles)
+    members = (_antennas if antenna else _inertials)(tables, table, titles)
+    groups: dict[str, Group] = {}
+    for row, (text, own) in enumerate(zip(names, members, strict=True)):
+        if text in groups:
+            raise table.error(row, phrase("error.repeated", kind="group", name=text))
+        groups[text] = Group(**own, clock=clocks[row])
+    return groups
+
+
+def _antennas(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield lever arm, shift and drift of each row."""
+    values = {kind: tables.vectors(table, names, 0.0) for kind, names in _ANTENNA.items()}
     sd = {
-        kind: table.vectors([f"sd_{kind}_{axis}" for axis in AXES], default, infinite=True)
-        for kind, default in (("lever", 0.0), ("shift", math.inf), ("drift", math.inf))
+        kind: table.vectors(deviation_columns(names), 0.0 if kind == "lever" else math.inf, infinite=True)
+        for kind, names in _ANTENNA.items()
     }
-    epochs = [None if math.isnan(each) else float(each) for each in table.numbers("drift_epoch")]
-    names = table.texts("group")
-    titles = [name or "GNSS" for name in names]
-    own = scalars(tables, table, Clock, titles)
-    words = [table.texts(column) for column in ("lever", "shift", "drift")]
-    found: dict[str, Antenna] = {}
-    for row, (name, title, lever, shift, drift) in enumerate(zip(names, titles, *words, strict=True)):
-        if name in found:
-            raise table.error(row, phrase("error.repeated", kind="group", name=name))
+    words = {kind: table.texts(kind) for kind in _ANTENNA}
+    epochs = table.numbers("drift_epoch").tolist()
+    for row, title in enumerate(titles):
 
-        def one(kind: type[Any], what: str, name: str, row: int = row, **more: Any) -> Any:
+        def one(kind: type[Unknown], what: str, name: str, row: int = row, **more: Any) -> Any:
+            if not name:
+                return None
             return tables.shared.one(table, row, what, kind, name, values[what][row], sd[what][row], **more)
 
-        arm = one(LeverArm, "lever", lever or title) if sd["lever"][row].any() else None
-        moved, drifts = called(shift, title), called(drift, title)
-        found[name] = Antenna(
-            tuple(values["lever"][row].tolist()) if arm is None else arm,
-            one(Shift, "shift", moved) if moved else None,
-            one(Drift, "drift", drifts, epoch=epochs[row]) if drifts else None,
-            own[row],
-        )
-    return found
+        arm: Any = tuple(values["lever"][row].tolist())
+        if sd["lever"][row].any():
+            arm = one(LeverArm, "lever", words["lever"][row] or title)
+        shift, drift = (called(words[kind][row], title) for kind in ("shift", "drift"))
+        epoch = None if math.isnan(epochs[row]) else epochs[row]
+        yield {
+            "lever_arm": arm,
+            "shift": one(Shift, "shift", shift),
+            "drift": one(Drift, "drift", drift, epoch=epoch),
+        }
 
 
-def inertials(tables: Tables) -> dict[str, Inertial]:
-    """Read the table `attitude_groups`, by the names of groups."""
-    table = tables.rows("attitude_groups")
+def _inertials(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield boresight and bias of each row."""
     # Both the photo and what carries it have axes as the settings say.
     matrices = tables.turns(table)
     sd = table.vectors(SD_ROTATIONS, math.inf, infinite=True, read=tables.angle)
     biases = tables.vectors(table, BIAS, 0.0)
     bias_sd = table.vectors(deviation_columns(BIAS), math.inf, infinite=True)
-    names = table.texts("group")
-    titles = [name or "IMU" for name in names]
-    own = scalars(tables, table, Clock, titles)
     words = table.texts("boresight", "true"), table.texts("bias", "false")
-    found: dict[str, Inertial] = {}
-    for row, (name, title, turned, bias) in enumerate(zip(names, titles, *words, strict=True)):
-        if name in found:
-            raise table.error(row, phrase("error.repeated", kind="group", name=name))
+    one = tables.shared.one
+    for row, title in enumerate(titles):
         matrix = None if np.isnan(matrices[row]).any() else matrices[row].T
-        one = tables.shared.one
-        boresight, gyro = called(turned, title), called(bias, title)
-        found[name] = Inertial(
-            one(table, row, "boresight", Boresight, boresight, matrix, sd[row]) if boresight else None,
-            own[row],
-            one(table, row, "bias", GyroBias, gyro, biases[row], bias_sd[row]) if gyro else None,
-        )
-    return found
+        boresight, bias = (called(column[row], title) for column in words)
+        yield {
+            "boresight": one(table, row, "boresight", Boresight, boresight, matrix, sd[row])
+            if boresight
+            else None,
+            "bias": one(table, row, "bias", GyroBias, bias, biases[row], bias_sd[row]) if bias else None,
+        }
 
 
-def antenna_of(each: Position | Velocity) -> Antenna:
-    """Return what an observation has in common with others."""
-    lever = each.lever_arm
-    if not isinstance(lever, LeverArm):
-        lever = tuple(np.broadcast_to(np.asarray(lever, dtype=float), 3).tolist())
-    clock = None if each.moment is None else each.clock
-    if isinstance(each, Velocity):
-        return Antenna(lever, clock=clock)
-    return Antenna(lever, each.shift, each.drift, clock)
-
-
-def antenna_columns(groups: Mapping[Antenna, str]) -> dict[str, Any]:
-    """Return the table of groups of positions and velocities, which have these names."""
-    levers = [each.lever if isinstance(each.lever, LeverArm) else None for each in groups]
+def antenna_columns(groups: Mapping[str, Group]) -> dict[str, Any]:
+    """Return the table of groups of positions and velocities, by their names."""
+    own = list(groups.values())
+    arms = [each.lever_arm for each in own]
+    levers = [each if isinstance(each, LeverArm) else None for each in arms]
     found: dict[str, Any] = {
-        "group": list(groups.values()),
+        "group": list(groups),
         "lever": ["" if each is None else each.name for each in levers],
-        "shift": [word_of(each.shift) for each in groups],
-        "drift": [word_of(each.drift) for each in groups],
+        "shift": [word_of(each.shift) for each in own],
+        "drift": [word_of(each.drift) for each in own],
     }
-    given = [each.lever.position if isinstance(each.lever, LeverArm) else each.lever for each in groups]
-    found |= columns_of([f"lever_{axis}" for axis in AXES], np.array(given))
-    found |= columns_of([f"sd_lever_{axis}" for axis in AXES], _of(levers, "deviations", 0.0))
+    values = [each.position if isinstance(each, LeverArm) else each for each in arms]
+    found |= columns_of(_ANTENNA["lever"], np.array(values))
+    found |= columns_of(deviation_columns(_ANTENNA["lever"]), _of(levers, "deviations", 0.0))
     for what in ("shift", "drift"):
-        unknowns = [getattr(each, what) for each in groups]
-        found |= columns_of([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan))
-        found |= zip(
-            [f"sd_{what}_{axis}" for axis in AXES], _of(unknowns, "deviations", np.nan).T, strict=True
-        )
-    epochs = [None if each.drift is None else each.drift.epoch for each in groups]
+        unknowns = [getattr(each, what) for each in own]
+        found |= columns_of(_ANTENNA[what], _of(unknowns, "position", np.nan))
+        found |= columns_of(deviation_columns(_ANTENNA[what]), _of(unknowns, "deviations", np.nan))
+    epochs = [None if each.drift is None else each.drift.epoch for each in own]
     if any(each is not None for each in epochs):
         found["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
-    return found | scalar_columns(Clock, [each.clock for each in groups])
+    return found | scalar_columns(Clock, [each.clock for each in own])
 
 
 def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats:
@@ -157,37 +164,37 @@ def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats
     return np.array([(missing,) * 3 if each is None else getattr(each, what) for each in unknowns])
 
 
-def inertial_groups(observations: Sequence[Attitude | Rate]) -> tuple[list[str], dict[str, Inertial]]:
-    """Return the name of the group of each observation, empty where it has none, and all groups by name."""
+def named_groups(observations: Sequence[Any], *, numbered: bool) -> tuple[list[str], dict[str, Group]]:
+    """Return the name of the group of each observation, empty if it has none, and all groups by name.
+
+    Groups of antennas are `numbered`; others have the names of their boresights.
+    """
     names: dict[tuple[object, ...], str] = {}
-    groups: dict[str, Inertial] = {}
-    found = []
-    for each in observations:
-        clock = None if each.moment is None else each.clock
-        own = Inertial(each.boresight, clock, each.bias if isinstance(each, Rate) else None)
-        known = own.boresight is None or isinstance(own.boresight, Boresight)
-        key = (own.boresight if known else np.asarray(own.boresight).tobytes(), own.clock, own.bias)
-        if key not in names:
-            names[key] = name = _group_name(own, groups)
+    groups: dict[str, Group] = {}
+    for observation in observations:
+        group = group_of(observation)
+        if group.key not in names:
+            names[group.key] = name = str(len(groups) + 1) if numbered else _inertial_name(group, groups)
             if name:
-                groups[name] = own
-        found.append(names[key])
-    return found, groups
+                groups[name] = group
+    if numbered and list(names) == [Group().key]:
+        return [], {}
+    return [names[group_of(observation).key] for observation in observations], groups
 
 
-def _group_name(own: Inertial, groups: Mapping[str, Inertial]) -> str:
-    """Return what a group is called: as its boresight, where no other group is."""
-    if own.boresight is None and own.clock is None and own.bias is None:
+def _inertial_name(group: Group, groups: Mapping[str, Group]) -> str:
+    """Return the name of a group: of its boresight, if no other group has it."""
+    if group.key == Group().key:
         return ""
     number = len(groups) + 1
-    if isinstance(own.boresight, Boresight):
-        name = own.boresight.name
+    if isinstance(group.boresight, Boresight):
+        name = group.boresight.name
     else:
-        name = f"IMU {number}" if own.boresight is None else f"known {number}"
+        name = f"IMU {number}" if group.boresight is None else f"known {number}"
     return f"{name} {number}" if name in groups else name
 
 
-def inertial_columns(groups: Mapping[str, Inertial], block: Block) -> dict[str, Any]:
+def inertial_columns(groups: Mapping[str, Group], block: Block) -> dict[str, Any]:
     """Return the table of groups of attitudes and rates, by their names."""
     own = list(groups.values())
     boresights = [each.boresight for each in own]

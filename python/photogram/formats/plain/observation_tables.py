@@ -170,7 +170,7 @@ def _given(
             table.check_given(values, columns)
         given[name] = list(values) if len(columns) > 1 else values[:, 0].tolist()
     sd = np.where(missing, 1.0, tables.deviations(table, kind.table, kind.sd_columns))
-    table.check_given(sd, kind.sd_columns, f"is empty: give it, or {kind.table} under [sd]")
+    table.check_given(sd, kind.sd_columns, kind.table)
     if kind.sd:
         given["covariance"] = list(covariances_of(sd, table, kind.sd))
     else:

@@ -13,15 +13,13 @@ from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import covariance_tables
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.groups import (
-    Antenna,
-    Inertial,
+    SHARED,
+    Group,
     antenna_columns,
-    antenna_of,
-    antennas,
     grouped,
     inertial_columns,
-    inertial_groups,
-    inertials,
+    named_groups,
+    read_groups,
 )
 from photogram.formats.plain.observation_tables import kind_tables, read_kinds
 from photogram.formats.plain.rigs import Rigs, read_bases
@@ -50,14 +48,33 @@ from photogram.formats.plain.trajectories import read_smoothness
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.column_table import ColumnTable
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
 from photogram.words import phrase
 
+_Observation = TypeVar("_Observation", bound=Observation)
 _Columns = dict[str, dict[str, Any]]
-_Kind = TypeVar("_Kind", bound=Observation)
-_Group = TypeVar("_Group", Antenna, Inertial)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A kind of observation of photos and trajectories."""
+
+    made: type[Position | Velocity | Attitude | Rate]
+    table: str
+    field: str  # What was observed
+    columns: tuple[str, ...]  # Its components
+    groups: str  # The table of its groups
+
+
+_KINDS = (
+    _Kind(Position, "gnss", "position", AXES, "gnss_groups"),
+    _Kind(Velocity, "velocities", "velocity", VELOCITY, "gnss_groups"),
+    _Kind(Attitude, "attitudes", "attitude", ROTATIONS, "attitude_groups"),
+    _Kind(Rate, "rates", "rate", RATE, "attitude_groups"),
+)
 
 
 def read_observations(
@@ -67,12 +84,10 @@ def read_observations(
     points: Mapping[str, int],
     rigs: Mapping[str, Rig],
 ) -> list[Observation]:
-    """Read all tables of observations beside images."""
+    """Read all tables of observations besides images."""
+    groups = {name: read_groups(tables, name) for name in ("gnss_groups", "attitude_groups")}
     return [
-        *_gnss(tables, transform, subjects),
-        *_velocities(tables, subjects),
-        *_attitudes(tables, subjects),
-        *_rates(tables, subjects),
+        *(each for kind in _KINDS for each in _read(tables, transform, subjects, kind, groups[kind.groups])),
         *read_smoothness(tables, subjects.trajectories),
         *read_kinds(tables, transform, points, subjects),
         *_relative_poses(tables, subjects.photos),
@@ -80,91 +95,48 @@ def read_observations(
     ]
 
 
-def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Observation]:
-    table = tables.read("gnss")
+def _read(
+    tables: Tables, transform: Transform, subjects: Subjects, kind: _Kind, groups: Mapping[str, Group]
+) -> Iterator[Observation]:
+    table = tables.read(kind.table)
     if table is None:
-        return []
-    of = subjects.of(tables, table)
-    measured = transform.positions("gnss", *_measured(tables, table, "gnss", AXES), table)
-    groups, times = grouped(tables, table, antennas(tables), "gnss_groups"), table.numbers("time")
-    found: list[Observation] = []
-    for row, group, given in _used(table, of, groups, Antenna(), "position", *measured):
-        if given["photo"] is not None:
-            time = times[row]
+        return
+    of, times = subjects.of(tables, table), table.numbers("time")
+    values, covariances = _measured(tables, transform, table, kind)
+    for row, (own, group) in enumerate(zip(of, grouped(tables, table, groups, kind.groups), strict=True)):
+        if own is None:
+            continue
+        given = clocked(table, row, own, group.clock)
+        given |= {kind.field: values[row], "covariance": covariances[row]}
+        given |= {name: getattr(group, name) for name in SHARED[kind.made]}
+        if kind.made is Position and given["photo"] is not None:
+            time = float(times[row])
             if math.isnan(time):
                 time = subjects.times[subjects.photos[given["photo"]]]
             if group.drift is not None and math.isnan(time):
                 raise table.error(row, phrase("plain.drift-without-time"))
-            given["time"] = 0.0 if math.isnan(time) else float(time)
-        given |= {"lever_arm": group.lever, "shift": group.shift, "drift": group.drift}
-        found.append(made(table, row, Position, **given))
-    return found
+            given["time"] = 0.0 if math.isnan(time) else time
+        yield made(table, row, kind.made, **given)
 
 
-def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.rows("velocities")
-    of = subjects.of(tables, table)
-    measured = _measured(tables, table, "velocities", VELOCITY)
-    groups = grouped(tables, table, antennas(tables), "gnss_groups")
-    return [
-        made(table, row, Velocity, **given, lever_arm=group.lever)
-        for row, group, given in _used(table, of, groups, Antenna(), "velocity", *measured)
-    ]
-
-
-def _used(
-    table: ColumnTable,
-    of: Sequence[dict[str, Any] | None],
-    groups: Sequence[_Group | None],
-    alone: _Group,
-    what: str,
-    values: Floats,
-    covariances: Floats,
-) -> Iterator[tuple[int, _Group, dict[str, Any]]]:
-    """Yield the rows that are used, with their groups, and by name what they are of and what was observed."""
-    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
-        if own is not None:
-            group = group or alone
-            given = clocked(table, row, own, group.clock)
-            yield row, group, given | {what: values[row], "covariance": covariances[row]}
-
-
-def _measured(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
-    """Return (rows, 3) what was observed, and (rows, 3, 3) covariances."""
-    values, names = table.given(columns), deviation_columns(columns)
-    sd = tables.deviations(table, name, names)
-    table.check_given(sd, names, f"is empty: give it, or {name} under [sd]")
-    return values, covariances_of(sd, table, columns)
-
-
-def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.rows("rates")
-    of = subjects.of(tables, table)
-    values, covariances = _measured(tables, table, "rates", RATE)
-    # About axes that point as those of photos do.
-    measured = values @ tables.flip, tables.flip @ covariances @ tables.flip
-    groups = grouped(tables, table, inertials(tables), "attitude_groups")
-    return [
-        made(table, row, Rate, **given, boresight=group.boresight, bias=group.bias)
-        for row, group, given in _used(table, of, groups, Inertial(), "rate", *measured)
-    ]
-
-
-def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.rows("attitudes")
-    of = subjects.of(tables, table)
-    given_sd = tables.settings.sd.get("attitudes")
-    sd = table.vectors(SD_ROTATIONS, read=tables.angle)
-    if given_sd is not None:
-        sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in given_sd], sd)
-    table.check_given(sd, SD_ROTATIONS, "is empty: give it, or attitudes under [sd]")
-    matrices = tables.known_matrices(table, "there is no attitude")
-    covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
-    groups = grouped(tables, table, inertials(tables), "attitude_groups")
-    return [
-        made(table, row, Attitude, **given, boresight=group.boresight)
-        for row, group, given in _used(table, of, groups, Inertial(), "attitude", matrices, covariances)
-    ]
+def _measured(tables: Tables, transform: Transform, table: ColumnTable, kind: _Kind) -> tuple[Floats, Floats]:
+    """Return (rows, 3) or (rows, 3, 3) what was observed, and (rows, 3, 3) covariances."""
+    names, flip = deviation_columns(kind.columns), tables.flip
+    if kind.made is Attitude:
+        sd = table.vectors(names, read=tables.angle)
+        if (common := tables.settings.sd.get(kind.table)) is not None:
+            sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in common], sd)
+        table.check_given(sd, names, kind.table)
+        covariances = covariances_of(sd, table, kind.columns, (tables.radians,) * 3)
+        return tables.known_matrices(table), flip @ covariances @ flip
+    values = table.given(kind.columns)
+    sd = tables.deviations(table, kind.table, names)
+    table.check_given(sd, names, kind.table)
+    covariances = covariances_of(sd, table, kind.columns)
+    if kind.made is Position:
+        return transform.positions(kind.table, values, covariances, table)
+    # Rates are about axes that point as those of photos do.
+    return (values @ flip, flip @ covariances @ flip) if kind.made is Rate else (values, covariances)
 
 
 def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
@@ -186,8 +158,7 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
 def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs, films: WrittenFilms) -> _Columns:
     """Return the tables of all observations beside images, of what they have in common, and of rigs."""
     return {
-        **_antenna_tables(block),
-        **_inertial_tables(block),
+        **_group_tables(block),
         **kind_tables(block),
         **_pose_tables(block),
         **rigs.tables(block),
@@ -196,7 +167,7 @@ def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs, films: 
     }
 
 
-def _all(block: Block, kind: type[_Kind]) -> list[_Kind]:
+def _all(block: Block, kind: type[_Observation]) -> list[_Observation]:
     return [each for each in block.observations if isinstance(each, kind)]
 
 
@@ -218,47 +189,34 @@ def _written(
     }
 
 
-def _antenna_tables(block: Block) -> _Columns:
-    """Return the tables of positions and velocities, and of their groups."""
-    positions, velocities = _all(block, Position), _all(block, Velocity)
-    if not positions and not velocities:
-        return {}
-    keys = [*map(antenna_of, positions), *map(antenna_of, velocities)]
-    groups = {key: str(row) for row, key in enumerate(dict.fromkeys(keys), 1)}
+def _group_tables(block: Block) -> _Columns:
+    """Return the tables of positions, velocities, attitudes and rates, and of their groups."""
     found: _Columns = {}
-    if positions:
-        places = places_written(block, np.array([each.observed[:3] for each in positions]))
-        found["gnss"] = subject_columns(positions, block) | _written(positions, AXES, places)
-    if velocities:
-        values = np.array([each.observed[:3] for each in velocities])
-        found["velocities"] = subject_columns(velocities, block) | _written(velocities, VELOCITY, values)
-    if list(groups) == [Antenna()]:
-        return found
-    names = [groups[key] for key in keys]
-    for table, own in (("gnss", names[: len(positions)]), ("velocities", names[len(positions) :])):
-        if own:
-            found[table]["group"] = own
-    return found | {"gnss_groups": antenna_columns(groups)}
+    for name in ("gnss_groups", "attitude_groups"):
+        kinds = [kind for kind in _KINDS if kind.groups == name]
+        observed = [_all(block, kind.made) for kind in kinds]
+        names, groups = named_groups(
+            [each for own in observed for each in own], numbered=name == "gnss_groups"
+        )
+        start = 0
+        for kind, own in zip(kinds, observed, strict=True):
+            if own:
+                found[kind.table] = subject_columns(own, block) | _observed_columns(kind, own, block)
+                if groups:
+                    found[kind.table]["group"] = names[start : start + len(own)]
+            start += len(own)
+        if groups:
+            columns = antenna_columns(groups) if name == "gnss_groups" else inertial_columns(groups, block)
+            found[name] = columns
+    return found
 
 
-def _inertial_tables(block: Block) -> _Columns:
-    """Return the tables of attitudes and rates, and of their groups."""
-    attitudes, rates = _all(block, Attitude), _all(block, Rate)
-    names, groups = inertial_groups([*attitudes, *rates])
-    found: _Columns = {}
-    if attitudes:
-        angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
-        turned = _written(attitudes, OPK, angles, ROTATIONS, (DEGREE,) * 3)
-        found["attitudes"] = subject_columns(attitudes, block) | turned
-    if rates:
-        values = np.array([each.observed[:3] for each in rates])
-        found["rates"] = subject_columns(rates, block) | _written(rates, RATE, values)
-    if not groups:
-        return found
-    for table, own in (("attitudes", names[: len(attitudes)]), ("rates", names[len(attitudes) :])):
-        if own:
-            found[table]["group"] = own
-    return found | {"attitude_groups": inertial_columns(groups, block)}
+def _observed_columns(kind: _Kind, own: Sequence[Any], block: Block) -> dict[str, Any]:
+    if kind.made is Attitude:
+        angles = angles_of(np.array([np.asarray(each.attitude) for each in own]), block)
+        return _written(own, OPK, angles, ROTATIONS, (DEGREE,) * 3)
+    values = np.array([each.observed[:3] for each in own])
+    return _written(own, kind.columns, places_written(block, values) if kind.made is Position else values)
 
 
 def _pose_tables(block: Block) -> _Columns:

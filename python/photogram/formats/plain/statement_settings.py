@@ -92,14 +92,9 @@ def _value(table: Table, key: str, unit: str) -> Any:
             return table.text(key)
 
 
-def asked_lines(asked: Mapping[str, Any], unit: str) -> list[str]:
-    """Return the lines of the sections, which :func:`read_asked` reads again; none where nothing is asked."""
-    found = []
-    for section, keys in KEYS.items():
-        lines = [f"{key} = {_written(own)}" for key in keys if (own := _said(asked, key, unit)) is not None]
-        if lines:
-            found += [f"[{section}]", *lines, ""]
-    return found
+def asked_tables(asked: Mapping[str, Any], unit: str) -> dict[str, Mapping[str, Any]]:
+    """Return the sections by name, which :func:`read_asked` reads again."""
+    return {section: {key: _said(asked, key, unit) for key in keys} for section, keys in KEYS.items()}
 
 
 def _said(asked: Mapping[str, Any], key: str, unit: str) -> Any:
@@ -113,20 +108,6 @@ def _said(asked: Mapping[str, Any], key: str, unit: str) -> Any:
     if key == "area":
         return f"{float(value)!r}{unit}2"
     return SENTENCES if key == "text" else value
-
-
-def _written(value: Any) -> str:
-    """Return a value as TOML has it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return quoted_text(value)
-    if isinstance(value, Mapping):
-        pairs = (f"{quoted_text(name)} = {_written(own)}" for name, own in value.items())
-        return f"{{ {', '.join(pairs)} }}" if value else "{}"
-    if isinstance(value, int | float):
-        return repr(float(value))
-    return f"[{', '.join(map(_written, value))}]"
 
 
 def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:

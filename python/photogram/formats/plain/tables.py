@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.column_words import is_angular
 from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, nameless, settled
+from photogram.formats.images import Y_DOWN, is_rotation
 from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
@@ -24,7 +25,6 @@ from photogram.formats.plain.schema import (
     covariance_columns,
 )
 from photogram.formats.plain.settings import Settings
-from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.places import Place
@@ -137,7 +137,7 @@ class Tables:
             found[known] = matrices_of(self.settings, values[known])
         return found
 
-    def known_matrices(self, table: ColumnTable, why: str = "there are no angles") -> Floats:
+    def known_matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
         found = self.matrices(table)
         unknown = np.isnan(found).any(axis=(1, 2))

@@ -20,13 +20,13 @@ from photogram.formats.plain.observed_poses import observed_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
-from photogram.formats.plain.statement_settings import asked_files, asked_lines
+from photogram.formats.plain.statement_settings import asked_files, asked_tables
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
 from photogram.formats.plain.tables import columns_of, correlations, places_written
 from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
-from photogram.io.toml import quoted_text
+from photogram.io.toml import quoted_text, toml_text
 from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
@@ -34,7 +34,6 @@ from photogram.network.cameras import Camera
 from photogram.network.film_reduction import camera_unit
 from photogram.network.moving_photos import LineSensor
 from photogram.network.observations import Control, Position
-from photogram.results.features import Definition
 from photogram.words import phrase
 
 
@@ -160,57 +159,33 @@ def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[s
 
 
 def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
-    block, frame, options = project.block, project.frame, project.options
-    lines = [
-        "[project]",
-        f"format = {VERSION}",
-        f"name = {_quoted(block.title)}",
-        "",
-        "[frame]",
-        f'kind = "{frame.kind}"',
-    ]
-    if frame.crs:
-        lines.append(f"crs = {_quoted(frame.crs)}")
-    if frame.origin is not None:
-        lines.append(f"origin = [{', '.join(map(repr, frame.origin))}]")
-    if block.spheroid is not None:
-        lines.append(f"ellipsoid = [{block.spheroid.a!r}, {block.spheroid.b!r}]")
+    block, frame, options, spheroid = project.block, project.frame, project.options, project.block.spheroid
     unit = block.linear_unit if block.linear_unit in LENGTHS else "m"
-    lines += ["", "[units]", f'length = "{unit}"', 'angle = "deg"', f'image = "{camera_unit(block)}"']
-    lines += ["", "[axes]", f'image_y = "{image_y}"']
-    if block.photo_to_ground:
-        lines.append('rotation = "photo_to_object"')
-    lines += [*_time(project), *films.settings(), "", "[adjust]"]
-    if options.datum is not None:
-        lines.append(f'datum = "{options.datum}"')
-    lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"']
-    lines += ["" if options.max_iterations is None else f"iterations = {options.max_iterations}\n"]
-    if project.features:
-        lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
-    lines += asked_lines(project.statement, unit)
-    return "\n".join(lines)
-
-
-def _time(project: Project) -> list[str]:
-    """Return what seconds count from, where the tables that were read have said so."""
     settings = project.details.get("settings")
-    if not isinstance(settings, Settings) or not settings.times:
-        return []
-    origin = settings.time_origin
-    told = _quoted(origin) if isinstance(origin, str) else repr(origin)
-    return ["", "[time]", f"origin = {told}", f'scale = "{settings.time_scale}"']
-
-
-def _feature(name: str, definition: Definition) -> str:
-    kind, points = definition
-    texts = [quoted_text(each) for each in (name, *points)]
-    return f"{texts[0]} = {{ {kind} = [{', '.join(texts[1:])}] }}"
-
-
-def _quoted(text: str) -> str:
-    """Return a text between quotation marks; what does not print is a space."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(each if each.isprintable() else " " for each in escaped) + '"'
+    time = {}
+    if isinstance(settings, Settings) and settings.times:
+        time = {"origin": settings.time_origin, "scale": settings.time_scale}
+    tables: dict[str, Mapping[str, Any]] = {
+        "project": {"format": VERSION, "name": block.title},
+        "frame": {
+            "kind": frame.kind,
+            "crs": frame.crs or None,
+            "origin": frame.origin,
+            "ellipsoid": None if spheroid is None else (spheroid.a, spheroid.b),
+        },
+        "units": {"length": unit, "angle": "deg", "image": camera_unit(block)},
+        "axes": {"image_y": image_y, "rotation": "photo_to_object" if block.photo_to_ground else None},
+        "time": time,
+        "film": {"interior": "before"} if films.before else {},
+        "adjust": {
+            "datum": options.datum,
+            "loss": options.loss or "none",
+            "unit_variance": options.unit_variance,
+            "iterations": options.max_iterations,
+        },
+        "features": {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()},
+    }
+    return toml_text(tables | asked_tables(project.statement, unit))
 
 
 def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
 from photogram.formats.project import Project, Unused
 from photogram.formats.targets import TITLE
-from photogram.messages import counted, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -30,12 +29,10 @@ from photogram.targets.output.rig import Rig
 from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
-from photogram.words import Phrase, option_sd
+from photogram.words import Phrase, option_sd, phrase
 
-MIDDLE = 0.5
-"""Of the first pixel, from the upper-left corner: projects count from there."""
-NEAR = 1e-6
-"""Of the spacing: what control may be off the points of a board."""
+MIDDLE = 0.5  # Of the first pixel, from the upper-left corner: projects count from there
+NEAR = 1e-6  # Of the spacing: what control may be off the points of a board
 
 
 def read_project(path: Path, wishes: Wishes) -> Project:
@@ -97,11 +94,11 @@ def calibration_of(project: Project) -> Calibration:
     """Return the calibration that a project with a board is, of cameras in pixels."""
     block = project.block
     if not project.boards:
-        raise InputError("has no board: a table of boards says what its control is", file=project.path)
+        raise InputError(phrase("board-project.none"), file=project.path)
     if block.image_unit != "px" or block.photo_cameras is None:
-        raise InputError("a calibration has images in pixels", file=project.path)
+        raise InputError(phrase("format.pixels"), file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
-        raise InputError("corners of a calibration are as good in x as in y", file=project.path)
+        raise InputError(phrase("board-project.sd"), file=project.path)
     # Those of knots are their cameras'.
     others = [
         each.name
@@ -110,8 +107,7 @@ def calibration_of(project: Project) -> Calibration:
     ]
     if others:
         raise InputError(
-            "a calibration has images and a board, and nothing of what else was observed"
-            f" ({listed(others)}): `photogram adjust` takes all",
+            phrase("board-project.observations", names=others),
             file=project.path,
         )
     (board,) = project.boards.values()
@@ -163,7 +159,7 @@ def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
             offsets[camera], sd[camera] = each.offset.value, each.offset.deviations[0]
     motion = [motions.get(row) for row in seen.tolist()]
     if np.isnan(times).any() or any(each is None for each in motion):
-        raise InputError("a calibration moves as its views tell, or not at all", file=project.path)
+        raise InputError(phrase("board-project.motion"), file=project.path)
     return {"times": times, "offsets": offsets, "sd_offsets": sd, "motion": np.array(motion)}
 
 
@@ -213,7 +209,7 @@ def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[I
     places = {name: row for row, name in enumerate(pictures)}
     points = dict(zip(project.block.point_ids, number.tolist(), strict=True))
     if strange := [name for name in left.points if name not in points]:
-        raise InputError(f"the points {listed(strange)} are none of the board", file=project.path)
+        raise InputError(phrase("board-project.points", names=strange), file=project.path)
     kept = [row for row, name in enumerate(left.photos) if name in places]
     picture = np.array([places[left.photos[row]] for row in kept], dtype=np.int64)
     return picture, np.array([points[left.points[row]] for row in kept], dtype=np.int64), kept
@@ -251,7 +247,7 @@ def _numbers_of(project: Project, board: Board) -> Indices:
     known = {name: k for k, name in enumerate(names)}
     strange = [name for name in project.block.point_ids if name not in known]
     if strange:
-        raise InputError(f"the points {listed(strange)} are none of the board", file=project.path)
+        raise InputError(phrase("board-project.points", names=strange), file=project.path)
     return np.array([known[name] for name in project.block.point_ids], dtype=np.int64)
 
 
@@ -262,7 +258,7 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
     far = np.abs(board.places[number] - block.point_positions)
     if not far.max(initial=0.0) < NEAR * min(board.pitch):
         row = int(np.argmax(far.max(axis=1)))
-        raise InputError(f"the point {block.point_ids[row]} lies elsewhere than that of the board")
+        raise InputError(phrase("board-project.position", point=block.point_ids[row]))
     if board.shape != "points":
         return board
     sd = np.zeros((len(board.places), 3))
@@ -287,7 +283,7 @@ def rig_of_project(project: Project) -> Rig:
     """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0."""
     block = project.block
     if not block.cameras:
-        raise InputError("has principal distances, and no cameras", file=project.path)
+        raise InputError(phrase("board-project.cameras"), file=project.path)
     return Rig(
         cameras=tuple(
             shifted(each, -MIDDLE).replace(name=name)
@@ -315,20 +311,12 @@ def _sensors(project: Project) -> Floats:
     return found
 
 
-def lost_beside_cameras(project: Project) -> list[str]:
-    """Return what of a project is not in files of its cameras, in sentences."""
-    block = project.block
-    apart = [
-        each.title
-        for each, known in zip(block.cameras, np.isfinite(_sensors(project)), strict=True)
-        if not known.all()
-    ]
-    found = [
-        counted(len(block.photo_ids), "photo"),
-        counted(len(block.point_ids), "point"),
-        counted(len(block.image_xy), "image"),
-        "standard deviations and errors, which `photogram calibrate --to` writes of a board",
-    ]
-    if apart:
-        found.append(f"where these cameras are to the first, if anything says it: {listed(apart)}")
-    return found
+def lost_beside_cameras(project: Project) -> list[Phrase]:
+    """Return parts of a project that files of its cameras cannot contain."""
+    block, known = project.block, [np.isfinite(sensor).all() for sensor in _sensors(project)]
+    counts = (len(block.photo_ids), len(block.point_ids), len(block.image_xy))
+    kinds = ("lost.all-photos", "lost.all-points", "lost.all-images")
+    found = [phrase(kind, n=count) for kind, count in zip(kinds, counts, strict=True)]
+    found.append(phrase("lost.calibration"))
+    cameras = [camera.title for camera, fixed in zip(block.cameras, known, strict=True) if not fixed]
+    return found + ([phrase("lost.sensors", names=cameras)] if cameras else [])

@@ -42,23 +42,26 @@ MAX_RADII = 11
 BLANK = " "  # Head of a column without a name
 
 
-def annexes(found: Statement) -> list[Section]:
+def annexes(statement: Statement) -> list[Section]:
     """Return the annexes; those without content are omitted by the page."""
-    texts, result = found.texts, found.result
-    checks = [check_points(found), *([] if found.of_all is None else [_radii(texts, found.of_all)])]
+    texts, result = statement.texts, statement.result
+    checks = [
+        check_points(statement),
+        *([] if statement.of_all is None else [_radii(texts, statement.of_all)]),
+    ]
     held = fixed_values(texts, result) or texts("annex.c.nothing")
-    budgets = [part for each in found.taken_apart for part in _budget(texts, each)]
-    left_out = left_out_points(texts, found.left_out)
-    metrology = _metrology(found)
+    budgets = [part for each in statement.taken_apart for part in _budget(texts, each)]
+    left_out = left_out_points(texts, statement.left_out)
+    metrology = _metrology(statement)
     return [
         annex(texts, "a", checks),
         annex(texts, "b", [left_out], texts("annex.b.note")),
         annex(texts, "c", budgets, texts("annex.c.note", held=held)),
-        annex(texts, "d", [part for each in result.cameras for part in _camera(found, each)]),
-        annex(texts, "e", _adjustment(found), texts.text(result.verdict.message)),
-        annex(texts, "f", _survey(found)),
+        annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
+        annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
+        annex(texts, "f", _survey(statement)),
         *([annex(texts, "h", metrology)] if metrology else []),
-        annex(texts, "g", _files(found)),
+        annex(texts, "g", _files(statement)),
     ]
 
 
@@ -118,9 +121,9 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
     return [Table("budget", title, quantities) for title, quantities in zip(titles, tables, strict=True)]
 
 
-def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
+def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
     """Return parameters and correlations of a camera, and its distortion with standard deviations."""
-    texts, columns, sd = found.texts, Columns(found.texts), camera.sd
+    texts, columns, sd = statement.texts, Columns(statement.texts), camera.sd
     of, estimated = units(camera.camera), camera.estimated
     axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
     names = [camera.names[k] for k in estimated]
@@ -144,9 +147,9 @@ def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
         ]
         title = texts("table.correlations", camera=camera.name)
         tables.append(Table("correlations", title, [columns.text("parameter", names), *numbers]))
-    curve = distortion_curve(found.result, camera)
+    curve = distortion_curve(statement.result, camera)
     if curve is not None:
-        unit, inside = found.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
+        unit, inside = statement.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
         rows = inside[np.unique(np.linspace(0, len(inside) - 1, MAX_RADII).round().astype(int))]
         decimals = decimals_for(curve.sd[rows])
         distortion = [
@@ -158,10 +161,10 @@ def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
     return tables
 
 
-def _adjustment(found: Statement) -> list[Part]:
+def _adjustment(statement: Statement) -> list[Part]:
     """Return sums by kind, tests, removed observations, residuals of control and check points."""
-    texts, columns = found.texts, Columns(found.texts)
-    kinds = kinds_of(found.result)
+    texts, columns = statement.texts, Columns(statement.texts)
+    kinds = kinds_of(statement.result)
     counts, redundancy, squares = zip(*kinds.values(), strict=True)
     sums = [
         columns.text("kind", [texts.kind(name) for name in kinds]),
@@ -170,19 +173,21 @@ def _adjustment(found: Statement) -> list[Part]:
         columns.number("squares", squares, 1),
     ]
     caption = texts("page.overlap.caption")
-    drawing = Drawing("map-overlap", texts("page.overlap"), caption, partial(overlap, found.result, texts))
+    drawing = Drawing(
+        "map-overlap", texts("page.overlap"), caption, partial(overlap, statement.result, texts)
+    )
     return [
         Table("kinds", texts("table.kinds"), sums),
-        verdict_table(found.result.verdict, texts),
-        removed_observations(found),
-        _markers(found),
+        verdict_table(statement.result.verdict, texts),
+        removed_observations(statement),
+        _markers(statement),
         drawing,
     ]
 
 
-def _markers(found: Statement) -> Table:
+def _markers(statement: Statement) -> Table:
     """Return rms and largest residual of the images of every control and check point."""
-    texts, columns, result = found.texts, Columns(found.texts), found.result
+    texts, columns, result = statement.texts, Columns(statement.texts), statement.result
     block, kinds, n = result.block, result.point_kinds, len(result.point_kinds)
     squares = np.where(result.used_images[:, np.newaxis], result.residuals, 0.0) ** 2
     total = np.bincount(result.image_points, weights=squares.sum(axis=1), minlength=n)
@@ -201,8 +206,8 @@ def _markers(found: Statement) -> Table:
     return Table("markers", texts("table.markers"), quantities)
 
 
-def _survey(found: Statement) -> list[Table]:
-    texts, columns, own = found.texts, Columns(found.texts), found.survey
+def _survey(statement: Statement) -> list[Table]:
+    texts, columns, own = statement.texts, Columns(statement.texts), statement.survey
     if own.system is None:
         return []
     decimals = max(3, decimals_for(own.sd))
@@ -222,11 +227,11 @@ def _survey(found: Statement) -> list[Table]:
     return [Table("survey", texts("annex.f"), quantities, note)]
 
 
-def _files(found: Statement) -> list[Part]:
-    texts, columns, files = found.texts, Columns(found.texts), found.inputs
+def _files(statement: Statement) -> list[Part]:
+    texts, columns, files = statement.texts, Columns(statement.texts), statement.inputs
     facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
-    if found.command:
-        facts.append(Fact(texts("page.command"), found.command))
+    if statement.command:
+        facts.append(Fact(texts("page.command"), statement.command))
     quantities = [
         columns.text(texts("page.file"), [each.path.name for each in files]),
         columns.number("size", [each.size for each in files], unit=texts("unit.bytes"), decimals=0),
@@ -235,9 +240,13 @@ def _files(found: Statement) -> list[Part]:
     return [Facts(texts("page.program"), facts), Table("files", texts("table.files"), quantities)]
 
 
-def _metrology(found: Statement) -> list[Part]:
-    texts, columns, parts = found.texts, Columns(found.texts), list[Part]()
-    features, lengths, measures = found.result.features, found.standards.lengths, found.standards.iso_19157
+def _metrology(statement: Statement) -> list[Part]:
+    texts, columns, parts = statement.texts, Columns(statement.texts), list[Part]()
+    features, lengths, measures = (
+        statement.result.features,
+        statement.standards.lengths,
+        statement.standards.iso_19157,
+    )
     if features is not None and len(features):
         parts.append(_features(texts, features))
     if lengths is not None:

@@ -23,9 +23,9 @@ _CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with 
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def statement_document(found: Statement) -> Document:
+def statement_document(statement: Statement) -> Document:
     """Return the page of a statement, for the browser and for paper."""
-    texts, asked, judged = found.texts, found.asked, found.judged
+    texts, asked, judged = statement.texts, statement.asked, statement.judged
     names = ("project", "client", "firm", "surveyor")
     head = [Fact(texts(f"page.{name}"), own) for name in names if (own := getattr(asked, name))]
     if asked.date:
@@ -36,14 +36,16 @@ def statement_document(found: Statement) -> Document:
     remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
     return Document(
         what=texts("page.what"),
-        title=asked.title or found.result.block.title,
-        judgements=[Judgement(mark, found.headline, [text for _, text in judged.sentences], tone)],
+        title=asked.title or statement.result.block.title,
+        judgements=[Judgement(mark, statement.headline, [text for _, text in judged.sentences], tone)],
         sections=[
-            Section("figures", texts("page.figures"), [*localized(texts, _figures(found)), *_notes(found)]),
-            Section("assumptions", texts("page.assumptions"), [assumed, _map(found)]),
+            Section(
+                "figures", texts("page.figures"), [*localized(texts, _figures(statement)), *_notes(statement)]
+            ),
+            Section("assumptions", texts("page.assumptions"), [assumed, _map(statement)]),
             Section("remarks", texts("page.remarks"), remarks),
             Section("signature", "", [Text(texts("page.signature"))]),
-            *annexes(found),
+            *annexes(statement),
         ],
         head=head,
         language=texts.language,
@@ -54,9 +56,9 @@ def statement_document(found: Statement) -> Document:
     )
 
 
-def _figures(found: Statement) -> list[Part]:
+def _figures(statement: Statement) -> list[Part]:
     """Return the table of the first sheet: with classes, and with RMSE without some points."""
-    own, texts, rest = found.of_all, found.texts, found.of_rest
+    own, texts, rest = statement.of_all, statement.texts, statement.of_rest
     if own is None:
         return []
     columns = Columns(texts)
@@ -82,13 +84,13 @@ def _figures(found: Statement) -> list[Part]:
         columns.text("point", [sized.point for _, sized, _ in shown]),
     ]
     if rest is not None:
-        head = texts("column.without", points=texts.listed(list(found.asked.without), 3))
+        head = texts("column.without", points=texts.listed(list(statement.asked.without), 3))
         left = [rest.parts[part] for part, *_ in shown]
         quantities.append(number(head, [math.nan if sized is None else sized.rmse for sized in left]))
-    if found.asked.classes:
+    if statement.asked.classes:
         names = [_CLASSES.get(part, "") for part, *_ in shown]
-        verdicts = {} if found.standards.asprs is None else found.standards.asprs.verdicts
-        classes = [found.asked.classes.get(name) for name in names]
+        verdicts = {} if statement.standards.asprs is None else statement.standards.asprs.verdicts
+        classes = [statement.asked.classes.get(name) for name in names]
         quantities.append(number("class", classes))
         outcomes = [texts(f"asprs.verdict.{verdicts[name]}") if name in verdicts else "" for name in names]
         quantities.append(columns.text("verdict", outcomes))
@@ -96,7 +98,7 @@ def _figures(found: Statement) -> list[Part]:
 
 
 def _survey(own: Figures, part: str) -> tuple[float, float]:
-    """Return RMSE of the survey, and combined with what was found, of parts that standards have."""
+    """Return RMSE of the survey, and combined with what was statement, of parts that standards have."""
     if part == "plan":
         return own.rmse_h2, own.rmse_h
     if part == "h":
@@ -106,9 +108,9 @@ def _survey(own: Figures, part: str) -> tuple[float, float]:
     return math.nan, math.nan
 
 
-def _notes(found: Statement) -> list[Text]:
+def _notes(statement: Statement) -> list[Text]:
     """Return what the sum of squares of the ASPRS means."""
-    texts, of_all, asprs = found.texts, found.of_all, found.standards.asprs
+    texts, of_all, asprs = statement.texts, statement.of_all, statement.standards.asprs
     if of_all is None or asprs is None:
         return []
     fields = {}
@@ -121,7 +123,7 @@ def _notes(found: Statement) -> list[Text]:
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
 
 
-def _map(found: Statement) -> Drawing:
-    texts, control = found.texts, control_places(found.result.block)
-    sketch = partial(differences, found.compared, control, texts)
+def _map(statement: Statement) -> Drawing:
+    texts, control = statement.texts, control_places(statement.result.block)
+    sketch = partial(differences, statement.compared, control, texts)
     return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)

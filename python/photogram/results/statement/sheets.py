@@ -15,32 +15,32 @@ if TYPE_CHECKING:
     from photogram import Statement
 
 
-def files_of_statement(found: Statement) -> dict[str, bytes]:
+def files_of_statement(statement: Statement) -> dict[str, bytes]:
     """Return the tables of a statement as text of commas, by the names of files."""
-    unit = found.result.block.linear_unit
-    files = {"check_points.csv": _check_file(found), "budget.csv": _budget_file(found.taken_apart)}
-    if found.left_out:
+    unit = statement.result.block.linear_unit
+    files = {"check_points.csv": _check_file(statement), "budget.csv": _budget_file(statement.taken_apart)}
+    if statement.left_out:
         about = f"lengths in {unit}; d: predicted by all others minus survey; no independent check"
         files["leave_one_out.csv"] = csv_text(
-            frame(left_out_points(found.texts, found.left_out).columns), [about]
+            frame(left_out_points(statement.texts, statement.left_out).columns), [about]
         )
-    if found.removed:
-        files["removed.csv"] = removed_observations(found).csv()
+    if statement.removed:
+        files["removed.csv"] = removed_observations(statement).csv()
     return files
 
 
-def _check_file(found: Statement) -> bytes:
-    columns = frame(check_points(found).columns)
-    for name, reason in found.compared.not_usable:
+def _check_file(statement: Statement) -> bytes:
+    columns = frame(check_points(statement).columns)
+    for name, reason in statement.compared.not_usable:
         values = {"point": name, "used": "no", "reason": reason, "cover": ""}
         columns = {key: [*column, values.get(key, math.nan)] for key, column in columns.items()}
     about = "d: adjusted minus given, to the east, north and up"
-    return csv_text(columns, [f"lengths in {found.result.block.linear_unit}; {about}"])
+    return csv_text(columns, [f"lengths in {statement.result.block.linear_unit}; {about}"])
 
 
-def _budget_file(found: Sequence[Budget]) -> bytes:
+def _budget_file(budgets: Sequence[Budget]) -> bytes:
     rows: list[tuple[Any, ...]] = []
-    for each in found:
+    for each in budgets:
         head = (each.quantity, each.unit, each.value, each.sd)
         basis = "estimated" if each.freedom.basis == "components" else "given"
         for own in each.sources:

@@ -86,11 +86,11 @@ def _localized(texts: Texts, column: Column, cell: Cell) -> Cell:
     return replace(cell, value=texts.numeral(column.written(cell.value)), sorts=sorts)
 
 
-def check_points(found: Statement) -> Table:
+def check_points(statement: Statement) -> Table:
     """Return the check points with their differences and tests."""
-    texts, own, columns = found.texts, found.compared, Columns(found.texts)
-    names, unit, n = own.names, found.result.block.linear_unit, len(own)
-    tests = None if found.of_all is None else found.of_all.points
+    texts, own, columns = statement.texts, statement.compared, Columns(statement.texts)
+    names, unit, n = own.names, statement.result.block.linear_unit, len(own)
+    tests = None if statement.of_all is None else statement.of_all.points
     sd, adjusted, normalised = (
         np.full((n, 3), np.nan) if tests is None else getattr(tests, name)
         for name in ("sd_predicted", "sd_adjusted", "normalised")
@@ -100,7 +100,7 @@ def check_points(found: Statement) -> Table:
         for name in ("T", "p", "others", "p_others", "ce90", "le90")
     )
     limit, decimals = 0.0 if tests is None else tests.limit, decimals_for(adjusted)
-    left_out = np.array([name in found.asked.without for name in names], dtype=bool)
+    left_out = np.array([name in statement.asked.without for name in names], dtype=bool)
     covers = ["vegetated" if each else "open" for each in own.vegetated]
     plain, axes = partial(Quantity, kind="name"), tuple(map(Axis, DIRECTIONS))
     quantities = [
@@ -108,7 +108,7 @@ def check_points(found: Statement) -> Table:
         plain(covers, name="cover", member="cover"),
         columns.text("cover", [texts(f"cover.{cover}") for cover in covers]),
         Quantity(own.given, member="given"),
-        Quantity(found.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
+        Quantity(statement.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
         columns.directions("difference", own.differences, decimals, unit, name="d", member="difference"),
         columns.directions("sd", sd, decimals, unit, name="sd", member="sd_predicted"),
         Quantity(adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
@@ -128,7 +128,7 @@ def check_points(found: Statement) -> Table:
         columns.number("CE90", ce90, decimals, unit, name="ce90_predicted", member="ce90_predicted"),
         columns.number("LE90", le90, decimals, unit, name="le90_predicted", member="le90_predicted"),
         plain(["no" if each else "yes" for each in left_out], name="used"),
-        plain([found.asked.without.get(name, "") for name in names], name="reason"),
+        plain([statement.asked.without.get(name, "") for name in names], name="reason"),
     ]
     return Table("check_points", texts("annex.a"), quantities)
 
@@ -157,14 +157,14 @@ def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
     return Table("leave_one_out", texts("annex.b"), quantities)
 
 
-def removed_observations(found: Statement) -> Table:
+def removed_observations(statement: Statement) -> Table:
     """Return the removed observations; the page lists the first ones."""
-    texts, columns, count = found.texts, Columns(found.texts), len(found.removed)
-    reasons, shown = [each.reason for each in found.removed], MAX_REMOVED_OBSERVATIONS
+    texts, columns, count = statement.texts, Columns(statement.texts), len(statement.removed)
+    reasons, shown = [each.reason for each in statement.removed], MAX_REMOVED_OBSERVATIONS
     quantities = [
-        Quantity([each.name for each in found.removed], kind="name", name="observation", member="name"),
+        Quantity([each.name for each in statement.removed], kind="name", name="observation", member="name"),
         Quantity(reasons, kind="name", name="reason", member="reason"),
-        columns.text("observation", [texts.text(each.subject) for each in found.removed]),
+        columns.text("observation", [texts.text(each.subject) for each in statement.removed]),
         columns.text("reason", [texts(f"removed.{reason}") for reason in reasons]),
     ]
     note = texts("table.removed.note", shown=shown, all=count) if count > shown else ""

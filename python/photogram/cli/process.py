@@ -1,16 +1,53 @@
-"""The standard streams: open whatever happens, and whole or a failure."""
+"""The process of the command line: its standard streams, and its end by signals."""
 
 from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from contextlib import suppress
 from io import TextIOWrapper
+from types import FrameType
+
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"
+"""Ends a status line: rich hides the cursor meanwhile."""
+
+
+def end_by_signals() -> None:
+    """Let SIGINT, SIGTERM and SIGHUP end the process with 128 and their number, unless they are ignored.
+
+    Not by an exception: one that is raised inside a destructor or a callback would be lost.
+    """
+    for name in _NAMES:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _end)
+
+
+def ignore_signals() -> None:
+    """Let signals no longer change the end of a run that is through: the interpreter would die of them."""
+    for name in _NAMES:
+        number = getattr(signal, name, None)
+        if number is not None:
+            signal.signal(number, signal.SIG_IGN)
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    # If the writer is not loaded yet, it has begun nothing.
+    abandon_all = getattr(sys.modules.get("photogram.io.writing.outputs"), "abandon_all", None)
+    if abandon_all is not None:
+        abandon_all()
+    try:
+        if os.isatty(2):
+            os.write(2, SHOW_CURSOR)
+    finally:
+        os._exit(128 + number)
+
 
 OUTPUT_FAULT = 1
 STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EBADF)
-"""What writing to a standard stream ends in."""
 
 
 def open_streams() -> None:
@@ -30,12 +67,7 @@ def open_streams() -> None:
 
 
 def stream_fault(error: OSError) -> int:
-    """Say what an error that names no file is about, unless the reader of the output has gone.
-
-    Returns
-    -------
-    The exit code.
-    """
+    """Report an error of a standard stream, except a broken pipe; return the exit code."""
     if error.errno != errno.EPIPE:
         of = "standard output: " if error.errno in STREAM_FAULTS else ""
         with suppress(OSError):
@@ -44,7 +76,7 @@ def stream_fault(error: OSError) -> int:
 
 
 def finish(code: int | str | None) -> int | str | None:
-    """Write out what is still to be printed; return the exit code."""
+    """Flush the standard streams; return the exit code."""
     for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
         try:
             if stream is not None:

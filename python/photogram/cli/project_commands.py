@@ -1,0 +1,157 @@
+"""`photogram info`, `convert`, `metadata` and `new`: projects and their files without adjustment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from photogram.cli.console import print_sections
+from photogram.cli.job import InputFile, Job, OutputFile, Reads, Writes, with_job
+from photogram.cli.options import Quiet
+from photogram.cli.projects import EXAMPLE, Additions, described, project_path, read_project
+from photogram.messages import counted, listed
+from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.formats import Project
+    from photogram.show.sections import Section
+
+CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
+
+
+@with_job
+def info(
+    job: Job,
+    *,
+    path: InputFile = None,
+    example: bool = False,
+    json: OutputFile = None,
+    added: Additions,
+    quiet: Quiet = False,
+) -> None:
+    """Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.
+
+    If the project requests an accuracy statement, the command describes the subject of the statement.
+    """
+    from photogram.io.json import to_json
+
+    project = read_project(job, project_path(job, path), added)
+    sections = [*described(project), *_asked(project)]
+    job.finish(
+        {} if json is None else {json: to_json(dict(sections))},
+        summary=lambda: print_sections(sections, "--json FILE"),
+    )
+
+
+def _asked(project: Project) -> list[Section]:
+    """Return a line on the requested accuracy statement, if any."""
+    if not project.statement:
+        return []
+    from photogram.results.statement.request import Asked
+    from photogram.results.statement.texts import Texts
+
+    asked, texts = Asked.checked(**project.statement), Texts(unit=project.block.linear_unit)
+    classes = [f"{CLASSES[name]} {texts.size(size)}" for name, size in asked.classes.items()]
+    budgets = "three that are chosen" if asked.budgets is None else listed(list(asked.budgets)) or "none"
+    said = [
+        ", ".join(asked.standards),
+        f"classes: {', '.join(classes) or 'none'}",
+        counted(len(project.checks), "check point"),
+        *([counted(len(asked.lengths), "calibrated length")] if asked.lengths else []),
+        f"budgets: {budgets}",
+    ]
+    return [("Accuracy statement", ["; ".join(said)])]
+
+
+@with_job
+def convert(
+    job: Job,
+    *,
+    path: InputFile = None,
+    out: Annotated[Path | None, Writes.EITHER] = None,
+    example: bool = False,
+    to: str | None = None,
+    added: Additions,
+    quiet: Quiet = False,
+) -> None:
+    """Write a project in another format and list the data that the format cannot contain."""
+    assert out is not None
+    from photogram.formats import cannot_hold, target
+
+    chosen = target(out, to)
+    project = read_project(job, project_path(job, path), added)
+    lost = cannot_hold(project, chosen.format.name)
+    sections = [
+        *described(project),
+        ("Written", [f"{out}: {chosen.format.title} (--to {chosen.format.name})"]),
+        ("Lost, as the format has no place for it", lost or ["nothing"]),
+    ]
+    job.finish(chosen.files(project), summary=lambda: print_sections(sections, "`photogram info`"))
+
+
+@with_job
+def metadata(
+    job: Job,
+    path: Annotated[Path, Reads.FILE],
+    out: OutputFile = None,
+    photos_crs: str | None = None,
+    mrk_antenna: bool = False,
+    sd: list[str] | None = None,
+    quiet: Quiet = False,
+) -> None:
+    """List positions of photographs from their files: EXIF, XMP, .MRK, geo.txt ...; write a table.
+
+    Only metadata are read. Sources in order of priority: table geo.txt or of references, .MRK, XMP, EXIF. The
+    order holds for positions and standard deviations separately.
+    """
+    from photogram.formats import read_metadata
+    from photogram.formats.metadata.systems import gnss_files
+    from photogram.formats.supplements import deviations
+
+    given = deviations(sd or [])
+    found = read_metadata(path, mrk_antenna=mrk_antenna)
+    job.reads(*found.tables)
+    job.spares(*found.pictures)
+    files = {} if out is None else gnss_files(found, out, photos_crs, given.get("gnss"))
+    job.finish(files, summary=lambda: print_sections(found.sections(), "--out FILE"))
+
+
+Kind = Literal["block", "metrology", "survey", "rolling", "archive", "night", "board"]
+
+SOURCES = {
+    "block": EXAMPLE,
+    "metrology": ("flange",),
+    "survey": ("survey",),
+    "rolling": ("rolling",),
+    "archive": ("archive",),
+    "night": ("exposures",),
+    "board": ("board",),
+}
+"""Packaged examples, directories of photogram.examples."""
+
+
+@with_job
+def new(
+    job: Job,
+    out: Annotated[Path, Writes.DIRECTORY],
+    kind: Kind = "block",
+    overwrite: bool = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a small real project as tables with comments on their contents.
+
+    Replace the tables by your own. `photogram adjust DIR` adjusts the project, `photogram stellar-camera
+    exposures DIR/night.toml` a night, `photogram calibrate DIR` views of a board.
+
+    Kinds: block: photos of a drone with control. metrology: targets and scale bars without control. survey:
+    enough check points for an accuracy statement. rolling: photos of a drone with a rolling shutter. archive:
+    scanned film with fiducial marks. night: exposures of stars. board: corners of a chessboard.
+    """
+    from photogram.errors import InputError
+
+    own = ("project.toml", "night.toml", "board.toml")
+    if any((out / name).exists() for name in own) and not overwrite:
+        raise InputError(phrase("command.project-exists"), file=out)
+    source = job.packaged(*SOURCES[kind])
+    files = {out / each.name: each.read_bytes() for each in sorted(source.iterdir()) if each.is_file()}
+    job.finish(files)

@@ -1,0 +1,400 @@
+"""OpenSfM and OpenDroneMap: `reconstruction.json` with `tracks.csv`, written with `gcp_list.txt`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.block_contents import correlated_control, posed
+from photogram.formats.format import Format, Wishes
+from photogram.formats.images import Y_DOWN, sizes_of, to_corner
+from photogram.formats.lenses import lens_of
+from photogram.formats.losses import losses
+from photogram.formats.models import complete_positions
+from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.project import Frame, Project, Size, assembled
+from photogram.io.files import read_lines
+from photogram.io.json import Tree, read_json, to_json, unknown
+from photogram.io.numbers import finite_number
+from photogram.io.places import Place, at_place
+from photogram.messages import Message
+from photogram.network.attitudes import Attitudes
+from photogram.network.cameras import Camera
+from photogram.network.observations import Observation, Position
+from photogram.words import Phrase, phrase
+
+TITLE = "OpenSfM reconstruction"
+MODEL, TRACKS = "reconstruction.json", "tracks.csv"
+UNKNOWN_DOP = 15.0  # Metres: what the package takes where nothing is said
+NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are no observations
+_VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
+_FIRST = 8
+_NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
+
+
+def place_of(path: Path) -> Path | None:
+    """Return the folder with the files: a path, or `opensfm` in it; of a file that it lies in."""
+    if path.is_file():
+        return path.parent if path.name == MODEL else None
+    return next((each for each in (path, path / "opensfm") if (each / MODEL).is_file()), None)
+
+
+def read(path: Path, wishes: Wishes) -> Project:
+    """Read the largest model of a file, or the one that is asked for, with its tracks."""
+    folder = place_of(path)
+    if folder is None:
+        raise InputError(phrase("format.files", name=MODEL), file=path)
+    messages: list[Message] = []
+    model = _model(read_json(folder / MODEL), wishes.model, messages)
+    cameras, sizes = _cameras(model["cameras"])
+    camera_rows = {each.name: row for row, each in enumerate(cameras)}
+    shots = dict(model["shots"].items())
+    names = list(shots)
+    for name, shot in shots.items():
+        if not name.strip() or not name.isprintable():
+            raise shot.error(phrase("format.name", what="shot", name=name))
+        if shot["camera"].text() not in camera_rows:
+            raise shot["camera"].error(phrase("format.undefined", what="camera", name=shot["camera"].text()))
+    of_photo = np.array([camera_rows[shot["camera"].value] for shot in shots.values()], dtype=np.int64)
+    rotations, translations = _poses(shots)
+    points = dict(model.get("points", {}).items())
+    there = (folder / TRACKS).is_file()
+    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages) if there else _NO_TRACKS
+    colours = {
+        name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
+    }
+    scales = np.array([max(size) for size in sizes], dtype=float)[of_photo[photos]]
+    middles = np.array(sizes, dtype=float)[of_photo[photos]] / 2
+    return assembled(
+        path=folder / MODEL,
+        title=TITLE,
+        cameras=cameras,
+        sizes=list[Size | None](sizes),
+        photo_ids=names,
+        photo_cameras=of_photo,
+        centres=-np.einsum("nji,nj->ni", rotations, translations),
+        matrices=(Y_DOWN @ rotations).transpose(0, 2, 1),
+        point_ids=list(points),
+        starts=np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3),
+        image_photos=photos,
+        image_points=tracks,
+        image_xy=middles + scales[:, np.newaxis] * xy,
+        observations=_gps(shots, wishes, messages),
+        frame=_frame(model),
+        lacks=[] if there else [Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")})],
+        messages=[*messages, *_beside(folder)],
+        details={"colours": colours},
+    ).replace(tracks=frozenset(points))
+
+
+def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
+    models = list(document)
+    if not models:
+        raise document.error(phrase("format.missing", what="a reconstruction"))
+    sizes = [sum(1 for _ in each["shots"].items()) for each in models]
+    if wanted is not None and wanted >= len(models):
+        raise document.error(phrase("format.models", n=len(models), model=wanted))
+    chosen = int(np.argmax(sizes)) if wanted is None else wanted
+    if len(models) > 1:
+        messages.append(
+            Message(
+                phrase(
+                    "format.model-chosen",
+                    n=len(models),
+                    names=[f"{size} photos" for size in sizes],
+                    model=chosen,
+                )
+            )
+        )
+    if not sizes[chosen]:
+        raise models[chosen].error(phrase("format.missing", what="shots"))
+    return models[chosen]
+
+
+def _cameras(cameras: Tree) -> tuple[list[Camera], list[Size]]:
+    found, sizes = [], []
+    for name, each in cameras.items():
+        width, height = each["width"].whole(1), each["height"].whole(1)
+        with at_place(each):
+            found.append(_camera(name, each, width, height))
+        sizes.append((width, height))
+    return found, sizes
+
+
+def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
+    kind = each.get("projection_type", "perspective")
+    scale = float(max(width, height))
+    middle = {"cx": width / 2, "cy": height / 2}
+
+    def terms(*names: str) -> dict[str, float]:
+        return {term: each.get(term, 0.0).number() for term in names}
+
+    if kind.value in ("perspective", "fisheye"):
+        model = "radial" if kind.value == "perspective" else "radial_fisheye"
+        return Camera(model, {"f": scale * each["focal"].number(), **middle, **terms("k1", "k2")}, name=name)
+    if kind.value in ("spherical", "equirectangular"):
+        if width != 2 * height:
+            raise each.error(phrase("opensfm.spherical"))
+        return Camera("equirectangular", {"w": float(width), "h": float(height)}, name=name)
+    models = {
+        "simple_radial": ("opencv", ("k1",)),
+        "radial": ("opencv", ("k1", "k2")),
+        "brown": ("full_opencv", ("k1", "k2", "k3", "p1", "p2")),
+        "fisheye_opencv": ("opencv_fisheye", ("k1", "k2", "k3", "k4")),
+    }
+    if not isinstance(kind.value, str) or kind.value not in models:
+        raise unknown(kind, "the projection type", {**models, "perspective": 0, "fisheye": 0, "spherical": 0})
+    model, names = models[kind.value]
+    fx = each["focal_x"].number()
+    return Camera(
+        model,
+        {
+            "fx": scale * fx,
+            "fy": scale * each.get("focal_y", fx).number(),
+            "cx": middle["cx"] + scale * each.get("c_x", 0.0).number(),
+            "cy": middle["cy"] + scale * each.get("c_y", 0.0).number(),
+            **terms(*names),
+        },
+        name=name,
+    )
+
+
+def _poses(shots: dict[str, Tree]) -> tuple[Floats, Floats]:
+    """Return (n, 3, 3) rotations world to camera, and (n, 3) translations."""
+    vectors = np.array([each["rotation"].numbers(3) for each in shots.values()])
+    for shot, vector in zip(shots.values(), vectors, strict=True):
+        if np.abs(vector).max() > 1e6:
+            raise shot["rotation"].error(phrase("format.angles"))
+    translations = np.array([each.get("translation", [0, 0, 0]).numbers(3) for each in shots.values()])
+    return _photocore.vector_rotations(vectors), translations
+
+
+def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> list[Observation]:
+    given = {name: each["gps_position"].numbers(3) for name, each in shots.items() if "gps_position" in each}
+    if not given or not any(position.any() for position in given.values()):
+        return []
+    heights = np.array([position[2] for position in given.values()])
+    level = len(given) > 1 and float(np.ptp(heights)) < 1e-6
+    if level:
+        messages.append(Message(phrase("opensfm.heights")))
+    found: list[Observation] = []
+    for name, position in given.items():
+        dop = shots[name].get("gps_dop", UNKNOWN_DOP)
+        sd = np.broadcast_to(wishes.sd.get("gnss", (dop.number(),)), 3).copy()
+        if not (sd > 0).all():
+            raise dop.error(phrase("format.positive", name="the standard deviation", value=float(sd.min())))
+        if level:
+            sd[2] = NO_HEIGHT
+        found.append(Position(name, position, sd=sd))
+    messages.append(Message(phrase("opensfm.gnss", n=len(found))))
+    return found
+
+
+def _frame(model: Tree) -> Frame:
+    if "reference_lla" not in model:
+        return Frame()
+    place = model["reference_lla"]
+    latitude, longitude = place["latitude"].number(), place["longitude"].number()
+    if abs(latitude) > 90 or abs(longitude) > 360:
+        raise place.error(phrase("photos.degrees", longitude=longitude, latitude=latitude))
+    return Frame("topocentric", "EPSG:4979", (latitude, longitude, place.get("altitude", 0.0).number()))
+
+
+def _tracks(
+    path: Path, names: list[str], points: list[str], messages: list[Message]
+) -> tuple[Indices, Indices, Floats]:
+    """Return photo, point and (m, 2) normalised coordinates of the observations that the model has."""
+    lines = read_lines(path)
+    width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
+    if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
+        raise Place(path, 1, lines[0]).error(
+            phrase("format.unknown", what="version", value=lines[0], names=list(_VERSIONS))
+        )
+    first = 1 if width else 0
+    width = width or _FIRST
+    photo_rows = {name: row for row, name in enumerate(names)}
+    point_rows = {name: row for row, name in enumerate(points)}
+    photos, tracks, xy = [], [], []
+    left = 0
+    for record, line in enumerate(lines[first:], first + 1):
+        if not line:
+            continue
+        cells = line.split("\t")
+        if len(cells) != width:
+            raise Place(path, record, line).error(phrase("format.count", n=len(cells), required=width))
+        photo, point = photo_rows.get(cells[0]), point_rows.get(cells[1])
+        if photo is None or point is None:
+            left += 1
+            continue
+        try:
+            xy.append((finite_number(cells[3]), finite_number(cells[4])))
+        except ValueError as error:
+            raise Place(path, record, line).error(str(error)) from None
+        photos.append(photo)
+        tracks.append(point)
+    if left:
+        messages.append(Message(phrase("format.unknown-images", n=left)))
+    return np.array(photos, dtype=np.int64), np.array(tracks, dtype=np.int64), np.reshape(xy, (-1, 2))
+
+
+def _beside(folder: Path) -> list[Message]:
+    found = [name for name in ("gcp_list.txt", "ground_control_points.json") if (folder / name).is_file()]
+    return [Message(phrase("opensfm.control", file=name, path=folder / name)) for name in found]
+
+
+CONTROL = "gcp_list.txt"
+VERSION = "OPENSFM_TRACKS_VERSION_v2"
+
+
+def cannot_hold(project: Project) -> list[Phrase]:
+    """Return parts of a project that the files cannot contain."""
+    control = "control-list" if _placed_frame(project) else "control"
+    return losses(project, "deviations", control, "observations-and-control", "gnss", "place", "rigs")
+
+
+def write(project: Project) -> Mapping[str, bytes]:
+    """Return the two files, and the list of control of a block that has a place on the earth."""
+    block = project.block
+    cameras, which = known_cameras(block)
+    sizes = sizes_of(project)
+    rows = np.flatnonzero(posed(block))
+    if not len(rows):
+        raise InputError(phrase("format.poses"))
+    attitudes = Attitudes(attitude_matrices(block)[rows])
+    rotations = attitudes.values("rotation_vector_to_vision").tolist()
+    translations = attitudes.translations(block.photo_positions[rows]).tolist()
+    gps = {each.photo: each for each in block.observations if isinstance(each, Position)}
+    shots: dict[str, Any] = {}
+    for row, rotation, translation in zip(rows.tolist(), rotations, translations, strict=True):
+        name = block.photo_ids[row]
+        shots[name] = {
+            "rotation": rotation,
+            "translation": translation,
+            "camera": cameras[which[row]].name,
+            "orientation": 1,
+        }
+        if name in gps:
+            shots[name]["gps_position"] = gps[name].observed[:3].tolist()
+            shots[name]["gps_dop"] = float(np.sqrt(np.trace(gps[name].precision) / 3))
+    positions = complete_positions(project)
+    placed = np.isfinite(positions).all(axis=1)
+    colours = project.details.get("colours", {})
+    model: dict[str, Any] = {
+        "cameras": {each.name: _camera_member(each, size) for each, size in zip(cameras, sizes, strict=True)},
+        "shots": shots,
+        "points": {
+            block.point_ids[row]: {
+                "color": list(map(float, colours.get(block.point_ids[row], (0, 0, 0)))),
+                "coordinates": positions[row].tolist(),
+            }
+            for row in np.flatnonzero(placed).tolist()
+        },
+    }
+    if project.frame.origin is not None and _placed_frame(project):
+        model["reference_lla"] = dict(
+            zip(("latitude", "longitude", "altitude"), project.frame.origin, strict=True)
+        )
+    files = {MODEL: to_json([model]), TRACKS: _tracks_file(project, sizes, which, set(rows.tolist()))}
+    control = _control(project)
+    return {**files, **({CONTROL: control} if control else {})}
+
+
+def _placed_frame(project: Project) -> bool:
+    """Return whether the frame has a place on the earth."""
+    return project.frame.kind == "topocentric" and project.frame.origin is not None
+
+
+def _control(project: Project) -> bytes:
+    """Return the list of control with its measurements; none of a block without a place on the earth.
+
+    Points of which some coordinates are not known have no place in it.
+    """
+    block = project.block
+    positions = block.point_positions.copy()
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    for name, each in correlated_control(block).items():
+        positions[places[name]] = each.observed
+    own = np.flatnonzero(np.isfinite(positions).all(axis=1))
+    if not len(own) or not _placed_frame(project):
+        return b""
+    from photogram.formats.crs import GEOGRAPHIC, from_frame
+
+    found = positions.copy()
+    found[own], _ = from_frame(GEOGRAPHIC, positions[own], np.zeros((len(own), 3, 3)), project.frame)
+    known = set(own.tolist())
+    lines = ["WGS84"]
+    # Pixels count from the middle of the first one there, and names end at blanks.
+    pixels = (to_corner(project) - 0.5).tolist()
+    for photo, point, pixel in zip(
+        block.image_photos.tolist(), block.image_points.tolist(), pixels, strict=True
+    ):
+        if point in known:
+            names = ("_".join(name.split()) for name in (block.photo_ids[photo], block.point_ids[point]))
+            lines.append(" ".join([*map(repr, [*found[point].tolist(), *pixel]), *names]))
+    return ("\n".join(lines) + "\n").encode() if len(lines) > 1 else b""
+
+
+def _camera_member(camera: Camera, size: Size) -> dict[str, Any]:
+    (width, height), scale = size, max(size)
+    found: dict[str, Any] = {"width": width, "height": height}
+    if camera.model == "equirectangular":
+        return {**found, "projection_type": "spherical"}
+    if camera.model in ("opencv_fisheye", "radial_fisheye", "simple_radial_fisheye") and camera.unit == "px":
+        kind, values = "fisheye_opencv", camera.parameters
+        fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+        cx, cy = values["cx"], values["cy"]
+        terms = {name: values.get(name, 0.0) for name in ("k1", "k2", "k3", "k4")}
+        terms["k1"] = values.get("k", terms["k1"])
+    else:
+        kind, lens = "brown", lens_of(camera, size)
+        if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
+            raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="OpenSfM"))
+        fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
+        terms = {name: getattr(lens, name) for name in ("k1", "k2", "p1", "p2", "k3")}
+    return {
+        **found,
+        "projection_type": kind,
+        "focal_x": fx / scale,
+        "focal_y": fy / scale,
+        "c_x": (cx - width / 2) / scale,
+        "c_y": (cy - height / 2) / scale,
+        **terms,
+    }
+
+
+def _tracks_file(project: Project, sizes: Any, which: list[int], shots: set[int]) -> bytes:
+    block = project.block
+    corner = to_corner(project)
+    of_images = np.asarray(which)[block.image_photos]
+    scale = np.array([max(size) for size in sizes], dtype=float)[of_images]
+    middle = np.array(sizes, dtype=float)[of_images] / 2
+    xy = (corner - middle) / scale[:, np.newaxis]
+    counts: dict[int, int] = {}
+    lines = [VERSION]
+    for photo, point, (x, y) in zip(
+        block.image_photos.tolist(), block.image_points.tolist(), xy.tolist(), strict=True
+    ):
+        if photo not in shots:
+            continue
+        feature = counts[photo] = counts.get(photo, -1) + 1
+        name = block.photo_ids[photo].replace("\t", " ")
+        lines.append(f"{name}\t{block.point_ids[point]}\t{feature}\t{x!r}\t{y!r}\t0.0004\t0\t0\t0\t-1\t-1")
+    return ("\n".join(lines) + "\n").encode()
+
+
+FORMAT = Format(
+    name="opensfm",
+    title=TITLE,
+    recognises=lambda path: place_of(path) is not None,
+    read=read,
+    write=write,
+    files=(MODEL,),
+    cannot_hold=cannot_hold,
+    pixels=True,
+)
