@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
 NOT_USABLE = 4
-SHOWN = 24
-"""Lines of a section that the summary of a command shows at most."""
+SHOWN = 24  # Lines of a section that the summary of a command shows at most
 
 SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
 """Sections of the document of a network that the summary of a command shows."""

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from photogram.show.sketch.plot import Plot
 
 TEXT, HTML = "report.txt", "report.html"
-NEEDED = ("jinja2", "contourpy")
-"""Packages of the browser report, in the extra `report`."""
+NEEDED = ("jinja2", "contourpy")  # Packages of the browser report, in the extra `report`
 
 
 @dataclass(frozen=True)

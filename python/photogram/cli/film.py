@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.show.sections import Section
 
-EXAMPLE = ("archive",)
-"""The packaged example, in photogram.examples."""
+EXAMPLE = ("archive",)  # The packaged example, in photogram.examples
 
 
 @with_job

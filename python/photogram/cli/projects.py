@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.show.sections import Section
 
-EXAMPLE = ("project",)
-"""The packaged example, a directory of photogram.examples."""
+EXAMPLE = ("project",)  # The packaged example, a directory of photogram.examples
 
 OriginName = Literal["corner", "center"]
 

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["PARAMETERS", "Collection"]
 
 
-POSE = ("w1", "w2", "w3", "t1", "t2", "t3")
-"""Of a photo: angle-axis vector w (rad) and translation t."""
+POSE = ("w1", "w2", "w3", "t1", "t2", "t3")  # Of a photo: angle-axis vector w (rad) and translation t
 PARAMETERS = (*POSE, "f", "k1", "k2")
 """Of a photo with the camera of "Bundle Adjustment in the Large": also focal length f (pixels), k1, k2."""
 

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
 
 FIRST_OF_TRANSLATION = 3
-STEP = 1e-6
-"""Of a parameter, in its own size or one."""
+STEP = 1e-6  # Of a parameter, in its own size or one
 POINTS = 3
 """Coordinates of a point, whose partials stand behind those of the photos."""
 

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AdjustedCollection"]
 
-POSE = 6
-"""Parameters of a photo that are no camera's."""
+POSE = 6  # Parameters of a photo that are no camera's
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

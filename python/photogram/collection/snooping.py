@@ -33,8 +33,7 @@ from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import phrase
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
-FAR = 5.0
-"""Robust standard deviations from which on an image is out at first, after a robust adjustment."""
+FAR = 5.0  # Robust standard deviations from which on an image is out at first, after a robust adjustment
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 

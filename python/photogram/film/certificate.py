@@ -41,12 +41,9 @@ from photogram.words import Phrase, phrase
 SD_DESIGN = 0.02
 SD_C = 0.003
 SD_PRINCIPAL_POINT = 0.003
-SD_UNKNOWN_POINT = 0.02
-"""Of an unknown principal point, or if distances alone determine the marks (mm)."""
-APART = 3.0
-"""Notable distance of the points of symmetry and autocollimation, in standard deviations."""
-PRINTED = 2e-3
-"""Largest difference of printed coefficients from the table of distortion, millimetres."""
+SD_UNKNOWN_POINT = 0.02  # Of an unknown principal point, or if distances alone determine the marks (mm)
+APART = 3.0  # Notable distance of the points of symmetry and autocollimation, in standard deviations
+PRINTED = 2e-3  # Largest difference of printed coefficients from the table of distortion, millimetres
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,7 @@ HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
 COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4
 """Numbers after the first line, of a camera, of a point with the number of its views, of a view."""
-ORTHONORMAL = 1e-6
-"""What R R^T may differ from the unit matrix."""
+ORTHONORMAL = 1e-6  # What R R^T may differ from the unit matrix
 
 
 class _Numbers:
