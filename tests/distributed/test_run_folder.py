@@ -65,7 +65,7 @@ def test_documents_that_are_none_of_a_run_are_refused(block, run, name, content)
     refused(
         block,
         run,
-        rf"{name.rsplit('/')[-1]}: (is no|the file (cannot|must)|the checksum differs)",
+        rf"{name.rsplit('/')[-1]}: (is no|cannot|the file cannot|the checksum differs)",
     )
 
 
