@@ -91,7 +91,7 @@ def test_rotations_that_are_the_other_way_round_are_found(tmp_path):
     ("file", "old", "new", "words"),
     [
         ("image.im", "8670.000", "8.670", ["image.im", "record 1", "is the unit another one"]),
-        ("image.im", "-1480.7692", "-1480,7692", ["record 2", "x: '-1480,7692' is not a number"]),
+        ("image.im", "-1480.7692", "-1480,7692", ["record 2", "x: must be a number, got '-1480,7692'"]),
         (
             "orientation.ori",
             "0.998950838367",
