@@ -14,8 +14,7 @@ from photogram.errors import InputError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.pattern import Pattern
-from photogram.planning.statistics import with_known_readout
+from photogram.planning.pattern import Pattern, with_known_readout
 from photogram.show.methods import Documented
 from photogram.words import phrase
 
