@@ -66,7 +66,7 @@ class Plan(Documented):
         PhotogramError
             The plan has no new points.
         """
-        from photogram.planning.plot import plan_sketch
+        from photogram.planning.document import plan_sketch
 
         return plan_sketch(self.patterns)
 
