@@ -17,7 +17,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation
 from photogram.network.tables import numbered
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:
