@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 FIRST_OF_TRANSLATION = 3
 STEP = 1e-6  # Of a parameter, in its own size or one
-POINTS = 3
-"""Coordinates of a point, whose partials stand behind those of the photos."""
+POINTS = 3  # Coordinates of a point, whose partials stand behind those of the photos
 
 
 def collection_findings(result: AdjustedCollection) -> Findings:

@@ -14,7 +14,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
-from photogram.collection.formats.format import Format
+from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.lazy_dataclasses import dataclass
