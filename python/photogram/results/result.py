@@ -30,10 +30,10 @@ from photogram.results.datum import (
     relative_datum,
 )
 from photogram.results.films import OnFilm
+from photogram.results.iteration import Redundancies, SumsOfSquares
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_kinds import ObservedKind, observed_kinds
 from photogram.results.selection import Adjusted, adjusted
-from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.trajectories import (
     AdjustedTrajectory,
     adjusted_trajectories,
@@ -219,12 +219,12 @@ class Result(OnFilm, AdjustedNetwork):
         return block_network(self.block, self.options)
 
     def _terms(self) -> Terms:
-        from photogram.results.block_terms import block_terms
+        from photogram.results.axes import block_terms
 
         return block_terms(self)
 
     def _determined(self) -> Determined:
-        from photogram.results.block_terms import determined
+        from photogram.results.axes import determined
 
         return determined(self)
 

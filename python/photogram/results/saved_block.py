@@ -26,14 +26,13 @@ from photogram.results.block_files import CLASSES, parts_of_block
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature, Features, Quantity
-from photogram.results.iteration import Iteration
+from photogram.results.iteration import Iteration, Redundancies, SumsOfSquares
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.results.result_files import (
     read_saved,
     rows_of,
 )
-from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
