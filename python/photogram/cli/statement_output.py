@@ -118,7 +118,7 @@ def stated(
 
     from photogram import statement as made
     from photogram.formats.crs_results import placed
-    from photogram.results.statement.given_coordinates import System
+    from photogram.results.statement.comparison import System
 
     run = job.run(command)
     system = None

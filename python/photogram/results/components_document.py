@@ -12,8 +12,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import judged
 from photogram.show.page import Document, Drawing, Part, Remarks, Section
 from photogram.show.quantity import Quantity, Table, of_each
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Line, Mark, Markers
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.components import Component
