@@ -172,10 +172,12 @@ def _motion(pattern: Pattern) -> Table:
     ):
         name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
         rows.append((name, sd, None, ratio))
-    heads = {"Unknown": "name", "rms sd": "number", "Largest sd": "number", "Times better": "number"}
+    values = [[row[k] for row in rows] for k in range(4)]
     columns = [
-        Quantity([row[k] for row in rows], kind=kind, head=head, decimals=2 if k == 3 else None)
-        for k, (head, kind) in enumerate(heads.items())
+        Quantity(values[0], kind="name", head="Unknown"),
+        Quantity(values[1], head="rms sd"),
+        Quantity(values[2], head="Largest sd"),
+        Quantity(values[3], head="Times better", decimals=2),
     ]
     return Table("", pattern.name, columns)
 
