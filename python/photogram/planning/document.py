@@ -198,11 +198,7 @@ def _control(pattern: Pattern) -> Table:
 
 
 def _layers(
-    key: str,
-    title: str,
-    patterns: Sequence[Pattern],
-    table: Callable[[Pattern], Table],
-    intro: str = "",
+    key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
     tables = [made for pattern in patterns if (made := table(pattern)).visible]
     return Section(key, title, layered_tables(key, tables), intro)
@@ -244,12 +240,9 @@ def _comparison_section(patterns: Sequence[Pattern]) -> Section:
     best = [names[k] if own else "no difference" for k, own in zip(sd.argmin(axis=0), differ, strict=True)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(least > 0, most / least, np.nan)
+    rows = [f"{kind} {axis}" for axis in axes for kind in ("rms", "largest")]
     columns = [
-        Quantity(
-            [f"{of} {axis}" for axis in axes for of in ("rms", "largest")],
-            kind="name",
-            head="Standard deviation",
-        ),
+        Quantity(rows, kind="name", head="Standard deviation"),
         *(Quantity(own, head=f"{name} {unit}") for name, own in zip(names, sd, strict=True)),
         Quantity(best, kind="name", head="Best"),
         Quantity(ratios, head="Largest over smallest", decimals=2),

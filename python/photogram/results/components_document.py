@@ -39,7 +39,7 @@ def weighed_document(found: VarianceComponents, network: Document) -> Document:
     return replace(network, judgements=own.judgements, advice=own.advice, sections=sections)
 
 
-def components_section(found: VarianceComponents, title: str = "Variance components") -> Section:
+def components_section(found: VarianceComponents) -> Section:
     """Return the section: which standard deviations are wrong, factors with their intervals."""
     caption = "Factors of the given standard deviations with their intervals (95 percent)."
     parts: list[Part] = [
@@ -53,7 +53,7 @@ def components_section(found: VarianceComponents, title: str = "Variance compone
         "Factors of the standard deviations of groups of observations, estimated from the residuals. The"
         " adjustment has the given weights."
     )
-    return Section("components", title, parts, intro)
+    return Section("components", "Variance components", parts, intro)
 
 
 def components_table(found: VarianceComponents) -> Table:

@@ -13,8 +13,7 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Pattern, Read
 from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
-from photogram.results.network_trial import OBSERVATION
-from photogram.results.suspects import observations_of_core
+from photogram.results.network_trial import OBSERVATION, observations_of_core
 from photogram.show.page import Drawing, Part, Section
 from photogram.show.quantity import Axis, Quantity, Table, members
 

@@ -64,7 +64,7 @@ class WeakestPhoto:
 
 
 @np.errstate(all="ignore")
-def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPoint]:
+def weakest_points(result: AdjustedNetwork) -> list[WeakestPoint]:
     """Return the points of the largest ratios, and those nearest to a station, the worst first.
 
     None without cofactors.
@@ -79,7 +79,7 @@ def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     distance = _distances(result, network)
     order = np.lexsort((distance, -ratio))
     near = np.flatnonzero(distance < NEAR)
-    worst = order[~np.isnan(ratio[order])][:count]
+    worst = order[~np.isnan(ratio[order])][:WORST]
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     return [
         WeakestPoint(
@@ -89,12 +89,12 @@ def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
             float(distance[row]),
             int(result.point_rays[row]),
         )
-        for row in list(dict.fromkeys(chosen))[:count]
+        for row in list(dict.fromkeys(chosen))[:WORST]
     ]
 
 
 @np.errstate(all="ignore")
-def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPhoto]:
+def weakest_photos(result: AdjustedNetwork) -> list[WeakestPhoto]:
     """Return the photos of the largest conditions, the worst first.
 
     Fixed unknowns of a photo do not count; those of which all are fixed are left out.
@@ -109,7 +109,7 @@ def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
     return [
         WeakestPhoto(int(rows[k]), names[rows[k]], float(condition[k]), int(images[rows[k]]))
-        for k in np.argsort(-condition, kind="stable")[:count].tolist()
+        for k in np.argsort(-condition, kind="stable")[:WORST].tolist()
     ]
 
 
