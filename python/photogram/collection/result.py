@@ -10,9 +10,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import POSE, Collection
 from photogram.collection.core_arrays import collection_network, collection_trial, named
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.covariance import Failure
+from photogram.results.covariance import Adjusted, Failure, Things
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
