@@ -143,7 +143,14 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         messages.append(Undetermined(phrase("collection.no-covariances", error=str(error)), what=str(error)))
     # A point far off on parallel rays creeps alone, and is named itself.
     if solution.weak and not solution.weak_points:
-        messages.append(hardly_determined(solution.status, _unknowns(solution.weak, collection)))
+        photos: dict[int, list[str]] = {}
+        for photo, unknown in sorted(solution.weak, key=lambda pair: pair[1]):
+            photos.setdefault(unknown, []).append(str(photo))
+        unknowns = [
+            str(phrase("collection.weak-unknowns", parameter=collection.parameters[unknown], names=names))
+            for unknown, names in photos.items()
+        ]
+        messages.append(hardly_determined(solution.status, "; ".join(unknowns)))
     messages += rounded(solution.redundancy_excess)
     numbers = [str(point) for point in range(len(collection.point_positions))] if solution.weak_points else []
     messages += harmful_points(solution.weak_points, numbers) + _hardly_held(solution)
@@ -190,15 +197,3 @@ def _hardly_held(solution: _photocore.CollectionSolution) -> list[Message]:
     ratio = np.nan_to_num(sd[:, free] / np.nanmedian(sd[:, free], axis=0)).max(axis=1)
     names = [str(photo) for photo in np.flatnonzero(ratio > WORSE)]
     return [Message.of("collection.weak-photos", names=names, ratio=float(ratio.max()))] if names else []
-
-
-def _unknowns(of_photos: list[tuple[int, int]], collection: Collection) -> str:
-    """Return names of unknowns and of their photos."""
-    photos: dict[int, list[str]] = {}
-    for photo, unknown in sorted(of_photos, key=lambda pair: pair[1]):
-        photos.setdefault(unknown, []).append(str(photo))
-    names = collection.parameters
-    return "; ".join(
-        str(phrase("collection.weak-unknowns", parameter=names[unknown], names=numbers))
-        for unknown, numbers in photos.items()
-    )

@@ -95,14 +95,6 @@ class Table:
             raise head.error(phrase("error.repeated", kind="column", name=twice[0]))
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
-    def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
-        """Return the table with columns named by the first of their aliases (small letters) that is there."""
-        names, lowered = list(self.columns), [name.casefold() for name in self.columns]
-        for column, others in aliases.items():
-            if column not in names and (own := next((each for each in others if each in lowered), None)):
-                names[lowered.index(own)] = column
-        return replace(self, columns=tuple(names))
-
     def require(self, *columns: str) -> None:
         """Reject a table without these columns."""
         there = set(self.columns)
@@ -119,13 +111,18 @@ class Table:
             yield Row(dict(zip(self.columns, texts, strict=False)), place, self.delimiter != ",")
 
 
-def cells(place: Place, delimiter: str = ",") -> list[str]:
-    """Split a record at its commas, or another delimiter; quotation marks hold a cell together."""
+def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[str]:
+    """Split a record at its commas, or another delimiter; quotation marks hold a cell together.
+
+    `blanks`: whether blanks may precede quotation marks.
+    """
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
         raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
     try:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
+        return [
+            cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=blanks))
+        ]
     except csv.Error as error:
         raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
 
@@ -138,6 +135,11 @@ def read_rows(
     `aliases` are headings of other programs, in small letters, for columns that are not there by their own
     names.
     """
-    table = Table.read(path, ragged=True).renamed(aliases)
+    table = Table.read(path, ragged=True)
+    names, lowered = list(table.columns), [name.casefold() for name in table.columns]
+    for column, others in aliases.items():
+        if column not in names and (own := next((each for each in others if each in lowered), None)):
+            names[lowered.index(own)] = column
+    table = replace(table, columns=tuple(names))
     table.require(*needed)
     return list(table.rows())
