@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 import photogram
 from photogram import InputError, Message, words
 from photogram.cli import app
-from photogram.io.places import Place, at_place
+from photogram.comparator import Place
+from photogram.io.places import at_place
 from photogram.results.statement import texts
 from photogram.statistics.verdict import RULES
 from photogram.words import Phrase, Words, on_command_line, phrase, table_of

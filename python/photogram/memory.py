@@ -26,8 +26,7 @@ GROUPS = (
 )
 """Controllers as `/proc/self/cgroup` names them, where the tree of their groups stands, the files with the
 limit of a group and with what it uses, and what of that the kernel gives back when asked."""
-STACK = 160 << 20
-"""Addresses for the stack of a thread, its share of the heap, and what is kept in reserve."""
+STACK = 160 << 20  # Addresses for the stack of a thread, its share of the heap, and what is kept in reserve
 
 
 def available_memory(root: Path = Path("/")) -> int | None:

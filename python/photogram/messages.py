@@ -11,11 +11,9 @@ from photogram.words import Phrase, quoted
 
 __all__ = ["Message", "Undetermined", "quoted"]
 
-MOST_NAMES = 12
-"""Names that a message lists at most."""
+MOST_NAMES = 12  # Names that a message lists at most
 
-MANY = 2_000
-"""Names among which no nearest one is looked for."""
+MANY = 2_000  # Names among which no nearest one is looked for
 
 MOST_CHARACTERS = 200
 """Characters of a record that a message shows at most; the cards of all programs have fewer."""

@@ -263,8 +263,8 @@ def test_no_test_where_the_grid_is_estimated_or_fixed():
         ("nonorthogonality_rad", 2, "error.at what=nonorthogonality_rad message=error.range"),
         ("covariance", [[0]], "error.numbers count=21 x 21 value=[[0]]"),
         ("covariance", [[-1.0] * 21] * 21, "error.covariance-singular"),
-        ("polynomial", {}, "'centre_um' is missing"),
-        ("polynomial", 5, "the document must describe a correction"),
+        ("polynomial", {}, "error.content"),
+        ("polynomial", 5, "error.content"),
     ],
 )
 def test_correction_files_are_checked(run, tmp_path, member, value, words):

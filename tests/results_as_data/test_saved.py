@@ -370,21 +370,24 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda document: document.update(format=1), "the file has the version '1'"),
-        (lambda document: document.update(kind="other"), "of a kind that is not known: 'other'"),
-        (lambda document: document.pop("kept"), "must be the summary of a result"),
-        (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "no class that this"),
-        (lambda document: document["kept"]["block"].update(frame={"was": 1}), "does not say what"),
-        (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
-        (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
+        (lambda document: document.update(format=1), "error.version version=1"),
+        (
+            lambda document: document.update(kind="other"),
+            "format.unknown what=kind of the result value=other",
+        ),
+        (lambda document: document.pop("kept"), "adjusted.summary"),
+        (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "document.class name=Path"),
+        (lambda document: document["kept"]["block"].update(frame={"was": 1}), "document.kind"),
+        (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "document.value"),
+        (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "document.value"),
         (
             lambda document: document["kept"].update(state={"tuple": []}),
-            "must contain the state of an adjustment",
+            "error.content content=state of an adjustment",
         ),
-        (lambda document: document["kept"]["result"].update(cameras=["x"]), "cameras.0. is 'x', not a Adj"),
+        (lambda document: document["kept"]["result"].update(cameras=["x"]), "argument.other name=cameras[0]"),
         (
             lambda document: document["kept"]["block"].update(point_ids="x"),
-            "point_ids is 'x', not a sequence",
+            "argument.other name=point_ids",
         ),
         (lambda document: document["kept"]["block"].update(other=1), "results.contradiction .*'other'"),
         (

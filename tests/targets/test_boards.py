@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from described import refusal
 from photogram.targets import Board
 from photogram.targets.board_files import is_board, read_board
-from rejections import rejected
 
 
 def test_points_of_a_chessboard_run_along_x_first():
@@ -78,7 +78,7 @@ def test_the_shape_goes_by_the_views():
     ],
 )
 def test_what_is_no_board_is_refused(given, said):
-    with rejected(said):
+    with refusal(said):
         Board(**given)
 
 
@@ -97,19 +97,23 @@ def test_board_toml(tmp_path):
 @pytest.mark.parametrize(
     ("text", "record", "said"),
     [
-        ("columns = 9\nrow = 6\n", 2, "did you mean rows"),
-        ("columns = 9.5\nrows = 6\nspacing = 1\n", 1, "whole number"),
-        ("columns = 9\nrows = 6\nspacing = 'wide'\n", 3, "spacing is a number"),
-        ("columns = 9\nrows = 6\nspacing = 1\nspacing_x = 1\n", 4, "say what a board has"),
-        ("kind = 'points'\npoints = 'none.csv'\n", 2, "no file none.csv"),
-        ("columns = 9\nrows = 6\n", None, "spacing"),
-        ("columns = \n", 1, "error.parse TOML Invalid value (at line 1, column 11)"),
+        ("columns = 9\nrow = 6\n", 2, "error.unknown.close kind=key name=row close=rows"),
+        ("columns = 9.5\nrows = 6\nspacing = 1\n", 1, "error.at what=columns message=error.whole value=9.5"),
+        (
+            "columns = 9\nrows = 6\nspacing = 'wide'\n",
+            3,
+            "error.at what=spacing message=error.number value=wide",
+        ),
+        ("columns = 9\nrows = 6\nspacing = 1\nspacing_x = 1\n", 4, "targets.spacings"),
+        ("kind = 'points'\npoints = 'none.csv'\n", 2, "targets.no-table name=none.csv"),
+        ("columns = 9\nrows = 6\n", None, "error.at what=spacing message=error.empty"),
+        ("columns = \n", 1, "TOML"),
     ],
 )
 def test_board_toml_that_is_wrong(tmp_path, text, record, said):
     path = tmp_path / "board.toml"
     path.write_text(text)
-    with rejected(said) as found:
+    with refusal(said) as found:
         read_board(path)
     assert (found.value.file, found.value.record) == (path, record)
 
@@ -150,5 +154,5 @@ def test_targets_of_kalibr(tmp_path, text, kind, grid):
 def test_a_target_that_kalibr_does_not_have(tmp_path):
     path = tmp_path / "target.yaml"
     path.write_text("target_type: 'ring'\n")
-    with rejected("ring is none of aprilgrid"):
+    with refusal("error.choice value=ring names=['aprilgrid', 'checkerboard',"):
         read_board(path)

@@ -138,9 +138,9 @@ def test_a_calibration_of_mrcal_is_the_same_after_a_plain_project(tmp_path):
 @pytest.mark.parametrize(
     ("table", "before", "after", "said"),
     [
-        ("boards.csv", "chessboard", "ring", "column kind: must be one of chessboard"),
+        ("boards.csv", "chessboard", "ring", "error.column column=kind message=error.choice"),
         ("boards.csv", "board,kind", "board,sort", "kind"),
-        ("boards.csv", ",9,7,", ",9,1,", "2 or more rows"),
+        ("boards.csv", ",9,7,", ",9,1,", "rows: error.least low=2 value=1"),
         ("boards.csv", ",9,7,", ",9,6,", "board-project.points"),
         ("control.csv", "\n1,0.04,", "\n1,0.05,", "board-project.position point=1"),
     ],

@@ -32,19 +32,15 @@ UnitVariance = Literal["estimated", "unity"]
 
 
 MOST_ITERATIONS = 50
-TRIAL_ITERATIONS = 15
-"""Control that fits needs four or five; one that needs more explains nothing."""
-WEAK = 1e3
-"""Condition number from which control is called weak."""
+TRIAL_ITERATIONS = 15  # Control that fits needs four or five; one that needs more explains nothing
+WEAK = 1e3  # Condition number from which control is called weak
 SUSPICIOUS = 1e-4
 """Root mean square residual, in sizes of the model, from which a cause is looked for; a good one is a few
 parts in a hundred thousand."""
-NO_FIT = 0.1
-"""And from which it is no orientation."""
+NO_FIT = 0.1  # And from which it is no orientation
 IN_A_PLANE = 3.0
 """Points are in a plane as far as can be told when they are off it by less than this many rms residuals."""
-ROUNDING = 1e-9
-"""Residuals below this fraction of the size of the model are rounding."""
+ROUNDING = 1e-9  # Residuals below this fraction of the size of the model are rounding
 
 
 def orient(

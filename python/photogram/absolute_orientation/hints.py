@@ -19,23 +19,19 @@ from photogram.statistics.likelihood import judged
 from photogram.words import Phrase, phrase
 
 FOOT = 0.3048
-STATIONS = 60
-"""Stations that are tried one by one, at the most."""
+STATIONS = 60  # Stations that are tried one by one, at the most
 WORK = 20_000
 """Of many stations fewer are tried, so that about as many are oriented anew altogether, but always a few."""
 FEW = 6
 PAIRS = 60
 """Pairs of stations that are exchanged on trial, at the most: of more, those that are nearest each other's
 places."""
-MOST = 5
-"""Hypotheses accepted one upon the other, at the most."""
-AS_WELL = 4.0
-"""A mirror image fits as well when its sum of squares is at most this multiple."""
+MOST = 5  # Hypotheses accepted one upon the other, at the most
+AS_WELL = 4.0  # A mirror image fits as well when its sum of squares is at most this multiple
 SAME_SCALE = 1e-3
 """Relative difference from a foot within which a scale is said to be that of feet and metres."""
 SCALE_DEVIATIONS = 3.0
-ROUNDING = 1e-5
-"""And what coordinates of a few digits leave of it."""
+ROUNDING = 1e-5  # And what coordinates of a few digits leave of it
 
 UNITS = {FOOT: "feet", 1 / FOOT: "metres"}
 

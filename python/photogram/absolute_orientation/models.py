@@ -24,8 +24,7 @@ from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.words import phrase
 
-LEAST = 5
-"""Points that determine the relative orientation of two photos."""
+LEAST = 5  # Points that determine the relative orientation of two photos
 
 
 @dataclass(frozen=True, eq=False)

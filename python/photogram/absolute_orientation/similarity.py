@@ -23,8 +23,7 @@ from photogram.words import phrase
 __all__ = ["Similarity", "read_similarity"]
 
 
-ORTHOGONAL = 1e-6
-"""Elements of A A^T - I that a matrix read from a file may have."""
+ORTHOGONAL = 1e-6  # Elements of A A^T - I that a matrix read from a file may have
 
 
 @dataclass(frozen=True, eq=False)

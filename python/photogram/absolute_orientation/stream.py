@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["CHUNK", "Document", "decimals_for", "transform_file"]
 
 
-CHUNK = 100_000
-"""Points transformed at a time."""
+CHUNK = 100_000  # Points transformed at a time
 OUTPUT = b"id,X,Y,Z,sd_X,sd_Y,sd_Z\n"
 
 

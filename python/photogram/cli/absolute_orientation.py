@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation.orientation import Orientation
     from photogram.io.writing import OutputSet
 
-EXAMPLE = "absolute_orientation"
-"""The packaged example, a directory of photogram.examples."""
+EXAMPLE = "absolute_orientation"  # The packaged example, a directory of photogram.examples
 
 
 ModelPointSd = Annotated[float, typer.Option(min=0.0)]

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
 
-EXAMPLE = ("board",)
-"""The packaged example, a directory of photogram.examples."""
+EXAMPLE = ("board",)  # The packaged example, a directory of photogram.examples
 
 
 class CornerBasisName(StrEnum):
@@ -45,8 +44,7 @@ class CornerBasisName(StrEnum):
     RAYS = "rays"
 
 
-CORNER_SD = 0.3
-"""Default standard deviation of corners (px)."""
+CORNER_SD = 0.3  # Default standard deviation of corners (px)
 TAKEN = (
     "--plan --field --focal --away --board --spacing --unit --shape --size --model --knots --sd --distance"
     " --need --out --json --html --no-html --plots --plot-format --quiet"

@@ -27,12 +27,10 @@ ShapeName = Literal["held", "bend", "points"]
 ViewName = Literal["name", "time"]
 
 
-SyncName = Literal["known", "none", "offset"]
-"""Whether images of one view were taken at one time."""
+SyncName = Literal["known", "none", "offset"]  # Whether images of one view were taken at one time
 
 
-PriorName = Literal["mrcal"]
-"""Whose priors cameras have."""
+PriorName = Literal["mrcal"]  # Whose priors cameras have
 
 
 PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
@@ -169,8 +167,7 @@ def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
     return found
 
 
-NOT_GOOD_ENOUGH = 4
-"""Exit code, as of results that should not be used."""
+NOT_GOOD_ENOUGH = 4  # Exit code, as of results that should not be used
 
 
 DatumName = Literal["corners", "mean-frames", "image", "axes"]

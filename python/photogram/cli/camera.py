@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from photogram.film import Certificate
     from photogram.film.years import DatedCamera
 
-EXAMPLE = ("certificate", "rc10.toml")
-"""The packaged example, in photogram.examples."""
+EXAMPLE = ("certificate", "rc10.toml")  # The packaged example, in photogram.examples
 
 
 @with_job

@@ -16,8 +16,7 @@ from photogram.cli.projects import Additions, described, project_path, read_proj
 if TYPE_CHECKING:
     pass
 
-EXAMPLE = "galveston"
-"""The packaged example, a directory of photogram.examples."""
+EXAMPLE = "galveston"  # The packaged example, a directory of photogram.examples
 
 
 @with_job

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from photogram.adjustment import robust
     from photogram.collection import AdjustedCollection, Collection
 
-EXAMPLE = ("collection", "ring.txt")
-"""The packaged example, in photogram.examples."""
+EXAMPLE = ("collection", "ring.txt")  # The packaged example, in photogram.examples
 PACKED = (".bz2", ".gz")
 
 

@@ -20,12 +20,10 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-EXAMPLE = ("comparator", "comparator-3.txt")
-"""The packaged example, a deck in photogram.examples."""
+EXAMPLE = ("comparator", "comparator-3.txt")  # The packaged example, a deck in photogram.examples
 
 
-Hand = Literal["file", "left", "right"]
-"""Handedness of the comparator against the plate."""
+Hand = Literal["file", "left", "right"]  # Handedness of the comparator against the plate
 
 
 @with_job

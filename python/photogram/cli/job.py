@@ -36,8 +36,7 @@ if TYPE_CHECKING:
 
 STANDS = {"example": "--example", "plan_views": "--plan"}
 """Options that replace the first argument of a command, by parameter."""
-LARGEST = 2**53
-"""Largest integer of an option; larger doubles are not exact counts."""
+LARGEST = 2**53  # Largest integer of an option; larger doubles are not exact counts
 
 
 class Reads(Enum):

@@ -13,8 +13,7 @@ from photogram.cli.options import Quiet, default_out
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
 
-EXAMPLE = ("perspective_center", "grid.deck")
-"""The packaged example, in photogram.examples."""
+EXAMPLE = ("perspective_center", "grid.deck")  # The packaged example, in photogram.examples
 
 
 @with_job

@@ -11,8 +11,7 @@ from io import TextIOWrapper
 from types import FrameType
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"
-"""Ends a status line: rich hides the cursor meanwhile."""
+SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"  # Ends a status line: rich hides the cursor meanwhile
 
 
 def end_by_signals() -> None:

@@ -26,8 +26,7 @@ from photogram.words import phrase
 
 __all__ = ["adjust", "adjusted"]
 
-WORSE = 100.0
-"""Standard deviations of a photo, in the median of all, beyond which its images hardly determine it."""
+WORSE = 100.0  # Standard deviations of a weak photo, in the median of all photos
 
 
 def adjust(

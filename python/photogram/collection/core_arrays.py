@@ -16,8 +16,7 @@ from photogram.network.core_arrays import CoreOptions
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
 from photogram.words import Phrase, phrase
 
-ROUGH, EXACT = 1e-7, 1e-12
-"""A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
+ROUGH, EXACT = 1e-7, 1e-12  # A smaller decrease of the sum of squares ends a round; EXACT with R of all rows
 
 
 def collection_network(given: Collection, options: CoreOptions) -> _photocore.CollectionNetwork:

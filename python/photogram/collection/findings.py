@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
 
 FIRST_OF_TRANSLATION = 3
-STEP = 1e-6
-"""Of a parameter, in its own size or one."""
-POINTS = 3
-"""Coordinates of a point, whose partials stand behind those of the photos."""
+STEP = 1e-6  # Of a parameter, in its own size or one
+POINTS = 3  # Coordinates of a point, whose partials stand behind those of the photos
 
 
 def collection_findings(result: AdjustedCollection) -> Findings:

@@ -15,12 +15,9 @@ from photogram.plots.picture_data import Correlated, Curve, Curves, Plan
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
 from photogram.results.picture_data import PicturedNetwork
 
-BEYOND = 1.1
-"""How far curves of distortion go on, of the largest observed radius."""
-ROWS = 51
-"""Radii of a curve."""
-SHOWN = 60
-"""Photos whose own curves are drawn at most."""
+BEYOND = 1.1  # How far curves of distortion go on, of the largest observed radius
+ROWS = 51  # Radii of a curve
+SHOWN = 60  # Photos whose own curves are drawn at most
 
 
 class PicturedCollection(PicturedNetwork):

@@ -14,12 +14,9 @@ from photogram.words import phrase
 
 __all__ = ["Simulation", "simulate", "simulate_turntable"]
 
-DISTANCE = 10.0
-"""Of the photos from the centre of the cloud."""
-SIZE = 4.0
-"""Side of the cloud, a cube."""
-FIELD = 400.0
-"""Image radius of the object on a turntable, pixels."""
+DISTANCE = 10.0  # Of the photos from the centre of the cloud
+SIZE = 4.0  # Side of the cloud, a cube
+FIELD = 400.0  # Image radius of the object on a turntable, pixels
 
 
 @dataclass(frozen=True, eq=False)

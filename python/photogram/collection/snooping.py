@@ -1,4 +1,4 @@
-"""Data snooping of a collection: gross errors found one after the other and taken out."""
+"""Data snooping of a collection, and its check: that of its block."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
 from photogram.collection.as_block import as_block
-from photogram.collection.collection import Collection
+from photogram.collection.collection import POSE, Collection
 from photogram.collection.core_arrays import collection_network, collection_trial
 from photogram.collection.findings import collection_held
-from photogram.collection.result import POSE, AdjustedCollection
+from photogram.collection.result import AdjustedCollection
+from photogram.diagnosis.diagnose import Manner, check_block
+from photogram.diagnosis.diagnosis import Diagnosis
+from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.subset import image_rows
@@ -33,8 +36,7 @@ from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import phrase
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
-FAR = 5.0
-"""Robust standard deviations from which on an image is out at first, after a robust adjustment."""
+FAR = 5.0  # Robust standard deviations from which on an image is out at first, after a robust adjustment
 BY_LOSSES = "a robust adjustment of the given values (Huber, then Cauchy)"
 
 
@@ -95,7 +97,7 @@ def snoop_collection(
 def _has_held(collection: Collection) -> bool:
     """Whether anything is held but the constants of a camera."""
     held = collection.photo_sd == 0
-    held[:, POSE:] &= ~held[:, POSE:].all(axis=0)
+    held[:, len(POSE) :] &= ~held[:, len(POSE) :].all(axis=0)
     return bool(held.any() or (collection.point_sd == 0).any())
 
 
@@ -145,3 +147,18 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
         point_sd=point_sd,
         **image_rows(given, images),
     )
+
+
+def check(network: Collection, threads: int | None) -> Diagnosis:
+    """Check a collection as its block, from where a robust adjustment brings it."""
+    section = Section("Start", "Values of a collection may be far off: a robust adjustment comes first.")
+    try:
+        adjusted = adjust(network, loss="huber", covariance=False, threads=threads)
+        network = network.replace(
+            photo_parameters=adjusted.photo_parameters, point_positions=adjusted.point_positions
+        )
+        section.figure("robust adjustment", adjusted.status)
+    except AdjustmentError as error:
+        section.remark(str(phrase("collection.no-robust-start", error=error)))
+    sections, result = check_block(as_block(network), Manner({"threads": threads}))
+    return Diagnosis("", [section, *sections], result)

@@ -49,8 +49,7 @@ MANY = 2  # Control points that do not fit, for control as a whole to be doubted
 
 EXCHANGED = "X and Y exchanged"
 
-Change = Callable[[Floats], Floats]
-"""Makes of (n, 3) coordinates as given those that were meant."""
+Change = Callable[[Floats], Floats]  # Makes of (n, 3) coordinates as given those that were meant
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,7 @@ _SCALES = 60  # with so many steps in between
 _EXPLAINED = 0.2  # e, what a regression leaves, at the most
 
 
-Change = Callable[[Block], Block]
-"""Makes of a block as given the one that was meant."""
+Change = Callable[[Block], Block]  # Makes of a block as given the one that was meant
 
 
 def turn_of(name: str) -> Floats:

@@ -61,8 +61,7 @@ from photogram.words import phrase
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 
 
-WHOLE = 950.0
-"""Bytes of an image point, with its share of its point and of the result, of a block adjusted as a whole."""
+WHOLE = 950.0  # Bytes of an image point, with its share of its point, of a block adjusted as a whole
 PARTS_A_WORKER = 4  # So that a slow worker does not hold the rest
 LEAST_PHOTOS = 20  # Of a part: smaller ones are all border
 

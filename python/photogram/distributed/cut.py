@@ -21,11 +21,9 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-UNKNOWNS = 6
-"""Of the pose of a photo."""
+UNKNOWNS = 6  # Of the pose of a photo
 SMALLEST = 8  # Photos of a piece that is a front of its own
-FORMATION, PAIR = 200.0, 108.0
-"""Multiply-adds for an image point, and for every two photos that share a point."""
+FORMATION, PAIR = 200.0, 108.0  # Multiply-adds of an image point, and of two photos that share a point
 WORD = 8.0  # Bytes of a number
 IMAGE_BYTES = 1300.0  # Of an image point with its share of its point, as it is read, formed and handed back
 

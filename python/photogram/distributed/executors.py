@@ -33,11 +33,9 @@ SETTINGS = {
     "distributed.scheduler.work-stealing": False,
     # Arrow's own pool keeps what tables have taken.
     "distributed.nanny.environ.ARROW_DEFAULT_MEMORY_POOL": "system",
-}
-"""Of clusters that are started here."""
+}  # Of clusters that are started here
 LOOPBACK = "127.0.0.1"
-ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)
-"""Of a scheduler. Dask looks for other things in what is no address (scheduler files, plug-ins)."""
+ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)  # Other texts make Dask look for files
 
 
 class Executor(Protocol):

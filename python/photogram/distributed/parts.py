@@ -34,11 +34,9 @@ TABLES: dict[str, tuple[str, ...]] = {
     "photos": PHOTOS,
     "points": ("point_positions", "point_sd"),
     "images": IMAGES,
-}
-"""The arrays of a block that have a row for each photo, point or image."""
+}  # The arrays of a block that have a row for each photo, point or image
 SETTINGS = "part.json"
 IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for name in each))
-"""The fields of a block that are no settings."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,7 @@ __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
 
 IMAGE = 200.0  # Multiply-adds of the formation of an image point
 ITERATIONS = 4  # Formations of an adjustment from usual initial values
-SHARE = 0.8
-"""Of the memory of a worker, what it may hold: the rest is for messages under way and what lies between."""
+SHARE = 0.8  # Of the memory of a worker that nodes may fill: messages under way take the rest
 
 
 @dataclass(frozen=True)

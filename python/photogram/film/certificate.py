@@ -32,21 +32,17 @@ from photogram.film.marks import usual_places
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.show.page import Document
-from photogram.show.summary import Brief, Rows
 from photogram.statistics.findings import Findings
 from photogram.words import Phrase, phrase
 
 SD_DESIGN = 0.02
 SD_C = 0.003
 SD_PRINCIPAL_POINT = 0.003
-SD_UNKNOWN_POINT = 0.02
-"""Of an unknown principal point, or if distances alone determine the marks (mm)."""
-APART = 3.0
-"""Notable distance of the points of symmetry and autocollimation, in standard deviations."""
-PRINTED = 2e-3
-"""Largest difference of printed coefficients from the table of distortion, millimetres."""
+SD_UNKNOWN_POINT = 0.02  # Of an unknown principal point, or if distances alone determine the marks (mm)
+APART = 3.0  # Notable distance of the points of symmetry and autocollimation, in standard deviations
+PRINTED = 2e-3  # Largest difference of printed coefficients from the table of distortion, millimetres
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,12 +17,9 @@ from photogram.words import Phrase, phrase
 
 How = Literal["exchange", "sign", "digit", "lost or extra"]
 
-LIMIT = 0.010
-"""Largest difference of a distance from its coordinates, millimetres."""
-EXPLAINED = 0.0035
-"""Largest remaining difference if a change explains it, millimetres."""
-SAME = 1e-9
-"""Differences that are equal except for rounding, millimetres."""
+LIMIT = 0.010  # Largest difference of a distance from its coordinates, millimetres
+EXPLAINED = 0.0035  # Largest remaining difference if a change explains it, millimetres
+SAME = 1e-9  # Differences that are equal except for rounding, millimetres
 _LEADING_ZERO = re.compile(r"[-+]?0\d")
 
 

@@ -82,8 +82,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     return found
 
 
-REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")
-"""What coordinates of marks may refer to."""
+REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")  # What coordinates of marks may refer to
 
 
 class _Frame:

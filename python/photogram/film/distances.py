@@ -281,10 +281,8 @@ def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
     ]
 
 
-SINGULAR = 1e-9
-"""Least eigenvalue of a covariance that is not zero, in parts of the largest."""
-HELD = 1e-2
-"""Standard deviation of the frame in parts of the least one of the figure."""
+SINGULAR = 1e-9  # Least eigenvalue of a covariance that is not zero, in parts of the largest
+HELD = 1e-2  # Standard deviation of the frame in parts of the least one of the figure
 
 
 def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:

@@ -36,11 +36,9 @@ UNKNOWNS: dict[str, tuple[str, ...]] = {
     "projective": ("t1", "t2", "theta", "m", "b1", "b2", "g1", "g2"),
 }
 """Unknowns of each model."""
-FAR = 5.0
-"""Residuals on both sides beyond which marks are named wrongly, millimetres."""
+FAR = 5.0  # Residuals on both sides beyond which marks are named wrongly, millimetres
 _MAX_STEPS = 20
-_CONVERGED = 1e-12
-"""Largest step at convergence, in parts of the format."""
+_CONVERGED = 1e-12  # Largest step at convergence, in parts of the format
 
 
 @dataclass(frozen=True, eq=False)

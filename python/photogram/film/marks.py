@@ -100,12 +100,10 @@ def usual_places(camera_type: str) -> UsualPlaces | None:
     return next((found for name, found in _TYPES.items() if plain.endswith(name)), None)
 
 
-CHANCE = 1e-4
-"""Probability of a wrong choice among the eight."""
+CHANCE = 1e-4  # Probability of a wrong choice among the eight
 DECIDED = 2.0 * float(np.log(8.0 / CHANCE))
 """Difference of the weighted sums of squares of the second and the best choice that decides."""
-NEAR = 0.1
-"""Largest distance of a reading from its mark, in parts of the format."""
+NEAR = 0.1  # Largest distance of a reading from its mark, in parts of the format
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.film.certificate import Certificate
 
-MAX_AGE_YEARS = 3.0
-"""Cameras are calibrated again after as many years at most."""
+MAX_AGE_YEARS = 3.0  # Cameras are calibrated again after as many years at most
 _DAYS_OF_YEAR = 365.25
 
 

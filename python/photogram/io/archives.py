@@ -12,11 +12,9 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.words import phrase
 
-MAX_RATIO, SMALL = 250, 1 << 26
-"""Members of more bytes than the second are no larger than so many times their packed selves."""
+MAX_RATIO, SMALL = 250, 1 << 26  # Members above SMALL bytes have at most this ratio of sizes
 
 UNPACKABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, struct.error)
-"""The errors of archives that are damaged, or packed in other ways."""
 
 
 def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> None:

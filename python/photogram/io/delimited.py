@@ -96,7 +96,6 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
 
 
 _Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
-"""The record of a header, the columns as the file and as photogram call them, and the delimiter."""
 
 
 def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]) -> ColumnTable:

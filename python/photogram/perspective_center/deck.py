@@ -38,8 +38,7 @@ _NUMBERS = {
     float: re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[ED][+-]?\d+|[+-]\d+)?", re.ASCII),
 }
 _NAMES = {int: "whole number", float: "number"}
-_FIRST = 0x2500
-"""A ruler: characters that occur in no card and count its columns."""
+_FIRST = 0x2500  # A ruler: characters that occur in no card and count its columns
 
 
 @dataclass(frozen=True)

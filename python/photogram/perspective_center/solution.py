@@ -24,8 +24,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
-from photogram.show.methods import Judged
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief, Judged
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import externally_studentized, studentized_limit
 from photogram.statistics.reliability import ROUNDING, TESTABLE
@@ -35,20 +34,16 @@ __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "
 
 Weights = Literal["equal", "readings", "deviations"]
 
-MOST_CYCLES = 6
-"""Cycles of the program before it gives up."""
+MOST_CYCLES = 6  # Cycles of the program before it gives up
 STRICT_CYCLES = 50
 STRICT_FRACTION = 1e-9
 """Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real
 plate."""
 SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
 NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
-REPORT_ORDER = [3, 4, 5, 0, 1, 2]
-"""Omega, phi, kappa before X, Y, Z."""
-INTERIOR = ("c", "xp", "yp")
-"""Principal distance and principal point."""
-STEEPEST = 1e-10
-"""Ratio of singular values of scaled columns below which they are dependent."""
+REPORT_ORDER = [3, 4, 5, 0, 1, 2]  # Omega, phi, kappa before X, Y, Z
+INTERIOR = ("c", "xp", "yp")  # Principal distance and principal point
+STEEPEST = 1e-10  # Ratio of singular values of scaled columns below which they are dependent
 
 
 @dataclass(frozen=True, eq=False)

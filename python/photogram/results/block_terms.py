@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.network.motion import scanners
 from photogram.results.axes import TURNS, Determined, Terms, image_axes, point_axes
-from photogram.results.result import Result
 from photogram.show.quantity import Quantity
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 def block_terms(result: Result) -> Terms:

@@ -26,8 +26,7 @@ from photogram.network.unadjusted import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.selection import Adjusted, Selection
-from photogram.show.methods import Documented, Judged
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
 

@@ -70,8 +70,7 @@ class _Pattern:
     statistic: str
     value: Callable[[Floats], float]
     """Of (m, 2) residuals ~v."""
-    least: bool = False
-    """Whether small values are the pattern."""
+    least: bool = False  # Whether small values are the pattern
 
 
 def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[DrawnPattern]:

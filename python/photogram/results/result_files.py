@@ -181,7 +181,7 @@ class Saved:
             return _photocore.BlockState(unknowns.tolist(), *rest)
         except (TypeError, ValueError) as error:
             raise InputError(
-                phrase("error.content", content="the state of an adjustment", reason=str(error)),
+                phrase("error.content", content="state of an adjustment", reason=str(error)),
                 file=self.folder / SUMMARY,
             ) from None
 

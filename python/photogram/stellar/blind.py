@@ -25,8 +25,7 @@ from photogram.words import Phrase, phrase
 
 ATTITUDE_ERROR, FIELD_ERROR = math.radians(1.5), 0.05
 """Largest errors of attitudes (radians) and of the principal distance (a share)."""
-_STEP = 1.3
-"""Ratio of consecutive fields of view; each covers half of the distance to the next."""
+_STEP = 1.3  # Ratio of consecutive fields of view; each covers half of the distance to the next
 _MAX_IMAGES = 200
 _TIMEOUT_MS = 5000
 _MAGNITUDES = (6.0, 9.0)

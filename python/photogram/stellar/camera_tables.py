@@ -15,11 +15,9 @@ from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
 from photogram.words import Phrase, phrase
 
-CORRELATED = 0.95
-"""Correlations above this are remarked on."""
+CORRELATED = 0.95  # Correlations above this are remarked on
 
-Unit = tuple[str, str, float]
-"""The unit of values, the unit that people read, and the factor between them."""
+Unit = tuple[str, str, float]  # The unit of values, the unit that people read, and the factor between them
 MM, UM_OF_M, UM = ("m", "mm", 1e3), ("m", "um", 1e6), ("um", "um", 1.0)
 SECONDS, ARC_SECONDS = ("s", "s", 1.0), ("arcsec", "arcsec", 1.0)
 ARCSEC_OF_RAD = ("rad", "arcsec", 1 / ARCSEC)

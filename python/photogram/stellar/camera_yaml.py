@@ -13,16 +13,14 @@ from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.words import phrase
 
-YamlForm = Literal["opencv", "ros"]
-"""What the file is for."""
+YamlForm = Literal["opencv", "ros"]  # What the file is for
 
 _BROWN = ("k1", "k2", "p1", "p2", "k3")
 _FISHEYE = ("k1", "k2", "k3", "k4")
 _ROS = {"plumb_bob": _BROWN, "equidistant": _FISHEYE}
 _LENSES = {"brown": ("plumb_bob", _BROWN), "kannala_brandt": ("equidistant", _FISHEYE)}
 _LENSES["equidistant"] = _LENSES["kannala_brandt"]
-WITH_YAML = frozenset(_LENSES)
-"""Lenses that have a form in YAML."""
+WITH_YAML = frozenset(_LENSES)  # Lenses that have a form in YAML
 _MATRIX = ("camera_matrix", "Camera_Matrix", "K")
 _DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
 

@@ -28,8 +28,7 @@ from photogram.stellar.places import Earth
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
-LEVEL = 0.05
-"""Probability that any exposure of a good night fails a test of all exposures."""
+LEVEL = 0.05  # Probability that any exposure of a good night fails a test of all exposures
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +101,8 @@ def _about_mean(angles: Floats, covariance: Floats, chosen: list[int]) -> float:
     return float(off @ weight @ off)
 
 
-NOTABLE = 2.0
-"""Exposures whose residuals are larger than the others foretell by less are only not as sharp."""
-_INVISIBLE = 1e-6
-"""Share of the information about a direction below which the others do not determine it."""
+NOTABLE = 2.0  # Exposures whose residuals are larger than the others foretell by less are only not as sharp
+_INVISIBLE = 1e-6  # Share of the information about a direction below which the others do not determine it
 _ATTITUDE = 3
 
 

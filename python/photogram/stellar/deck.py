@@ -87,8 +87,7 @@ class Cards:
 
 _DEGREE = np.pi / 180.0
 _HOUR = np.pi / 12.0
-_FULL = 52
-"""Cards of a full weight matrix of 22 parameters: every row starts a card."""
+_FULL = 52  # Cards of a full weight matrix of 22 parameters: every row starts a card
 _MAX_STARS, _MAX_POINTS, _FIRST_POINT = 100, 200, 10000
 _HEAD = (
     "card 1 (problem number)",

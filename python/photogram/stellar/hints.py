@@ -24,8 +24,7 @@ _MAX_EXPOSURES = 3
 _SCALES = tuple(1.1**k for k in range(-6, 7) if k)
 """Principal distances over the given one; each covers half of the distance to the next."""
 _WIDE = 0.05
-_HOUR = math.tau / 24 * 1.00273790935
-"""Rotation of the Earth against the stars, radians."""
+_HOUR = math.tau / 24 * 1.00273790935  # Rotation of the Earth against the stars, radians
 
 Mend = Callable[[Exposure, "Night"], tuple[Exposure, "Night"]]
 

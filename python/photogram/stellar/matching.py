@@ -12,18 +12,13 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-_SEEDS = 25
-"""Brightest images that make hypotheses; three times as many support them."""
-_EXACT = 20
-"""Hypotheses with the most support, which are counted exactly."""
+_SEEDS = 25  # Brightest images that make hypotheses; three times as many support them
+_EXACT = 20  # Hypotheses with the most support, which are counted exactly
 _CANDIDATES, _TURNED = 1500, 800
 """Largest numbers of pairs of an image and a star that make hypotheses, with known and unknown roll."""
-_DEEPER = 2
-"""Stars in the frame for each image; fainter ones of the catalogue would match by chance only."""
-FEWEST = 3
-"""Images, and stars, that a match requires."""
-STRETCH = 0.01
-"""Largest error of the scale of the approximate camera, as a share."""
+_DEEPER = 2  # Stars in the frame for each image; fainter ones of the catalogue would match by chance only
+FEWEST = 3  # Images, and stars, that a match requires
+STRETCH = 0.01  # Largest error of the scale of the approximate camera, as a share
 
 
 @dataclass(frozen=True, eq=False)

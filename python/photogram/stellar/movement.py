@@ -45,10 +45,8 @@ class FictitiousPoint:
     covariance: Floats  # (2, 2) of the place by the orientation, radians squared
 
 
-_DIAGONAL = np.arange(9) * 0.01
-"""x = y of the fictitious points, metres."""
-PAIRS = ((0, 1), (1, 2), (0, 2))
-"""Post minus pre, event minus post, event minus pre."""
+_DIAGONAL = np.arange(9) * 0.01  # x = y of the fictitious points, metres
+PAIRS = ((0, 1), (1, 2), (0, 2))  # Post minus pre, event minus post, event minus pre
 
 
 def movement(result: Result) -> tuple[Movement, ...]:

@@ -32,8 +32,7 @@ from photogram.words import Phrase, phrase
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
 
-_MAX_FIELDS = 200
-"""Fields of view that are tried if images name their stars."""
+_MAX_FIELDS = 200  # Fields of view that are tried if images name their stars
 _MAX_ROUNDS = 10
 
 

@@ -33,8 +33,7 @@ from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 
-AUTO = "auto"
-"""The name of a lens that the data choose."""
+AUTO = "auto"  # The name of a lens that the data choose
 
 
 _TABLES = {
@@ -80,12 +79,9 @@ _ALIASES = {
     "star": ("hip",),
 }
 """Headings of photutils and SExtractor."""
-_LARGEST_FRAME = 1e6
-"""Pixels."""
-_SHORTEST = 0.1
-"""Principal distance over the longer side of the frame: 157 degrees of a central perspective."""
-_LARGEST_DUT1 = 1.0
-"""Seconds; leap seconds keep UT1 - UTC within 0.9."""
+_LARGEST_FRAME = 1e6  # Pixels
+_SHORTEST = 0.1  # Principal distance over the longer side of the frame: 157 degrees of a central perspective
+_LARGEST_DUT1 = 1.0  # Seconds; leap seconds keep UT1 - UTC within 0.9
 
 
 def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None) -> Night:

@@ -27,8 +27,7 @@ from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase, phrase
 
 MAX_REJECTION_ROUNDS = 20
-_REACH = 3.0
-"""Distance in pixels within which the star of an image is searched for at least."""
+_REACH = 3.0  # Distance in pixels within which the star of an image is searched for at least
 _NOTABLE_ERROR = 2.0
 """Multiple of the error of approximate attitudes that is remarked on: they were compared by another lens."""
 

@@ -12,10 +12,8 @@ from photogram.words import phrase
 
 __all__ = ["Options"]
 
-_DAYS = 20 * math.pi
-"""A time of ten days, in radians."""
-_STEPS = 10_000
-"""Rows of the table of a curve at most."""
+_DAYS = 20 * math.pi  # A time of ten days, in radians
+_STEPS = 10_000  # Rows of the table of a curve at most
 
 
 def core_threads(threads: int | None) -> int:

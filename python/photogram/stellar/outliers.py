@@ -18,8 +18,7 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
-_FALL = 10.0
-"""Least ratio by which the sum of squares falls without the star that spoils a solution."""
+_FALL = 10.0  # Least ratio by which the sum of squares falls without the star that spoils a solution
 _MAX_ROUNDS = 10
 _MAX_SUSPECTS = 12
 

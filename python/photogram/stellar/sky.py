@@ -23,16 +23,11 @@ ABERRATION = 0.320 * ARCSEC
 """Constant of diurnal aberration at the equator as the report has it, in radians; 0.3192 arcsec is nearer."""
 
 
-TEMPERATURES = (150.0, 350.0)
-"""Air on the ground in kelvin: -123 to 77 degrees Celsius."""
-HIGHEST_PRESSURE = 850.0
-"""Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone."""
-HECTOPASCAL = 1013.25 / 760.0
-"""Of a millimetre of mercury."""
-HOUR = 0.0
-"""Sidereal time of all images of a landmark, radians: it does not turn with the sky."""
-_STEP = 1e-6
-"""Of the differences that transform weights, radians."""
+TEMPERATURES = (150.0, 350.0)  # Air on the ground in kelvin: -123 to 77 degrees Celsius
+HIGHEST_PRESSURE = 850.0  # Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone
+HECTOPASCAL = 1013.25 / 760.0  # Of a millimetre of mercury
+HOUR = 0.0  # Sidereal time of all images of a landmark, radians: it does not turn with the sky
+_STEP = 1e-6  # Of the differences that transform weights, radians
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,7 @@ from photogram.words import Phrase, phrase
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
-_PER_IMAGE = 2000
-"""Bytes of memory that an image takes."""
+_PER_IMAGE = 2000  # Bytes of memory that an image takes
 
 
 @dataclass(frozen=True, eq=False)

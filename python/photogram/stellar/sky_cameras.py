@@ -64,8 +64,7 @@ def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
     return np.array([value.number() for value in values]), covariance
 
 
-_EQUAL = 1e-4
-"""Pixels by which fy may differ from fx in blocks, if the two were one parameter."""
+_EQUAL = 1e-4  # Pixels by which fy may differ from fx in blocks, if the two were one parameter
 _KINDS = ("brown camera", "sky camera")
 
 

@@ -14,13 +14,11 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.problem import Problem, degrees_of_freedom, failure
 from photogram.stellar.state import Level, Solved
 
-_EXPECTED = 1e-6
-"""Initial mean error of a direction, radians."""
+_EXPECTED = 1e-6  # Initial mean error of a direction, radians
 _ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
 """Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
 _MAX_ITERATIONS, _MORE = 100, 5
-_FIRST, _NEXT = 25, 8
-"""Iterations before the sum of squares is tested, and between tests."""
+_FIRST, _NEXT = 25, 8  # Iterations before the sum of squares is tested, and between tests
 _STILL = 1e-6
 """Negligible change of the sum of squares, in units of the squared mean error of unit weight: its root is the
 distance of unknowns from the smallest sum, in mean errors."""

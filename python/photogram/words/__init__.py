@@ -28,11 +28,9 @@ from typing import Any
 
 from photogram.lazy_dataclasses import dataclass, field
 
-MAX_NAMES = 12
-"""Names that a list has at most."""
+MAX_NAMES = 12  # Names that a list has at most
 
-MAX_QUOTED = 40
-"""Characters of a field that a message quotes at most."""
+MAX_QUOTED = 40  # Characters of a field that a message quotes at most
 
 _on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
 _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
@@ -86,8 +84,7 @@ def option_sd(kind: str) -> Phrase:
     return Phrase("option.sd", {"kind": kind})
 
 
-OPTIONS_OF_CONTROL = (Phrase("option.control"), Phrase("option.datum"))
-"""Options that give control."""
+OPTIONS_OF_CONTROL = (Phrase("option.control"), Phrase("option.datum"))  # Options that give control
 
 
 @contextmanager

@@ -14,17 +14,15 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
-from photogram.collection.formats.format import Format
+from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
 from photogram.words import Phrase, phrase
 
-ROOM = 64
-"""Characters that a number and the white space after it take at the most, in the mean over a file."""
-HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3
-"""Numbers of the first line, of an image, of a photo, of a point."""
+ROOM = 64  # Characters that a number and the white space after it take at the most, in the mean over a file
+HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Numbers of the first line, of an image, of a photo, of a point
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:

@@ -17,7 +17,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.formats.format import Format
+from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
@@ -25,10 +25,8 @@ from photogram.words import Phrase, phrase
 
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
-COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4
-"""Numbers after the first line, of a camera, of a point with the number of its views, of a view."""
-ORTHONORMAL = 1e-6
-"""What R R^T may differ from the unit matrix."""
+COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4  # Numbers in a head, a camera, a point and a view
+ORTHONORMAL = 1e-6  # What R R^T may differ from the unit matrix
 
 
 class _Numbers:

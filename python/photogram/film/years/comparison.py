@@ -21,9 +21,8 @@ from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
-from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
@@ -33,10 +32,8 @@ NODES = 9  # radii, by Gauss and Legendre
 AZIMUTHS = 12
 STEP = 0.01  # of differences, in standard deviations
 UM = 1e3
-LEAST = 1e-4
-"""Least standard deviation of an estimated figure, in parts of the largest of the others."""
-ALONE = 1e-3
-"""Least part of the standard deviation of a figure that is independent of the figures before it."""
+LEAST = 1e-4  # Least standard deviation of an estimated figure, in parts of the largest of the others
+ALONE = 1e-3  # Least part of the standard deviation of a figure that is independent of the figures before it
 
 _RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
 """Coefficients of rho, rho^3, ...: R_1, which is rho, R_3, R_5, R_7."""

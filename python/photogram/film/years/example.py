@@ -11,8 +11,7 @@ from photogram.film.lens_table import RadialTable
 
 DAYS = ("1974-03-12", "1977-05-03", "1980-02-27", "1983-05-11", "1986-04-08", "1989-06-20")
 ANGLES = (7.5, 15.0, 22.7, 30.0, 35.0, 40.0)
-FOCAL_LENGTH, STEP = 152.375, 0.015
-"""Millimetres; the step before the fourth certificate is one of a repair."""
+FOCAL_LENGTH, STEP = 152.375, 0.015  # Millimetres; the step before the fourth certificate is one of a repair
 CURVE = (-3.1e-4, 3.8e-8, -1.0e-12)
 POINT = (0.004, -0.012)
 SD_READING, SD_FOCAL_LENGTH, SD_POINT = 1.5e-3, 0.003, 0.003

@@ -28,8 +28,8 @@ from photogram.formats.metadata.reference import is_reference, read_geo_txt, rea
 from photogram.formats.metadata.search import EXPOSURES, files_of, found_in
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted
-from photogram.show.sections import Section
-from photogram.show.summary import Brief
+from photogram.show.forms import TitledLines
+from photogram.show.methods import Brief
 from photogram.words import phrase
 
 WITHOUT = "without"
@@ -91,7 +91,7 @@ class Metadata(Brief):
         located = [each for each in self.photos.values() if each.position is not None]
         return counts(each.deviations for each in located)
 
-    def sections(self) -> list[Section]:
+    def sections(self) -> list[TitledLines]:
         """Return what was read as titled sections: for people."""
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]

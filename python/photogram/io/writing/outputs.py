@@ -30,12 +30,10 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-Content = bytes | Callable[[BinaryIO], None]
-"""What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
+Content = bytes | Callable[[BinaryIO], None]  # Bytes, or a function that writes them to a file
 
 PERMISSIONS = 0o777
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""The signals that ask a process to end."""
 
 
 class _Raw(io.RawIOBase):

@@ -20,11 +20,9 @@ if sys.platform != "win32":
 NAME = re.compile(r"\.photogram-([0-9a-f]{16})")
 LOCK = "lock"
 NEW = os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
-"""Exclusive creation: what is there already, a planted link too, is an error."""
 DIRECTORY = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
 TRIALS = 16
 UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EBADF)
-"""What file systems answer that cannot put a directory on the disk at a wish."""
 MARK_NAME = re.compile(r"photogram-incomplete-([0-9a-f]{16})\.txt")
 MARK_TEXT = """\
 The files named below belong together, and photogram was ended while it put them in place:

@@ -59,12 +59,10 @@ class Observation:
     """What its components are called: rotations are in radians, all others in the linear unit."""
     LOCAL: ClassVar[bool] = False
     """Whether in geographic space these are east, north and up."""
-    _PER: ClassVar[str] = ""
-    """What follows the units of its components: `/s` of rates."""
+    _PER: ClassVar[str] = ""  # What follows the units of its components: `/s` of rates
     MISSING: ClassVar[bool] = False
     """Whether NaN stands for components that were not observed."""
-    _POSITIVE: ClassVar[bool] = False
-    """Whether its first value, a length, must be positive."""
+    _POSITIVE: ClassVar[bool] = False  # Whether its first value, a length, must be positive
 
     points: tuple[str, ...] = field(init=False, repr=False)
     photos: tuple[str, ...] = field(init=False, repr=False)

@@ -29,10 +29,10 @@ from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import standards
 from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
+from photogram.show.methods import Brief, Rows
 from photogram.show.page import Document
 from photogram.show.quantity import records
 from photogram.show.run import InputFile
-from photogram.show.summary import Brief, Rows
 from photogram.words import Phrase, phrase
 
 __all__ = ["Statement", "statement"]

@@ -37,8 +37,17 @@ from photogram.show.sketch.layout import (
 )
 from photogram.show.sketch.letters import Box, widest, width
 from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, stops
-from photogram.show.sketch.svg_contours import levels_written
-from photogram.show.sketch.svg_marks import Attributes, element, names, number, path, sample, svg, text
+from photogram.show.sketch.svg_marks import (
+    Attributes,
+    element,
+    levels_written,
+    names,
+    number,
+    path,
+    sample,
+    svg,
+    text,
+)
 from photogram.show.sketch.ticks import Ticks, ticks
 from photogram.show.style import FAINT, INK, SETTINGS
 
