@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from photogram.adjustment.adjustment import (
 )
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
-from photogram.collection.collection import Collection
 from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
 from photogram.messages import Message, Undetermined
 from photogram.network.core_arrays import CoreOptions
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import Collection
 
 __all__ = ["adjust", "adjusted"]
 

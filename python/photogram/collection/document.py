@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.results.axes import Determined, Terms, image_axes
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section

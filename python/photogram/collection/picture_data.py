@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.network.cameras import Camera
 from photogram.plots.picture_data import Correlated, Curve, Curves, Plan

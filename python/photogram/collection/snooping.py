@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.collection import POSE, Collection
 from photogram.collection.core_arrays import collection_network, collection_trial
 from photogram.collection.findings import collection_held
+from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.diagnosis.diagnose import Manner, check_block
 from photogram.diagnosis.diagnosis import Diagnosis
@@ -37,6 +37,9 @@ from photogram.statistics.snooping.starts import MEDIAN_OF_TWO
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import Collection
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0  # Robust standard deviations from which on an image is out at first, after a robust adjustment
