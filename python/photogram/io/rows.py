@@ -95,6 +95,14 @@ class Table:
             raise head.error(phrase("error.repeated", kind="column", name=twice[0]))
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
+    def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
+        """Return the table with columns named by the first of their aliases (small letters) that is there."""
+        names, lowered = list(self.columns), [name.casefold() for name in self.columns]
+        for column, others in aliases.items():
+            if column not in names and (own := next((each for each in others if each in lowered), None)):
+                names[lowered.index(own)] = column
+        return replace(self, columns=tuple(names))
+
     def require(self, *columns: str) -> None:
         """Reject a table without these columns."""
         there = set(self.columns)
@@ -135,11 +143,6 @@ def read_rows(
     `aliases` are headings of other programs, in small letters, for columns that are not there by their own
     names.
     """
-    table = Table.read(path, ragged=True)
-    names, lowered = list(table.columns), [name.casefold() for name in table.columns]
-    for column, others in aliases.items():
-        if column not in names and (own := next((each for each in others if each in lowered), None)):
-            names[lowered.index(own)] = column
-    table = replace(table, columns=tuple(names))
+    table = Table.read(path, ragged=True).renamed(aliases)
     table.require(*needed)
     return list(table.rows())
