@@ -14,9 +14,9 @@ from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import DatumName, Options, Project
 from photogram.results.block_files import KIND as BLOCK
-from photogram.results.block_files import read_block_result
 from photogram.results.result import Result
 from photogram.results.result_files import SUMMARY, read_summary
+from photogram.results.saved_block import read_block_result
 from photogram.words import phrase
 
 if TYPE_CHECKING:

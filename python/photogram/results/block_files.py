@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.parquet import Column, Repeated, Sheet
+from photogram.io.parquet import Column, Repeated
 from photogram.io.structure import Stand
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
@@ -25,8 +24,6 @@ from photogram.network.geometry import Spheroid
 from photogram.network.lens import Lens
 from photogram.network.motion import scanners
 from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Observation
-from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import (
@@ -39,13 +36,11 @@ from photogram.network.trajectories import (
     Table,
     Trajectory,
 )
-from photogram.network.unknowns import Unknown
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature, Features, Quantity
 from photogram.results.iteration import Iteration, Redundancies, SumsOfSquares
 from photogram.results.observation_kinds import ObservedKind
-from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -53,8 +48,6 @@ from photogram.results.result_files import (
     Part,
     image_parts,
     point_parts,
-    read_saved,
-    rows_of,
     sheet,
     written,
 )
@@ -227,7 +220,7 @@ CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline,
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
 
 
-_CLASSES = (
+VALUE_CLASSES = (
     AdjustedCamera,
     AdjustedUnknown,
     Film,
@@ -253,47 +246,3 @@ _CLASSES = (
     SumsOfSquares,
     Undetermined,
 )
-
-
-def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
-    saved = read_saved(
-        folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
-    )
-    given = saved.members("block", Block)
-    images, names = saved.sheets["images"], {}
-    for kind in ("photo", "point"):
-        sheet = saved.sheets[f"{kind}s"]
-        own = sheet.names(kind)
-        names[kind] = (
-            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
-        )
-        given[f"{kind}_ids"] = names[kind]
-        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
-    parts = parts_of_block(
-        geographic=given["spheroid"] is not None,
-        unit=given["linear_unit"],
-        image_unit=str(document["image_unit"]),
-        distances="principal_distance" in saved.sheets["photos"].columns,
-        observed=_observed(saved.sheets["photos"]),
-    )
-    own_arrays, block_arrays = saved.arrays(parts, "block")
-    block = Block(**given, **block_arrays)
-    members = saved.members("result", Result)
-    if block.timed or any(each.knot_unknowns for each in block.cameras):
-        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
-        pairs = zip(members["unknowns"], block.unknowns, strict=True)
-        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
-    return Result(**members, **own_arrays, block=block, state=saved.state())
-
-
-def _observed(photos: Sheet) -> list[str]:
-    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
-    return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
-
-
-def _below(base: type) -> Iterator[type]:
-    subclasses: list[type] = base.__subclasses__()
-    for each in subclasses:
-        yield each
-        yield from _below(each)

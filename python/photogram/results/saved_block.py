@@ -1,0 +1,66 @@
+"""The result of a block from the files of a folder (`docs/results.md`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.io.parquet import Sheet
+from photogram.network.block import Block
+from photogram.network.observations import Observation
+from photogram.network.passages import Passage
+from photogram.network.unknowns import Unknown
+from photogram.results.block_files import CLASSES, VALUE_CLASSES, parts_of_block
+from photogram.results.result import Result
+from photogram.results.result_files import (
+    read_saved,
+    rows_of,
+)
+
+
+def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
+    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
+    saved = read_saved(
+        folder, [*VALUE_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
+    )
+    given = saved.members("block", Block)
+    images, names = saved.sheets["images"], {}
+    for kind in ("photo", "point"):
+        sheet = saved.sheets[f"{kind}s"]
+        own = sheet.names(kind)
+        names[kind] = (
+            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
+        )
+        given[f"{kind}_ids"] = names[kind]
+        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
+    parts = parts_of_block(
+        geographic=given["spheroid"] is not None,
+        unit=given["linear_unit"],
+        image_unit=str(document["image_unit"]),
+        distances="principal_distance" in saved.sheets["photos"].columns,
+        observed=_observed(saved.sheets["photos"]),
+    )
+    own_arrays, block_arrays = saved.arrays(parts, "block")
+    block = Block(**given, **block_arrays)
+    members = saved.members("result", Result)
+    if block.timed or any(each.knot_unknowns for each in block.cameras):
+        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
+        pairs = zip(members["unknowns"], block.unknowns, strict=True)
+        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
+    return Result(**members, **own_arrays, block=block, state=saved.state())
+
+
+def _observed(photos: Sheet) -> list[str]:
+    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
+    return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
+
+
+def _below(base: type) -> Iterator[type]:
+    subclasses: list[type] = base.__subclasses__()
+    for each in subclasses:
+        yield each
+        yield from _below(each)
