@@ -124,7 +124,7 @@ def diagnose(
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
     if not len(block.image_xy):
-        raise argument_error("block", "missing", name="image observations")
+        raise argument_error("block", "no-images")
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):
