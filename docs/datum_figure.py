@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from views import svg
 
 from photogram.arguments.types import Floats
-from photogram.show.pictures import new_figure, round_length
+from photogram.show.style import new_figure, round_length
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from free_network import in_three_datums

@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from views import svg
 
-from photogram.show.pictures import new_figure
+from photogram.show.style import new_figure
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from line_scanner import measured

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from views import BLUE, LIGHT, svg
 
 from photogram import adjust, simulate
-from photogram.show.pictures import new_figure
+from photogram.show.style import new_figure
 from photogram.statistics import lambda0
 
 FIGURE = Path(__file__).with_name("redundancy.svg")

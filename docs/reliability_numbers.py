@@ -22,7 +22,7 @@ COMMANDS: dict[str, list[str]] = {
     "fuzz": [sys.executable, "-m", "tests.fuzz", "--inputs", "1000000", "--seed", "14"],
     "blocks": [sys.executable, "-m", "tests.fuzz.dense", "--blocks", "8000", "--seed", "12"],
     "nist": ["cargo", "test", "--release", "--package", "photocore", "--test", "nist", "--", "--nocapture"],
-    "stars": [sys.executable, "benches/star_nights.py", "30"],
+    "stars": [sys.executable, "benches/star_nights.py", "120"],
 }
 OWN = ("fuzz", "blocks", "growth")
 """Commands that write their section themselves."""

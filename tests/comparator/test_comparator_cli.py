@@ -307,5 +307,5 @@ def test_tables_of_one_calibration_may_not_contradict(run, tables):
 
 
 def test_the_numbers_of_the_page_are_those_of_the_command():
-    command = [sys.executable, str(ROOT / "docs" / "regenerate.py"), "--check", "comparators.md"]
+    command = [sys.executable, str(ROOT / "docs" / "regenerate.py"), "--check", "comparator.md"]
     assert subprocess.run(command, check=False).returncode == 0

@@ -119,7 +119,7 @@ def test_features_are_refused(project, tmp_path):
     shutil.copytree(project, folder)
     with (folder / "project.toml").open("a") as file:
         file.write('[features]\nd = { distance = ["a", "b"] }\n')
-    with pytest.raises(InputError, match=r"\[features\] take joint covariances"):
+    with pytest.raises(InputError, match=r"\[features\] require joint covariances"):
         Streamed(folder, Wishes(), tmp_path / "parts")
 
 
@@ -130,7 +130,7 @@ def test_a_free_project_is_refused_before_its_images_are_read(tmp_path):
         block.replace(observations=[], point_sd=free, photo_position_sd=np.inf),
         tmp_path / "free",
     )
-    with pytest.raises(InputError, match=r"nothing gives the block a datum .* photogram\.adjust_in_parts\("):
+    with pytest.raises(InputError, match=r"the block has no datum .* photogram\.adjust_in_parts\("):
         Streamed(project, Wishes(), tmp_path / "parts")
 
 

@@ -99,7 +99,7 @@ def test_rotations_that_are_the_other_way_round_are_found(tmp_path):
             "0.598950838367",
             ["orientation.ori", "record 1", "format.rotation"],
         ),
-        ("control.con", "-22.15520", "x", ["control.con", "record 1", "X: 'x'"]),
+        ("control.con", "-22.15520", "x", ["control.con", "record 1", "X: must be a number, got 'x'"]),
     ],
 )
 def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):

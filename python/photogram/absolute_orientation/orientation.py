@@ -13,9 +13,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
-from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE

@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
-from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names, Panel, around
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import INK, PURPLE, VERMILION
+from photogram.show.style import INK, PURPLE, VERMILION, round_length
 
 LONGEST_RESIDUAL = 0.12  # As a part of the larger side of the plan
 

@@ -22,9 +22,8 @@ from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Part, Remarks, Section
-from photogram.show.summary import Brief
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
 

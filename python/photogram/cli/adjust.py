@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
+    from photogram.show.forms import TitledLines
     from photogram.show.page import Section as Chapter
-    from photogram.show.sections import Section
     from photogram.words import Phrase
 
 
@@ -115,7 +115,7 @@ def _finish(
     removed: Snooped | None,
     target: Path,
     documents: Documents,
-    sections: list[Section],
+    sections: list[TitledLines],
     stated: Statement | None,
     *,
     strict: bool,
@@ -321,7 +321,7 @@ def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
     return MinimumConstraints() if name == "minimum" else None
 
 
-def _files(project: Project, result: Result, report: str, sections: list[Section]) -> dict[str, bytes]:
+def _files(project: Project, result: Result, report: str, sections: list[TitledLines]) -> dict[str, bytes]:
     """Return all files of the output folder."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files

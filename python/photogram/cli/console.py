@@ -16,8 +16,8 @@ from photogram.messages import printable
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
+    from photogram.show.forms import TitledLines
     from photogram.show.page import Document
-    from photogram.show.sections import Section
 
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
@@ -50,7 +50,7 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
 
 
-def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) -> None:
+def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN) -> None:
     """Print titled sections with at most `most` lines each; `whole` names the file with all lines."""
     for title, lines in summary:
         if not lines:

@@ -19,8 +19,8 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.results.network import AdjustedNetwork
+    from photogram.show.forms import TitledLines
     from photogram.show.page import Document, Drawing
-    from photogram.show.sections import Section
     from photogram.show.sketch.plot import Plot
 
 TEXT, HTML = "report.txt", "report.html"
@@ -158,7 +158,7 @@ class Documents:
         *,
         text: bool = True,
         more: dict[Path, bytes] | None = None,
-        above: Iterable[Section] = (),
+        above: Iterable[TitledLines] = (),
         tables: Sequence[str] = (),
         code: int | None = None,
     ) -> None:

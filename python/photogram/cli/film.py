@@ -17,7 +17,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
-    from photogram.show.sections import Section
+    from photogram.show.forms import TitledLines
 
 EXAMPLE = ("archive",)  # The packaged example, in photogram.examples
 
@@ -90,7 +90,7 @@ def marks(
     job.finish(written, summary=lambda: print_sections(told, "--out DIR"))
 
 
-def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], list[Section]]:
+def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], list[TitledLines]]:
     """Return tables of the marks of MicMac from its files, and remarks."""
     from photogram.formats.micmac import read_marks
     from photogram.io.csv_text import csv_text

@@ -14,7 +14,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.formats import Project
-    from photogram.show.sections import Section
+    from photogram.show.forms import TitledLines
 
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
@@ -43,7 +43,7 @@ def info(
     )
 
 
-def _asked(project: Project) -> list[Section]:
+def _asked(project: Project) -> list[TitledLines]:
     """Return a line on the requested accuracy statement, if any."""
     if not project.statement:
         return []

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from photogram import Block
     from photogram.arguments.types import Indices
     from photogram.formats import Project
-    from photogram.show.sections import Section
+    from photogram.show.forms import TitledLines
 
 EXAMPLE = ("project",)  # The packaged example, a directory of photogram.examples
 
@@ -125,7 +125,7 @@ def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
     return x, y, z, sd
 
 
-def described(project: Project) -> list[Section]:
+def described(project: Project) -> list[TitledLines]:
     """Return a description of a project as titled sections."""
     import numpy as np
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.formats import Project
     from photogram.results.statement.statement import Statement
-    from photogram.show.sections import Section
+    from photogram.show.forms import TitledLines
 
 
 @with_job
@@ -56,7 +56,7 @@ def statement(
     job.finish(files, summary=lambda: print_sections(_summary(found), "statement.json"), code=found.exit)
 
 
-def _summary(found: Statement) -> list[Section]:
+def _summary(found: Statement) -> list[TitledLines]:
     """Return the lines for the screen: the first lines of the page."""
     return [
         (found.texts("page.what"), [found.headline]),

@@ -12,12 +12,13 @@ from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation
 from photogram.network.tables import numbered
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -28,12 +29,7 @@ if TYPE_CHECKING:
     from photogram.results.grouping import Grouping, Observables
     from photogram.statistics.snooping.taking_out import Settings
 
-__all__ = ["PARAMETERS", "Collection"]
-
-
-POSE = ("w1", "w2", "w3", "t1", "t2", "t3")  # Of a photo: angle-axis vector w (rad) and translation t
-PARAMETERS = (*POSE, "f", "k1", "k2")
-"""Of a photo with the camera of "Bundle Adjustment in the Large": also focal length f (pixels), k1, k2."""
+__all__ = ["Collection"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,17 +161,10 @@ class Collection(Valued, Brief):
     def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return dict(_photocore.camera_models())[self.camera]
 
-    @staticmethod
-    def parameters_of(camera: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return names and units of the k parameters of a photo with a camera of this model."""
-        powers = dict(_photocore.camera_models())[camera][1]
-        units = ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for _, power in powers)
-        return (*POSE, *(name for name, _ in powers)), units
-
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
-        return self.parameters_of(self.camera)[0]
+        return parameters_of(self.camera)[0]
 
     @property
     def _constant(self) -> NDArray[np.bool_]:
@@ -185,7 +174,7 @@ class Collection(Valued, Brief):
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
-        return self.parameters_of(self.camera)[1]
+        return parameters_of(self.camera)[1]
 
     @property
     def formula(self) -> str:
@@ -197,14 +186,28 @@ class Collection(Valued, Brief):
         return replace(self, **changes)
 
     def _observables(self) -> Observables:
-        from photogram.collection.components import collection_observables
+        from photogram.results.grouping import Observables
 
-        return collection_observables(self)
+        photos, width = self.photo_parameters.shape
+        return Observables(
+            given=self,
+            photo_cameras=np.arange(photos),
+            camera_names=self.photo_ids,
+            strips=lambda: [np.arange(photos)],
+            point_classes=np.where(np.isfinite(self.point_sd).any(axis=1), "control", "pass"),
+            # The core has parameters of cameras apart; they keep their weights.
+            photo_observed=(self.photo_sd > 0) & np.isfinite(self.photo_sd) & (np.arange(width) < len(POSE)),
+            stations=("rotations",) * 3 + ("translations",) * 3 + ("cameras",) * (width - len(POSE)),
+            commons=0,
+        )
 
     def _scaled(self, grouping: Grouping, factors: Floats) -> Collection:
-        from photogram.collection.components import scaled_collection
-
-        return scaled_collection(self, grouping, factors)
+        roots = np.sqrt(factors)
+        return self.replace(
+            image_sd=self.image_sd * grouping.factors(roots, grouping.images),
+            point_sd=self.point_sd * grouping.factors(roots, grouping.points),
+            photo_sd=self.photo_sd * grouping.factors(roots, grouping.photos),
+        )
 
     def _adjust(self, **options: Any) -> AdjustedCollection:
         from photogram.collection.adjust import adjust
@@ -222,7 +225,7 @@ class Collection(Valued, Brief):
         return snoop_collection(self, settings, **options)
 
     def _check(self, threads: int | None) -> Diagnosis:
-        from photogram.collection.checking import check
+        from photogram.collection.snooping import check
 
         return check(self, threads)
 

@@ -6,9 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram import _photocore
+from photogram.collection.parameters import POSE
+from photogram.results.axes import Determined, Terms, image_axes
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section
 from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.quantity import Axis, Quantity
 
 if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
@@ -17,18 +21,6 @@ if TYPE_CHECKING:
 @np.errstate(over="ignore", invalid="ignore")
 def collection_document(result: AdjustedCollection) -> Document:
     """Return the document of an adjusted collection."""
-    pictures = drawings(result)
-    cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
-    return network_document(
-        result,
-        "Adjustment of a collection of photos",
-        _size_section(result),
-        [control_section(result), stations_section(result), cameras],
-        photos=int(np.count_nonzero(result.photo_images)),
-    )
-
-
-def _size_section(result: AdjustedCollection) -> Section:
     given, variance = result.collection, result.variance_of_unit_weight
     counts = {
         "photos": result.photo_images > 0,
@@ -48,15 +40,30 @@ def _size_section(result: AdjustedCollection) -> Section:
         Fact("Cost", significant(result.cost, 7)),
         Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
     ]
-    return size_section(result, size, more, good)
+    pictures = drawings(result)
+    cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
+    return network_document(
+        result,
+        "Adjustment of a collection of photos",
+        size_section(result, size, more, good),
+        [control_section(result), stations_section(result), cameras],
+        photos=int(np.count_nonzero(result.photo_images)),
+    )
 
 
 def collection_members(result: AdjustedCollection) -> dict[str, Any]:
     """Return the members of the JSON document of an adjusted collection."""
+    named = zip(result.collection.parameters[len(POSE) :], result.collection.units[len(POSE) :], strict=True)
+    lengths, plain = list[str](), list[str]()
+    for name, unit in named:
+        (lengths if unit else plain).append(name)
     return {
         **network_members(result),
         "units": {
-            **_units(result),
+            "w1, w2, w3": "rad",
+            "t1, t2, t3, position": "unit of the object space",
+            ", ".join([*lengths, "residual_px"]): "pixel",
+            **({", ".join(plain): "1"} if plain else {}),
             "covariance": "products of these",
             "operations": "multiply-adds, each time the phase is carried out",
             "seconds": "s",
@@ -79,14 +86,51 @@ def collection_members(result: AdjustedCollection) -> dict[str, Any]:
     }
 
 
-def _units(result: AdjustedCollection) -> dict[str, str]:
-    """Return the units of parameters, of positions and of residuals, what shares a unit together."""
-    names, units = result.collection.parameters[6:], result.collection.units[6:]
-    lengths = [name for name, unit in zip(names, units, strict=True) if unit]
-    plain = [name for name, unit in zip(names, units, strict=True) if not unit]
-    return {
-        "w1, w2, w3": "rad",
-        "t1, t2, t3, position": "unit of the object space",
-        ", ".join([*lengths, "residual_px"]): "pixel",
-        **({", ".join(plain): "1"} if plain else {}),
-    }
+def collection_terms(result: AdjustedCollection) -> Terms:
+    """Return names and components of photos, points and images of a collection."""
+    given = result.collection
+    named = zip(given.parameters, given.units, strict=True)
+    return Terms(
+        photos=np.arange(len(result.photo_parameters)),
+        points=np.arange(len(result.point_positions)),
+        photo_axes=tuple(Axis.of(name, unit, f"_{unit}".rstrip("_")) for name, unit in named),
+        point_axes=tuple(Axis.of(name, "") for name in "XYZ"),
+        image_axes=image_axes("px"),
+        photo_values=result.photo_parameters,
+        layers={"Rotations": slice(0, 3), "Translations": slice(3, 6), "Cameras": slice(6, None)},
+        parts={"parameters": slice(None)},
+        of_photos=(
+            Quantity(
+                result.photo_images,
+                name="images",
+                member="images",
+                about="number of images",
+                head="Images",
+                decimals=0,
+            ),
+        ),
+    )
+
+
+@np.errstate(invalid="ignore")
+def determined(result: AdjustedCollection) -> Determined:
+    """Turn w and t of P = R(w) X + t into the station and a turn about the axes of the photo.
+
+    In w and t a photo far from the origin would look badly determined, whatever sees it.
+    """
+    pose = len(POSE)
+    translations, cofactors = result.photo_parameters[:, 3:pose], result.photo_cofactors[:, :pose, :pose]
+    vectors = np.ascontiguousarray(result.photo_parameters[:, :3])
+    matrices, turns = _photocore.attitudes_from_numbers("rotation_vector_to_photo", vectors, np.eye(3))
+    # The station is -A t, and A becomes A (I + [rho]).
+    partials = np.zeros((len(vectors), pose, pose))
+    partials[:, :3, :3] = matrices @ np.cross(translations[:, np.newaxis, :], turns, axisb=1, axisc=1)
+    partials[:, :3, 3:] = -matrices
+    partials[:, 3:, :3] = turns
+    return Determined(
+        stations=-np.einsum("pij,pj->pi", matrices, translations),
+        points=result.point_positions,
+        poses=partials @ cofactors @ partials.transpose(0, 2, 1),
+        ranks=(np.diagonal(cofactors, axis1=1, axis2=2) > 0).sum(axis=1),
+        point_cofactors=result.point_cofactors,
+    )

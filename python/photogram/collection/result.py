@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import Collection
 from photogram.collection.core_arrays import collection_network, collection_trial, named
+from photogram.collection.parameters import POSE
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.covariance import Failure
+from photogram.results.covariance import Adjusted, Failure, Things
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram import _photocore
+    from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from photogram.statistics.findings import Findings
 
 __all__ = ["AdjustedCollection"]
-
-POSE = 6  # Parameters of a photo that are no camera's
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -131,7 +129,20 @@ class AdjustedCollection(AdjustedNetwork):
         return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
     def _adjusted(self) -> Adjusted:
-        return _selectable(self)
+        names, photos, points = self.collection.parameters, self.given.photo_ids, self.given.point_ids
+        values, sd, count = self.photo_parameters, self.photo_sd, len(photos)
+        pose, camera = slice(0, len(POSE)), slice(len(POSE), None)
+        places = [("X", "Y", "Z")] * len(points)
+        return Adjusted(
+            network="collection",
+            things={
+                "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
+                "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),
+                "camera": Things(photos, [names[camera]] * count, values[:, camera], sd[:, camera]),
+                "point": Things(points, places, self.point_positions, self.point_sd),
+            },
+            numbered=True,
+        )
 
     def _refused(self, error: Failure) -> Exception:
         return named(*error.args)
@@ -140,12 +151,12 @@ class AdjustedCollection(AdjustedNetwork):
         return collection_network(self.collection, self.options)
 
     def _terms(self) -> Terms:
-        from photogram.collection.tables import collection_terms
+        from photogram.collection.document import collection_terms
 
         return collection_terms(self)
 
     def _determined(self) -> Determined:
-        from photogram.collection.tables import determined
+        from photogram.collection.document import determined
 
         return determined(self)
 
@@ -165,21 +176,3 @@ class AdjustedCollection(AdjustedNetwork):
             self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
         )
         return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
-
-
-def _selectable(result: AdjustedCollection) -> Adjusted:
-    """Return the adjusted values of a collection by kinds and numbers."""
-    names, photos, points = result.collection.parameters, result.given.photo_ids, result.given.point_ids
-    values, sd, count = result.photo_parameters, result.photo_sd, len(photos)
-    pose, camera = slice(0, POSE), slice(POSE, None)
-    places = [("X", "Y", "Z")] * len(points)
-    return Adjusted(
-        network="collection",
-        things={
-            "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
-            "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),
-            "camera": Things(photos, [names[camera]] * count, values[:, camera], sd[:, camera]),
-            "point": Things(points, places, result.point_positions, result.point_sd),
-        },
-        numbered=True,
-    )

@@ -1,4 +1,4 @@
-"""The result of a collection as files of a folder; photos and points are numbers from 0."""
+"""The result of a collection in the files of a folder; photos and points are numbers from 0."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from photogram.results.result_files import (
 if TYPE_CHECKING:
     from photogram.collection import AdjustedCollection
 
+
 KIND = "collection"
 _AXES = ("x", "y", "z")
-_TABLES = {"control": "control", "stations": "station"}
-"""Tables for people, and the kind that each is in `collection.tables`."""
+_TABLES = {"control": "control", "stations": "station"}  # Tables of files, with their kinds
 
 
 def collection_files(result: AdjustedCollection) -> dict[str, Content]:

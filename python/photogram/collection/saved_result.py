@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from photogram.collection.collection import Collection
+from photogram.collection.parameters import parameters_of
 from photogram.collection.result import AdjustedCollection
 from photogram.collection.result_files import collection_parts
 from photogram.messages import Message
@@ -24,7 +25,7 @@ def read_collection_result(folder: Path, document: Mapping[str, Any]) -> Adjuste
     images = saved.sheets["images"]
     for kind in ("photo", "point"):
         given[f"image_{kind}s"] = images.numbers(kind)
-    names, units = Collection.parameters_of(given["camera"])
+    names, units = parameters_of(given["camera"])
     own, arrays = saved.arrays(collection_parts(names, units), "collection")
     collection = Collection(**given, **arrays)
     return AdjustedCollection(

@@ -53,9 +53,8 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
-from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings
 from photogram.words import phrase
 

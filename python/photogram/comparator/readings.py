@@ -13,7 +13,7 @@ from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io.places import Place as Place
 from photogram.messages import Message, unknown_name
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief
 from photogram.words import Phrase, phrase
 
 # A reading this far from the others on its point was taken on another point, or is in another unit

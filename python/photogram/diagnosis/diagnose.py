@@ -50,8 +50,7 @@ from photogram.words import phrase
 
 __all__ = ["Manner", "check_block", "diagnose"]
 
-FINAL_STATIONS = 5.0
-"""Stations count as adjusted when half the residuals are below so many standard deviations."""
+FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # So many times the usual residual before the adjustment comes from coarse stations
 MOST_SETS = 5  # Mistakes in the control as a whole that are put right one upon the other, at the most
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from photogram.diagnosis.findings import Finding, Section
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented, Rows
 from photogram.show.page import Document
-from photogram.show.summary import Brief, Rows
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Rule, Verdict, as_phrase, fitting_rules
 from photogram.words import Phrase, phrase
 

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from photogram._photocore import ContributionRow, FormedNode, Node
     from photogram.distributed.nodes import CoreEngine
 
-GIVEN = "0"
-"""The state that the nodes themselves give."""
+GIVEN = "0"  # The state that the nodes themselves give
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,8 @@ from photogram.film.marks import usual_places
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.show.page import Document
-from photogram.show.summary import Brief, Rows
 from photogram.statistics.findings import Findings
 from photogram.words import Phrase, phrase
 

@@ -11,10 +11,9 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
 from photogram.show.judgement import judged, tests_section
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented, Rows
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
-from photogram.show.summary import Brief, Rows
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
 from photogram.results.features import Definition
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief
 from photogram.targets.board import Board
 from photogram.words import Phrase, option_sd, phrase
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.arguments.types import Bools
@@ -10,11 +12,12 @@ from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
-from photogram.giant.project import Project
 from photogram.words import Phrase, phrase
 
-"""As the 1987 program printed them."""
-CODES = np.array([1, 2, 4])
+if TYPE_CHECKING:
+    from photogram.giant import Project
+
+CODES = np.array([1, 2, 4])  # Types of control: the sum of the codes of its components
 
 
 class _GuideWords(Words):

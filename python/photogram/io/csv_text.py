@@ -10,8 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 
-_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
-"""What arrays of numbers and truth values are written from, by their kinds."""
+_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By kinds of arrays
 
 
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:

@@ -19,8 +19,7 @@ from photogram.words import Phrase, phrase
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),
     b"\x1f\x8b": lambda file: cast("BinaryIO", gzip.GzipFile(fileobj=file)),
-}
-"""How files that begin like this are unpacked piece by piece."""
+}  # How files that begin like this are unpacked piece by piece
 LONGEST = max(map(len, COMPRESSED))
 PIECE = 1 << 17  # Characters that are read at a time
 SHOWN = 120  # Characters of a faulty line that are shown

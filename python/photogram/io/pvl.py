@@ -23,7 +23,6 @@ class Quantity(NamedTuple):
 
 
 Value: TypeAlias = str | int | float | list["Value"] | Quantity
-"""What a key may have: a text, a number, a list (in parentheses or braces), any of them with a unit."""
 
 
 @dataclass
@@ -57,12 +56,10 @@ _TOKEN = re.compile(
 )
 _CONTINUED = re.compile(r"-\r?\n\s*")  # A hyphen at the end of a line: the text goes on without it
 _FOLDED = re.compile(r"\s*\n\s*")
-_WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")
-"""Whole numbers. What begins with zeros is a name that digits make up."""
+_WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")  # Zeros in front are part of a name
 _DECIMAL = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _BASED = re.compile(r"(2|8|16)#([-+]?[0-9A-Fa-f]{1,16})#")
 _PLAIN = re.compile(r"[^\s=(){},;\"'<>#/-](?:[^\s=(){},;\"'<>#/-]|/(?!\*)|-(?!$))*")
-"""Words that need no marks of quotation."""
 _DEEPEST = 32
 _OPENING = {"(": ")", "{": "}"}
 _BEGINS = {"group": "group", "begin_group": "group", "object": "object", "begin_object": "object"}

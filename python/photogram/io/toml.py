@@ -19,8 +19,7 @@ from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 MOST_DIGITS = 1000
-_ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
-"""Python rejects integers of thousands of digits without their line."""
+_ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")  # Python names no line of such integers
 
 
 class TomlFile:

@@ -8,8 +8,7 @@ from photogram.arguments.types import Floats
 
 TYPED_DECIMALS = 12  # Decimals that people type at most
 
-MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))
-"""Error of an angle that was computed from a rotation matrix, degrees."""
+MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))  # Of angles, degrees
 
 
 def scaled(values: Floats, factor: float) -> Floats:

@@ -43,7 +43,7 @@ from photogram.network.tables import (
 )
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
-from photogram.show.summary import Brief, Rows, few
+from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
 _NUMBERS: Any = None  # Names that are not given

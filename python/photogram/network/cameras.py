@@ -26,7 +26,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 Weights = Literal["corrected", "measured"]

@@ -11,9 +11,8 @@ from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Judgement
-from photogram.show.summary import Brief
 from photogram.words import phrase
 
 __all__ = ["Run", "Stop", "run_deck"]

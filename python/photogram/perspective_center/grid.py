@@ -11,7 +11,7 @@ from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief
 from photogram.words import phrase
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]

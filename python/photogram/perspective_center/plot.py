@@ -8,11 +8,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, band
+from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, Panel, around, band
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import INK, MARKED
+from photogram.show.style import INK, MARKED, round_length
 
 LONGEST_RESIDUAL = 0.12  # As a part of the extent of the grid
 SAME_RADIUS = 0.02  # Points have one mean if their radii differ by less than this part of the largest

@@ -7,13 +7,18 @@ from functools import partial
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.errors import PhotogramError
 from photogram.lazy_dataclasses import replace
 from photogram.planning.pattern import Pattern
-from photogram.planning.plot import plan_sketch
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
+from photogram.show.sketch.layout import labelled
+from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
 from photogram.words import Phrase, phrase
 
@@ -24,6 +29,9 @@ MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
 MOTION_UNITS = {"s": (1e-3, "ms"), "rad/s": (1e-3, "mrad/s"), "rad": (ARCSEC, "arcsec")}
+_PANEL_INCHES = 6.0  # Longer side of a panel
+_MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
+_KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
 def plan_document(patterns: Sequence[Pattern]) -> Document:
@@ -51,10 +59,10 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
             Section("network", "Plan of the network", [drawing] if new else []),
             _comparison_section(patterns),
             Section("size", "How much", [_size(patterns)]),
-            _layers("points", "New points", patterns, _shown_points, points),
+            _layers("points", "New points", patterns, _points, points),
             _layers("photos", "Photos", patterns, _photos),
             _layers("motion", "Motion", patterns, _motion),
-            _layers("control", "Control", patterns, _shown_control, control),
+            _layers("control", "Control", patterns, _control, control),
             remarks_section(_remarks(patterns)),
         ],
         details=[
@@ -94,7 +102,7 @@ def _pattern_members(pattern: Pattern) -> dict[str, object]:
         "image_count": int(pattern.result.used_images.sum()),
         "scale": pattern.scale,
         "unit": pattern.unit,
-        "points": records(_present(points_table(pattern)).columns),
+        "points": records(_points(pattern).columns),
         "photos": [vars(quality) for quality in pattern.photos],
         "control": records(_control(pattern).columns),
     }
@@ -123,20 +131,13 @@ def points_table(pattern: Pattern) -> Table:
     return Table("", pattern.name, columns)
 
 
-def _present(table: Table) -> Table:
-    count = next(column for column in table.columns if column.name == "points")
-    return replace(table, columns=chosen(table.columns, np.flatnonzero(count.values)))
+def _points(pattern: Pattern) -> Table:
+    table, groups = points_table(pattern), np.flatnonzero([group.points for group in pattern.points])
+    return replace(table, columns=chosen(table.columns, groups))
 
 
-def _shown_points(pattern: Pattern) -> Table | None:
-    return _present(points_table(pattern)) if pattern.new_points.any() else None
-
-
-def _multiples(pattern: Pattern) -> Table | None:
-    if not pattern.new_points.any():
-        return None
-    axes, points = tuple(Axis(axis) for axis in pattern.axes), _present(points_table(pattern))
-    group, rms, largest = (points.columns[k] for k in (1, 3, 4))
+def _multiples(pattern: Pattern) -> Table:
+    axes, (_, group, _, rms, largest, *_) = tuple(map(Axis, pattern.axes)), _points(pattern).columns
     columns = [
         replace(quantity, values=quantity.values / pattern.unit, axes=axes, kind="number", decimals=2)
         for quantity in (rms, largest)
@@ -161,7 +162,7 @@ def _photos(pattern: Pattern) -> Table:
     return Table("", pattern.name, columns)
 
 
-def _motion(pattern: Pattern) -> Table | None:
+def _motion(pattern: Pattern) -> Table:
     rows: list[tuple[str, float, float | None, float | None]] = []
     for quality in pattern.motion:
         factor, unit = MOTION_UNITS.get(quality.unit, (1.0, quality.unit))
@@ -171,14 +172,12 @@ def _motion(pattern: Pattern) -> Table | None:
     ):
         name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
         rows.append((name, sd, None, ratio))
-    if not rows:
-        return None
-    unknowns, rms, largest, ratios = zip(*rows, strict=True)
+    values = [[row[k] for row in rows] for k in range(4)]
     columns = [
-        Quantity(unknowns, kind="name", head="Unknown"),
-        Quantity(rms, head="rms sd"),
-        Quantity(largest, head="Largest sd"),
-        Quantity(ratios, head="Times better", decimals=2),
+        Quantity(values[0], kind="name", head="Unknown"),
+        Quantity(values[1], head="rms sd"),
+        Quantity(values[2], head="Largest sd"),
+        Quantity(values[3], head="Times better", decimals=2),
     ]
     return Table("", pattern.name, columns)
 
@@ -194,22 +193,14 @@ def _control(pattern: Pattern) -> Table:
         components("detectable", length, "deviation", head="Detectable"),
         components("effect", head="Effect in sd", decimals=1),
     ]
-    return Table("", pattern.name, columns)
-
-
-def _shown_control(pattern: Pattern) -> Table | None:
-    rows = np.flatnonzero([quality.held for quality in pattern.control])
-    return replace(_control(pattern), shown=rows) if rows.size else None
+    shown = np.flatnonzero([quality.held for quality in pattern.control])
+    return Table("", pattern.name, columns, shown=shown)
 
 
 def _layers(
-    key: str,
-    title: str,
-    patterns: Sequence[Pattern],
-    table: Callable[[Pattern], Table | None],
-    intro: str = "",
+    key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
-    tables = [made for pattern in patterns if (made := table(pattern)) is not None]
+    tables = [made for pattern in patterns if (made := table(pattern)).visible]
     return Section(key, title, layered_tables(key, tables), intro)
 
 
@@ -242,11 +233,7 @@ def _comparison_section(patterns: Sequence[Pattern]) -> Section:
         return Section("comparison", "Side by side", [])
     unit, axes = patterns[0].block.linear_unit, patterns[0].axes
     groups = [pattern.points[-1] for pattern in patterns]
-    sd = (
-        np.array([[group.rms_sd, group.max_sd] for group in groups])
-        .transpose(0, 2, 1)
-        .reshape(len(groups), -1)
-    )
+    sd = np.array([np.ravel([group.rms_sd, group.max_sd], order="F") for group in groups])
     least, most = sd.min(axis=0), sd.max(axis=0)
     names = [pattern.name for pattern in patterns]
     differ = most > 1.005 * least
@@ -317,3 +304,50 @@ def _remarks(patterns: Sequence[Pattern]) -> list[str]:
         text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
         for text, concerned in names.items()
     ]
+
+
+def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
+    """Return a picture with a panel for each pattern, in one scale of lengths and one of colours."""
+    heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
+    if heights.size == 0:
+        raise PhotogramError(phrase("plan.new-points"))
+    plan = np.vstack([pattern.point_plan[pattern.result.used_points] for pattern in patterns])
+    photos = np.vstack([pattern.photo_plan for pattern in patterns])
+    limits = around(np.vstack([plan, photos]), 0.05)
+    label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
+    shades = Shades(float(heights.min()), float(heights.max()), label)
+    panels = [_panel(pattern, limits, shades) for pattern in patterns]
+    known = {mark.label for mark in labelled(panels[-1])}
+    every = {mark.label: mark for panel in panels for mark in labelled(panel) if isinstance(mark, Markers)}
+    more = [replace(mark, places=NOWHERE) for label, mark in every.items() if label not in known]
+    panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
+    width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
+    stacked = width > _MAX_SIDE_BY_SIDE * height
+    rows, columns = (len(panels), 1) if stacked else (1, len(panels))
+    across = max(2 * _PANEL_INCHES if stacked else min(_PANEL_INCHES, _PANEL_INCHES * width / height), 3.5)
+    up = min(across * height / width, _PANEL_INCHES)
+    size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
+    return Plot(*size, panels, columns, shades)
+
+
+def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:
+    new, unit, plan = pattern.new_points, pattern.block.linear_unit, pattern.point_plan
+    sd = pattern.point_sd[new, 2]
+    size = float(np.sqrt(np.clip(2e4 / max(1, len(sd)), 2, 30)))
+    marks: list[Mark] = [
+        # The worst on top: where points are dense, they are what a planner looks for.
+        Markers(plan[new], "o", size, values=sd, shades=shades, rising=True, layer=1.0),
+        Markers(pattern.photo_plan, "+", 4.0, FAINT, label="photo"),
+    ]
+    held = np.isfinite(pattern.block.point_sd) & pattern.result.used_points[:, np.newaxis]
+    plane, height = held[:, :2].any(axis=1), held[:, 2]
+    chosen = plane & height, height & ~plane, plane & ~height
+    marks += [
+        Markers(plan[rows], shape, 7.7, VERMILION, "white", 1.6, label=name)
+        for (name, shape), rows in zip(_KINDS, chosen, strict=True)
+        if rows.any()
+    ]
+    quality = pattern.points[-1]
+    figures = f"rms {quality.rms_sd[2]:#.3g} {unit}, largest {quality.max_sd[2]:#.3g} {unit}"
+    across, up = (f"{axis}, {unit}" for axis in pattern.axes[:2])
+    return Panel(limits, marks, f"{pattern.name}\n{figures}", across, up, equal=True)

@@ -14,8 +14,7 @@ from photogram.errors import InputError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.pattern import Pattern
-from photogram.planning.statistics import with_known_readout
+from photogram.planning.pattern import Pattern, with_known_readout
 from photogram.show.methods import Documented
 from photogram.words import phrase
 
@@ -67,7 +66,7 @@ class Plan(Documented):
         PhotogramError
             The plan has no new points.
         """
-        from photogram.planning.plot import plan_sketch
+        from photogram.planning.document import plan_sketch
 
         return plan_sketch(self.patterns)
 

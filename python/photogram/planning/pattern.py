@@ -1,30 +1,138 @@
-"""One pattern of a plan: a predicted block, its standard deviations as lengths, its places and its scale."""
+"""One pattern of a plan: a predicted block, its standard deviations as lengths, its places and its scale.
+
+Points are grouped by their place in the block, not by their distance to control: it is the same for every
+pattern of control, so that the rows of two patterns hold the same points, and it is how the accuracy of
+blocks is usually tabulated: weak at the border, where rays are few and come from one side, uniform inside.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.adjustment.prediction import image_depths
-from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
+from photogram.arguments.types import Bools, Floats
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.hull import hull
 from photogram.network.motion import on_shared
-from photogram.planning.statistics import (
-    ControlQuality,
-    MotionQuality,
-    PhotoQuality,
-    PointQuality,
-    control_quality,
-    locations,
-    motion_quality,
-    photo_quality,
-    point_quality,
-)
+from photogram.network.trajectories import Readout
 from photogram.results.result import Result
+from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
+
+LOCATIONS = ("corner", "edge", "interior")
+PLACES = 25  # Evenly spaced times of a trajectory
+CLASSES = (*((f"{n} rays", n, n) for n in range(2, 7)), ("7 to 9 rays", 7, 9), ("10 and more", 10, math.inf))
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class MotionQuality:
+    """What is expected of a motion that all photos, or all trajectories, have.
+
+    Attributes
+    ----------
+    unknown
+        "readout time" with its name, "velocity", "rate" (of photos with motions of their own), "position of
+        trajectories" or "rotation of trajectories" (anywhere between their images).
+    unit
+        "s", the linear unit a second, "rad/s", the linear unit or "rad".
+    rms_sd, max_sd
+        Root mean square and largest of the expected standard deviations of its components.
+    """
+
+    unknown: str
+    unit: str
+    rms_sd: float
+    max_sd: float
+
+
+@dataclass(frozen=True)
+class PointQuality:
+    """What a group of new points promises.
+
+    Attributes
+    ----------
+    grouping, group
+        `rays`, `location` or `all`, and the name of the group.
+    points
+        Their number.
+    rms_sd, max_sd
+        Root mean square and largest of their expected standard deviations in the three coordinates, linear
+        unit.
+    redundancy
+        Mean redundancy number of their image coordinates.
+    unchecked
+        Share of image coordinates with less redundancy than 0.01: gross errors there cannot be found.
+    detectable
+        Minimal detectable error of the other image coordinates, millimetres: the median; NaN for none.
+    effect
+        What such an error moves at most when it stays in, in standard deviations: the median; NaN for none.
+    """
+
+    grouping: str
+    group: str
+    points: int
+    rms_sd: Triple
+    max_sd: Triple
+    redundancy: float
+    unchecked: float
+    detectable: float
+    effect: float
+
+
+@dataclass(frozen=True)
+class PhotoQuality:
+    """What the photos promise in one unknown.
+
+    Attributes
+    ----------
+    unknown
+        Its name.
+    rms_sd, max_sd
+        Root mean square and largest of the expected standard deviations: linear unit, radians for angles.
+    redundancy
+        Mean redundancy number of the given values as observations; NaN where none is weighted.
+    """
+
+    unknown: str
+    rms_sd: float
+    max_sd: float
+    redundancy: float
+
+
+@dataclass(frozen=True)
+class ControlQuality:
+    """How control is checked in one component.
+
+    Attributes
+    ----------
+    component
+        Its name.
+    held
+        How many control points hold it.
+    sd
+        Root mean square of its a priori standard deviations, linear unit.
+    redundancy
+        Mean redundancy number of those that are weighted (not fixed); NaN for none.
+    detectable
+        Minimal detectable error, linear unit: the median; NaN for none.
+    effect
+        What such an error moves at most when it stays in, in standard deviations: the median; NaN for none.
+    """
+
+    component: str
+    held: int
+    sd: float
+    redundancy: float
+    detectable: float
+    effect: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +197,7 @@ class Pattern:
 
     @cached_property
     def point_locations(self) -> NDArray[np.str_]:
-        """(n,) `corner`, `edge` or `interior`, as :func:`~photogram.planning.statistics.locations` has it."""
+        """(n,) `corner`, `edge` or `interior`, as :func:`~photogram.planning.pattern.locations` has it."""
         stations = [self.photo_plan]
         if on_shared(self.block).any():
             # A strip of a scanner is as long as its trajectory.
@@ -111,17 +219,52 @@ class Pattern:
     @cached_property
     def points(self) -> list[PointQuality]:
         """New points and their images, by number of rays, by location, and all."""
-        return point_quality(self.result, self.point_sd, self.point_locations, self.new_points)
+        rays = self.result.point_rays
+        groups = [("rays", name, (rays >= low) & (rays <= high)) for name, low, high in CLASSES]
+        groups += [("location", name, self.point_locations == name) for name in LOCATIONS]
+        groups.append(("all", "all", np.ones(len(rays), dtype=np.bool_)))
+        return [self._group(grouping, name, self.new_points & chosen) for grouping, name, chosen in groups]
 
     @cached_property
     def photos(self) -> list[PhotoQuality]:
         """Positions (linear unit) and attitudes (radians) of the photos."""
-        return photo_quality(self.result, self.photo_sd, self.axes)
+        block, redundancy = self.block, self.result.photo_redundancy.copy()
+        moving = {each.photo for each in block.timed if each.trajectory is None}
+        for row, name in enumerate(block.photo_ids):
+            if name in moving:
+                own = self.result.trajectories[name]
+                redundancy[row] = [*own.position_redundancy[0], *own.rotation_redundancy[0]]
+        given_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
+        weighted = np.isfinite(given_sd) & (given_sd > 0)
+        unknowns = (*self.axes, "omega", "phi", "kappa")
+        return [
+            PhotoQuality(name, _rms(sd), _of(np.max, sd), _of(np.mean, redundancy[weighted[:, k], k]))
+            for k, (name, sd) in enumerate(zip(unknowns, self.photo_sd.T, strict=True))
+        ]
 
     @cached_property
     def motion(self) -> list[MotionQuality]:
         """Readout times, velocities and rates of photos, trajectories; nothing where nothing moves."""
-        return motion_quality(self.result)
+        block, trajectories = self.block, self.result.trajectories
+        if not block.timed:
+            return []
+        found = [
+            MotionQuality(f"readout time, {each.name}", "s", float(each.sd[0]), float(each.sd[0]))
+            for each in self.result.unknowns
+            if isinstance(each.given, Readout) and not each.given.is_held
+        ]
+        own = [trajectories[each.photo] for each in block.timed if each.trajectory is None]
+        linear = block.linear_unit
+        if own:
+            found.append(_quality("velocity", f"{linear}/s", np.array([each.position_sd[1] for each in own])))
+            found.append(_quality("rate", "rad/s", np.array([each.rotation_sd[1] for each in own])))
+        if sds := [
+            trajectories[name].poses(times).sd for name, times in _times_on_trajectories(block).items()
+        ]:
+            sd = np.concatenate(sds)
+            found.append(_quality("position of trajectories", linear, sd[:, :3]))
+            found.append(_quality("rotation of trajectories", "rad", sd[:, 3:]))
+        return found
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:
@@ -129,13 +272,40 @@ class Pattern:
         if self.known is None or not self.new_points.any():
             return None
         sd = (self.known.point_sd * self._point_units)[self.new_points]
-        x, y, z = np.sqrt((sd**2).mean(axis=0)).tolist()
-        return x, y, z
+        return _triple(_rms, sd)
 
     @cached_property
     def control(self) -> list[ControlQuality]:
         """Held components of control, by axis."""
-        return control_quality(self.result, self.control_sd, self.axes)
+        qualities = []
+        for name, sd, numbers in zip(
+            self.axes, self.control_sd.T, self.result.point_redundancy.T, strict=True
+        ):
+            held = self.result.used_points & np.isfinite(sd)
+            weighted = held & (sd > 0)
+            redundancy = numbers[weighted]
+            detectable = _of(np.median, minimal_detectable_error(sd[weighted], redundancy))
+            effect, mean = _of(np.median, largest_effect(redundancy)), _of(np.mean, redundancy)
+            qualities.append(ControlQuality(name, int(held.sum()), _rms(sd[held]), mean, detectable, effect))
+        return qualities
+
+    def _group(self, grouping: str, group: str, chosen: Bools) -> PointQuality:
+        block, sd = self.block, self.point_sd[chosen]
+        images = chosen[block.image_points]
+        redundancy = self.result.redundancy[images]
+        checked = redundancy >= TESTABLE
+        detectable = minimal_detectable_error(block.image_sd[images], redundancy)[checked]
+        return PointQuality(
+            grouping=grouping,
+            group=group,
+            points=int(chosen.sum()),
+            rms_sd=_triple(_rms, sd),
+            max_sd=_triple(lambda column: _of(np.max, column), sd),
+            redundancy=_of(np.mean, redundancy),
+            unchecked=1 - _of(np.mean, checked),
+            detectable=_of(np.median, detectable),
+            effect=_of(np.median, largest_effect(redundancy[checked])),
+        )
 
     @cached_property
     def _point_units(self) -> Floats:
@@ -150,9 +320,9 @@ class Pattern:
 
     def _plan(self, positions: Floats) -> Floats:
         spheroid = self.block.spheroid
-        if spheroid is None:
-            return positions[:, :2]
-        return self._cartesian_plan(geometry.geographic_to_geocentric(positions, spheroid))
+        if spheroid is not None:
+            positions = geometry.geographic_to_geocentric(positions, spheroid)
+        return self._cartesian_plan(positions)
 
     def _cartesian_plan(self, xyz: Floats) -> Floats:
         """Return the plan of places in X, Y, Z, geocentric where the space is geographic."""
@@ -164,3 +334,80 @@ class Pattern:
         centre = stations.mean(axis=0)
         frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
         return np.asarray((xyz - centre) @ frame[:2].T)
+
+
+def with_known_readout(block: Block) -> Block | None:
+    """Return a block whose readout times are known; None where all of them are."""
+    known: dict[int, Readout] = {}
+    timed = []
+    for each in block.timed:
+        own = each.readout
+        if each.shutter is not None and own is not None and not own.is_held:
+            readout = known.setdefault(id(own), Readout(own.name, own.value, 0.0))
+            each = replace(each, shutter=replace(each.shutter, readout=readout))
+        timed.append(each)
+    return block.replace(timed=timed) if known else None
+
+
+def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
+    """Return the location of each of (n, 2) points in plan, (n,): one of `LOCATIONS`.
+
+    The block is the smallest rectangle around its (P, 2) photo stations, P at least 1. A point in it lies in
+    the interior, one beyond a side of it at an edge, one beyond two sides in a corner. So a single strip has
+    flanks and ends, but hardly an interior.
+    """
+    axes = _axes(stations)
+    turned, extent = points @ axes.T, stations @ axes.T
+    beyond = (turned < extent.min(axis=0)) | (turned > extent.max(axis=0))
+    return np.asarray(np.array(LOCATIONS)[2 - beyond.sum(axis=1)])
+
+
+def _axes(points: Floats) -> Floats:
+    """Rows: the unit vectors along the sides of the smallest rectangle around points in plan.
+
+    One of its sides lies along a side of the convex hull (Freeman and Shapira, 1975).
+    """
+    corners = hull(points)
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*sides.T)
+    if not (lengths > 0).any():
+        return np.eye(2)
+    c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
+    frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+    extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
+    return np.asarray(frames[np.argmin(extents.prod(axis=1))])
+
+
+def _times_on_trajectories(block: Block) -> dict[str, Floats]:
+    """Return the times at which the trajectories that photos share are looked at, by their names."""
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    order = np.argsort(block.image_photos, kind="stable")
+    bounds = np.searchsorted(block.image_photos[order], np.arange(len(rows) + 1))
+    spans: dict[str, tuple[float, float]] = {}
+    for each in block.timed:
+        row = rows[each.photo]
+        own = order[bounds[row] : bounds[row + 1]]
+        if each.trajectory is None or not len(own):
+            continue
+        time, since, _ = each.images(block.image_xy[own])
+        scale = 1.0 if each.readout is None else float(each.readout.position[0])
+        times = time + scale * since
+        first, last = spans.get(each.trajectory.name, (math.inf, -math.inf))
+        spans[each.trajectory.name] = min(first, float(times.min())), max(last, float(times.max()))
+    return {name: np.linspace(*span, PLACES) for name, span in spans.items()}
+
+
+def _quality(unknown: str, unit: str, sd: Floats) -> MotionQuality:
+    return MotionQuality(unknown, unit, _rms(sd), float(sd.max()))
+
+
+def _triple(reduce: Callable[[Floats], float], sd: Floats) -> Triple:
+    return cast("Triple", tuple(reduce(column) for column in sd.T))
+
+
+def _rms(values: Floats) -> float:
+    return math.sqrt(_of(np.mean, values**2))
+
+
+def _of(reduce: Callable[[Any], Any], values: Floats | Bools) -> float:
+    return float(reduce(values)) if values.size else math.nan

@@ -10,8 +10,6 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
-from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import (
     NOWHERE,
     Arrows,
@@ -20,14 +18,16 @@ from photogram.show.sketch.marks import (
     Mark,
     Markers,
     Names,
+    Panel,
     Polygons,
+    ScaleBar,
     Shades,
     ellipse_axes,
     hexadecimal,
     rgb,
 )
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
+from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION, round_length
 
 MAX_POINTS, MAX_PHOTOS, MAX_FOOTPRINTS, MAX_ELLIPSES, MAX_VECTORS = 6000, 2000, 400, 150, 300
 MAX_NAMES = 40  # Of photos, and of control and check points

@@ -10,11 +10,9 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.picture_data import Images
-from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, ScaleBar
-from photogram.show.sketch.marks import Arrows, Mark, Markers
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
-from photogram.show.style import FAINT, INK, MARKED
+from photogram.show.style import FAINT, INK, MARKED, round_length
 
 MAX_SINGLE_IMAGES = 900  # More image points of a camera are drawn as means of cells
 MAX_CELLS = 16  # Along the longer side of the frame

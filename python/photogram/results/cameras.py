@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief
 from photogram.words import phrase
 
 if TYPE_CHECKING:

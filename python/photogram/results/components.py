@@ -9,9 +9,8 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.quantity import members, records
-from photogram.show.summary import Brief
 from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
 

@@ -50,7 +50,7 @@ DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
 """Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
 
-RADIAL = re.compile(r"[KkA]\d|k")  # Radial terms
+RADIAL = re.compile(r"[KkA]\d|k")  # Names of radial terms
 
 BALANCED_AT = 2.0 / 3.0  # r0 as a part of the largest observed radius
 BEYOND = 1.25  # End of a curve as a multiple of the largest observed radius

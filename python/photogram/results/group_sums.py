@@ -28,10 +28,9 @@ from photogram.network.strips import strips_of
 from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
-from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test

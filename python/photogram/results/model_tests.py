@@ -34,10 +34,9 @@ from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.scores import quadratic, score
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
-from photogram.show.summary import Brief
 from photogram.words import phrase
 
 if TYPE_CHECKING:

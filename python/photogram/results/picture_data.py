@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,12 +27,14 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
-from photogram.results.film_pictures import film_patterns, mean_mark_residuals
+from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.results.tests import Tests
 from photogram.statistics.findings import Tested
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 class PicturedNetwork(Pictured):

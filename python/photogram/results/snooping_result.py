@@ -12,10 +12,9 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented, Rows, few
 from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section
 from photogram.show.quantity import Quantity, Table, members, of_each, records
-from photogram.show.summary import Brief, Rows, few
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival

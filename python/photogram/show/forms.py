@@ -15,6 +15,8 @@ from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Se
 WIDTH = 100  # characters of a line of prose
 MAX_ROWS = 40  # of a table in a summary
 
+TitledLines = tuple[str, list[str]]  # A section of text
+
 PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
     {"′": "arcmin", "″": "arcsec", "°": "deg", "∞": "inf", "⁻": "^-", "²": "^2"}
 )
@@ -53,7 +55,7 @@ def text(document: Document) -> str:
     return "\n\n".join(parts).translate(PLAIN) + "\n"
 
 
-def titled_lines(document: Document, *keys: str) -> list[tuple[str, list[str]]]:
+def titled_lines(document: Document, *keys: str) -> list[TitledLines]:
     """Return titles and lines: verdict and advice, a line for each sentence, key figures, sections with keys.
 
     All sections without keys; with keys sections have no introduction.
@@ -62,7 +64,7 @@ def titled_lines(document: Document, *keys: str) -> list[tuple[str, list[str]]]:
     return [(title.translate(PLAIN), [line.translate(PLAIN) for line in lines]) for title, lines in titled]
 
 
-def _judged(document: Document) -> list[tuple[str, list[str]]]:
+def _judged(document: Document) -> list[TitledLines]:
     titled: list[tuple[str, list[object]]] = [
         (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
         for judgement in document.judgements
@@ -71,7 +73,7 @@ def _judged(document: Document) -> list[tuple[str, list[str]]]:
     return [(title, [_sentence(line) for line in lines]) for title, lines in titled if lines]
 
 
-def _sections(document: Document, keys: Sequence[str]) -> list[tuple[str, list[str]]]:
+def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
     """Return the lines of key figures and sections below their titles; none without lines."""
     figures = fact_lines([*document.head, *document.highlights])
     titled = [("Key figures", figures)] + [

@@ -6,12 +6,13 @@ The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design")
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
 
 BLUE = "#0072b2"
 VERMILION = "#d55e00"
@@ -25,6 +26,8 @@ SOFT = "#5c5c5c"
 """Of letters that are not to stand out: 6.7 to 1 on white; FAINT, of lines, has 3.4."""
 """What is drawn as it is, what a reader should look at, and what only helps."""
 ORDERED = "cividis"  # Colour map of values from small to large
+
+DPI = 120  # Dots per inch of PNG files
 
 SETTINGS: dict[str, Any] = {
     "font.size": 9.0,
@@ -63,12 +66,12 @@ def need_matplotlib() -> None:
         raise ModuleNotFoundError(said, name="matplotlib") from None
 
 
-def styled(further: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:
-    """Return a context in which axes, letters and legends are those of the house, with further settings."""
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which axes, letters and legends are those of the house."""
     need_matplotlib()
     import matplotlib as mpl
 
-    settings: Any = {**SETTINGS, **(further or {})}
+    settings: Any = SETTINGS
     return mpl.rc_context(settings)
 
 
@@ -77,3 +80,25 @@ def signed() -> Colormap:
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("signed", [BLUE, "#ffffff", VERMILION])
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return a figure that belongs to no window (inches)."""
+    need_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained", dpi=DPI)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def round_length(value: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not above a value.
+
+    For a value that is not positive, which has none, it is 1.
+    """
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))

@@ -12,8 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, unknown_name
-from photogram.show.methods import Documented, Judged
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue

@@ -11,7 +11,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import unknown_name
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import COMMON, INDEX, NAMES
 from photogram.stellar.sky import TAU, Site

@@ -12,8 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented, Judged
-from photogram.show.summary import Brief
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
 from photogram.stellar.cameras import PlateCamera

@@ -27,7 +27,7 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]

@@ -22,9 +22,8 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.show.page import Document
-from photogram.show.summary import Brief, Rows
 from photogram.statistics.verdict import Verdict
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses

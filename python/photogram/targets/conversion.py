@@ -18,10 +18,9 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented
+from photogram.show.methods import Brief, Documented, Rows
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table
-from photogram.show.summary import Brief, Rows
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.lens_fit import (
     GRID,

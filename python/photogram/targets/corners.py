@@ -23,7 +23,7 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.show.summary import Brief, Rows, few
+from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
 MIN_CORNERS_PER_VIEW = 6

@@ -20,7 +20,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials, datum_rows

@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.targets.projection import DatumName, worst
 
 

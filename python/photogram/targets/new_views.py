@@ -16,7 +16,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst

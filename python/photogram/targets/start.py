@@ -21,7 +21,7 @@ from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
-from photogram.show.summary import Brief, Rows, few
+from photogram.show.methods import Brief, Rows, few
 from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
-from photogram.show.methods import Documented
-from photogram.show.summary import Brief, Rows
+from photogram.show.methods import Brief, Documented, Rows
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Candidate
 

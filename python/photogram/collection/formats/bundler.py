@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.formats.format import Format
+from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
@@ -25,8 +26,7 @@ from photogram.words import Phrase, phrase
 
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
-COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4
-"""Numbers after the first line, of a camera, of a point with the number of its views, of a view."""
+COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4  # Numbers in a head, a camera, a point and a view
 ORTHONORMAL = 1e-6  # What R R^T may differ from the unit matrix
 
 
@@ -42,13 +42,9 @@ class _Numbers:
         self.path = path
         self.words = len(header[0].split())  # Of the first line
         self.taken = 0
-        self.values = self._all(first[header.end() :], pieces)
-
-    def _all(self, first: bytes, pieces: Iterator[bytes]) -> Floats:
         parts: list[Floats] = []
         read = 0
-        piece: bytes | None = first
-        while piece is not None:
+        for piece in chain([first[header.end() :]], pieces):
             numbers, good = _photocore.read_numbers(piece)
             read += len(numbers)
             if not good:
@@ -56,8 +52,7 @@ class _Numbers:
             parts.append(numbers)
             # The parts, and what is made of them.
             require(4 * read * numbers.itemsize, f"{self.path}: {read} numbers")
-            piece = next(pieces, None)
-        return np.concatenate(parts)
+        self.values = np.concatenate(parts)
 
     def take(self, count: int, what: str) -> Floats:
         """Return the next numbers."""

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
 from photogram.collection.collection import Collection
-from photogram.collection.formats.format import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import packed, pieces
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.words import phrase
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of collections."""
+
+    name: str  # As functions take it
+    title: str  # As people are told what a file is
+    suffix: str  # Of files that are written
+    begins: Callable[[bytes], bool]  # Whether a file that begins with this, after unpacking, is meant for one
+    # Takes the path, for messages, and the content, unpacked, in pieces that end at the end of a word
+    read: Callable[[Path, Iterator[bytes]], Collection]
+    to_bytes: Callable[[Collection], bytes]
+    camera: str = "bal"  # The model of cameras that the format can hold
+
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.collection.formats.{name}").FORMAT
@@ -19,19 +35,13 @@ FORMATS: dict[str, Format] = {
         "bundler",
         "bal",
     )
-}
-"""By name; a file has the first format that it begins like."""
+}  # By name; a file has the first format that it begins like
 
 
 def recognised(path: Path) -> tuple[Collection, Format]:
     """Read a collection, packed by bzip2 or gzip or not, and say what format it has.
 
     All unknowns are free, and the standard deviation of image coordinates is one pixel.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or holds something else; names file, line and what stands there.
     """
     with turned(f"reading {path}"):
         content = pieces(path)

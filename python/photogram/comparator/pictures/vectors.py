@@ -11,11 +11,9 @@ import numpy as np
 from photogram.comparator.case import exchanged
 from photogram.comparator.pointing import Ellipse
 from photogram.errors import InputError
-from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names
+from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names, Panel, around
 from photogram.show.sketch.plot import Plot, side_by_side
-from photogram.show.style import BLUE, FAINT, SOFT, VERMILION
+from photogram.show.style import BLUE, FAINT, SOFT, VERMILION, round_length
 from photogram.words import phrase
 
 if TYPE_CHECKING:

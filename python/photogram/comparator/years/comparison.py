@@ -25,9 +25,8 @@ from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
-from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history

@@ -21,9 +21,8 @@ from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.methods import Documented, Judged
+from photogram.show.methods import Brief, Documented, Judged
 from photogram.show.page import Document
-from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history

@@ -28,8 +28,8 @@ from photogram.formats.metadata.reference import is_reference, read_geo_txt, rea
 from photogram.formats.metadata.search import EXPOSURES, files_of, found_in
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted
-from photogram.show.sections import Section
-from photogram.show.summary import Brief
+from photogram.show.forms import TitledLines
+from photogram.show.methods import Brief
 from photogram.words import phrase
 
 WITHOUT = "without"
@@ -91,7 +91,7 @@ class Metadata(Brief):
         located = [each for each in self.photos.values() if each.position is not None]
         return counts(each.deviations for each in located)
 
-    def sections(self) -> list[Section]:
+    def sections(self) -> list[TitledLines]:
         """Return what was read as titled sections: for people."""
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]
@@ -205,8 +205,7 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     return found + [Message(phrase("photos.remark", remark=text, n=count)) for text, count in remarks.items()]
 
 
-MAX_INTERVAL_DIFFERENCE = 2.0
-"""Seconds between two pictures by their EXIF, which has whole seconds, and by the events."""
+MAX_INTERVAL_DIFFERENCE = 2.0  # Seconds; EXIF has whole seconds
 
 
 def read_gnss_file(

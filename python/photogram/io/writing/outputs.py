@@ -30,12 +30,10 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-Content = bytes | Callable[[BinaryIO], None]
-"""What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
+Content = bytes | Callable[[BinaryIO], None]  # Bytes, or a function that writes them to a file
 
 PERMISSIONS = 0o777
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""The signals that ask a process to end."""
 
 
 class _Raw(io.RawIOBase):
@@ -177,7 +175,7 @@ class OutputSet:
             path = os.path.join(self._stagings[target.directory].path, str(len(self._staged)))
             mode = stat.S_IMODE(target.status.st_mode) & PERMISSIONS if target.status else 0o666
             descriptor = os.open(path, os.O_WRONLY | NEW, mode)
-            file = _opened(descriptor, target)
+            file: io.BufferedWriter = io.BufferedWriter(_Raw(descriptor, target.given))
             self._staged.append(_Staged(target, path, file))
             if target.status:
                 _keep_owner(descriptor, target.status, mode)
@@ -286,10 +284,6 @@ def _stream(target: Target) -> io.BufferedWriter:
                 if stream is not None:
                     stream.flush()
             descriptor = os.dup(target.descriptor)
-    return _opened(descriptor, target)
-
-
-def _opened(descriptor: int, target: Target) -> io.BufferedWriter:
     return io.BufferedWriter(_Raw(descriptor, target.given))
 
 

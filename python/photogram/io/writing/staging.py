@@ -20,11 +20,9 @@ if sys.platform != "win32":
 NAME = re.compile(r"\.photogram-([0-9a-f]{16})")
 LOCK = "lock"
 NEW = os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
-"""Exclusive creation: what is there already, a planted link too, is an error."""
 DIRECTORY = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
 TRIALS = 16
 UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EBADF)
-"""What file systems answer that cannot put a directory on the disk at a wish."""
 MARK_NAME = re.compile(r"photogram-incomplete-([0-9a-f]{16})\.txt")
 MARK_TEXT = """\
 The files named below belong together, and photogram was ended while it put them in place:
@@ -213,24 +211,18 @@ def _path(staging: Staging) -> str:
 
 
 def _dead_marks(directory: str) -> list[tuple[str, set[str]]]:
-    """Return the marks of dead runs in a directory, with the places that they name."""
+    """Return the marks of dead runs in a directory, with the places that they name, other lines left out."""
     found = []
     with suppress(OSError):
         for name in sorted(os.listdir(directory)):
             match = MARK_NAME.fullmatch(name)
             if match and not alive(directory, match[1]):
-                path = os.path.join(directory, name)
-                found.append((path, _named(path, directory)))
+                path, places = os.path.join(directory, name), set[str]()
+                found.append((path, places))
+                with suppress(OSError), open(path, encoding="utf-8", errors="replace") as lines:
+                    for line in lines:
+                        with suppress(ValueError):
+                            place = json.loads(line)
+                            if isinstance(place, str):
+                                places.add(os.path.normpath(os.path.join(directory, place)))
     return found
-
-
-def _named(path: str, directory: str) -> set[str]:
-    """Return the places that a mark names; what is none of its lines is passed over."""
-    places = set()
-    with suppress(OSError), open(path, encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            with suppress(ValueError):
-                name = json.loads(line)
-                if isinstance(name, str):
-                    places.add(os.path.normpath(os.path.join(directory, name)))
-    return places

@@ -16,10 +16,17 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
-from photogram.results.statement.comparison import Compared, compared, control_places
+from photogram.results.statement.comparison import (
+    NOTHING,
+    Compared,
+    Survey,
+    System,
+    compared,
+    control_places,
+    surveyed,
+)
 from photogram.results.statement.document import budget_member, figures_member, statement_members
 from photogram.results.statement.figures import figures
-from photogram.results.statement.given_coordinates import NOTHING, Survey, System, surveyed
 from photogram.results.statement.grounds import Grounds, removed_observations
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
@@ -29,10 +36,10 @@ from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import standards
 from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
+from photogram.show.methods import Brief, Rows
 from photogram.show.page import Document
 from photogram.show.quantity import records
 from photogram.show.run import InputFile
-from photogram.show.summary import Brief, Rows
 from photogram.words import Phrase, phrase
 
 __all__ = ["Statement", "statement"]

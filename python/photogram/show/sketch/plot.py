@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.pictures import new_figure
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Panel, Sketch
 from photogram.show.sketch.svg import svg_of
-from photogram.show.style import styled
+from photogram.show.style import new_figure, styled
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -1,3 +1,0 @@
-"""Sections of text: a title with lines."""
-
-Section = tuple[str, list[str]]
