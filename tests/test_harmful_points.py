@@ -10,7 +10,7 @@ import pytest
 from photogram import Block, adjust, diagnose, simulate, snoop
 from photogram.diagnosis.key_numbers import held_values
 from photogram.network import project
-from photogram.results.weakest import weakest_photos, weakest_points
+from photogram.results.network_sections import weakest_photos, weakest_points
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from moving_blocks import rolling, scanned
 from photogram import adjust
 from photogram.results.footprints import footprints
-from photogram.results.weakest import weakest_points
+from photogram.results.network_sections import weakest_points
 
 
 @pytest.fixture(scope="module")

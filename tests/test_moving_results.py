@@ -41,7 +41,7 @@ from photogram.network import (
     Trajectory,
 )
 from photogram.network.subset import kept_images
-from photogram.results.courses import courses
+from photogram.results.trajectories import courses
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,7 @@ from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
 from photogram.plots.cells import cells
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Names
+from photogram.show.sketch.marks import Names, Panel
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
 OF_LENSES = [name for name in PLOTS if name not in ("features", "films")]

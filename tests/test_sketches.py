@@ -13,13 +13,23 @@ from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
 from photogram.lazy_dataclasses import fields
-from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import laid_out
-from photogram.show.sketch.letters import width, wrapped
-from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts, rgb
+from photogram.show.sketch.letters import ticks, width, wrapped
+from photogram.show.sketch.marks import (
+    Contours,
+    Ellipses,
+    Level,
+    Markers,
+    Mesh,
+    Names,
+    Panel,
+    Shades,
+    Sketch,
+    Texts,
+    rgb,
+)
 from photogram.show.sketch.svg import svg_of
 from photogram.show.sketch.svg_marks import svg
-from photogram.show.sketch.ticks import ticks
 from svg_words import assert_readable, boxes, elements
 
 EXAMPLES = files("photogram") / "examples"

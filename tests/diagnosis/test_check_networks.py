@@ -155,7 +155,7 @@ def test_a_collection_is_checked():
 
 
 def test_the_block_of_a_collection_sees_what_it_sees():
-    from photogram.collection.as_block import as_block
+    from photogram.collection.snooping import as_block
 
     collection = simulate_collection(photos=6, points=60, seed=4).collection
     adjusted = adjust(collection)

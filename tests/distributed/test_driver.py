@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import ToyEngine, adjusted, kept, make
+from toy import OPTIONS, ToyEngine, adjusted, kept, make
 
 from photogram import AdjustmentError, RankError, _photocore
-from photogram.distributed.driver import Driver, Stop
+from photogram.distributed.driver import Driver
 from photogram.distributed.executors import Serial
 from photogram.distributed.shelf import shelf
 from photogram.distributed.tasks import Job
@@ -21,11 +21,11 @@ def empty_shelf():
     shelf.clear()
 
 
-def run(folder, tree, *, stop=None, memory=None, executor=None, resume=False, progress=None):
+def run(folder, tree, *, options=OPTIONS, memory=None, executor=None, resume=False, progress=None):
     job = Job(folder, ToyEngine(), _photocore.__version__, memory=memory)
     executor = executor or Serial(folder)
     try:
-        return Driver(job, tree, executor, stop or Stop(), progress).run(resume=resume)
+        return Driver(job, tree, executor, options, progress).run(resume=resume)
     finally:
         executor.stop()
 
@@ -53,9 +53,9 @@ def test_parts_give_what_the_whole_gives(tmp_path, parts):
 
 def test_steps_that_are_rounding_are_the_end(tmp_path):
     tree = make(tmp_path, 40, 60, 4)
-    outcome = run(tmp_path, tree, stop=Stop(tolerance=1e-300))
+    outcome = run(tmp_path, tree, options=replace(OPTIONS, limit=1e-300))
     assert outcome.status == "converged"
-    assert len(outcome.iterations) < Stop().max_iterations
+    assert len(outcome.iterations) < OPTIONS.max_iterations
     assert all(each.largest_change < 1e-6 for each in outcome.iterations[-5:])
 
 

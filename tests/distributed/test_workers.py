@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import toy
 from test_driver import agrees, run
-from toy import ToyEngine, kept, make
+from toy import OPTIONS, ToyEngine, kept, make
 
 from photogram import InputError, _photocore
-from photogram.distributed.driver import Driver, Stop
+from photogram.distributed.driver import Driver
 from photogram.distributed.executors import Workers, check_workers, connected
 from photogram.distributed.tasks import Job
 
@@ -31,7 +31,7 @@ def on(client, folder, tree, engine=None):
     job = Job(folder, engine or ToyEngine(), _photocore.__version__, threads=1)
     executor = Workers(client)
     try:
-        return Driver(job, tree, executor, Stop()).run()
+        return Driver(job, tree, executor, OPTIONS).run()
     finally:
         executor.stop()
 

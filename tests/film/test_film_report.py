@@ -12,8 +12,7 @@ from golden_data import DATA, golden
 from message_codes import coded
 from photogram import InputError, Result, adjust, formats, simulate
 from photogram.network import Fiducial, Film, KnownTogether, Mark
-from photogram.results.film_pictures import film_patterns, mark_residuals, mean_mark_residuals
-from photogram.results.film_report import film_table
+from photogram.results.film_report import film_patterns, film_table, mark_residuals, mean_mark_residuals
 from photogram.show.sketch.marks import Names
 
 ARCHIVE = files("photogram") / "examples" / "archive"

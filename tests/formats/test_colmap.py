@@ -209,7 +209,12 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
             "FULL_OPENCW",
             ["cameras.txt", "record 2", "colmap.model", "model=FULL_OPENCW"],
         ),
-        ("cameras.txt", " 3612.5 3612.5", " 3612,5 3612.5", ["record 2", "'3612,5'"]),
+        (
+            "cameras.txt",
+            " 3612.5 3612.5",
+            " 3612,5 3612.5",
+            ["cameras.txt record 2", "parameter 1 of 12: error.number value=3612,5"],
+        ),
         (
             "images.txt",
             "1395.3837490217622 ",

@@ -111,7 +111,10 @@ FAULTS = [
     ),
     (columns("InstrumentPosition", "J2000Y"), "format.member name=J2000Y"),
     (columns("InstrumentPointing", "J2000Q2"), "format.member name=J2000Q2"),
-    (changed("BodyRotation", ConstantRotation="(1, 2, 3)"), "BodyRotation/ConstantRotation: has 3 numbers"),
+    (
+        changed("BodyRotation", ConstantRotation="(1, 2, 3)"),
+        "BodyRotation/ConstantRotation: error.count count=9 actual=3",
+    ),
     (changed("BodyRotation", **{"^Table": '"body.tab"'}), "csm.elsewhere"),
     (
         {"known": made_cubes.keywords() | {"INS-85600_ITRANSL": [0, 0, 0]}},
@@ -122,8 +125,8 @@ FAULTS = [
         {"instrument": made_cubes.INSTRUMENT | {"SpatialSumming": "0"}},
         "format.positive name=the sum of pixels",
     ),
-    (less("INS-85600_OD_K"), "NaifKeywords: INS-85600_OD_K is missing"),
-    (less("BODY301_RADII"), "NaifKeywords: BODY301_RADII is missing"),
+    (less("INS-85600_OD_K"), "NaifKeywords: error.missing name=INS-85600_OD_K"),
+    (less("BODY301_RADII"), "NaifKeywords: error.missing name=BODY301_RADII"),
     (less(f"CLOCK_ET_-85_{made_cubes.CLOCK}_COMPUTED"), "csm.clock"),
 ]
 

@@ -164,7 +164,7 @@ def test_photos_with_another_camera_have_their_own(tmp_path):
     ("line", "change", "words"),
     [
         (2, lambda line: " 0.0005 20", ["record 2", "dbat.size"]),
-        (4, lambda line: line.replace("8.67", "8,67"), ["record 4", "'8,67' is not a number"]),
+        (4, lambda line: line.replace("8.67", "8,67"), ["record 4", "c: error.number value=8,67"]),
         (4, lambda line: "-" + line, ["record 4", "dbat.distance c=-8.67"]),
         (7, lambda line: line.replace("0 -33.0", "7 -33.0"), ["record 7", "dbat.photo number=0 other=7"]),
         (12, lambda line: line.replace("1 C", "0 C"), ["record 12", "format.repeated what=photo name=0"]),
@@ -303,10 +303,10 @@ def test_a_script_says_what_is_unknown_and_held(roma, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("351, 410", "351, x", ["sxb.xml", "record 6", "must be an integer, got 'x'"]),
-        (">keep<", ">drop<", ["record 9", "'drop' is neither keep nor remove"]),
-        ("id,im,x,y", "id,im,x", ["markpts.txt", "record 2", "4 cells, but the table has 3 columns"]),
-        ("smartpts.txt", "smart.txt", ["smart.txt", "cannot be read"]),
+        ("351, 410", "351, x", ["sxb.xml record 6", "error.whole value=x"]),
+        (">keep<", ">drop<", ["record 9", "format.unknown what=filter value=drop"]),
+        ("id,im,x,y", "id,im,x", ["markpts.txt record 2", "error.cells count=4 columns=3"]),
+        ("smartpts.txt", "smart.txt", ["smart.txt", "error.read"]),
         ("$HERE", "$DBAT", ["dbat.path value=$DBAT"]),
         ("<model>3<", "<model>4<", ["sxb.xml", "format.unknown what=model value=4"]),
         ("26.5770,38.8110", "26.5770,-38.8110", ["dbat.old"]),

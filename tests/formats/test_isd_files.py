@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support_data import RADIUS, START, along_minus_z, document, unmirrored, written
 
+from message_codes import coded, has_code
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.network import Polynomial, projected
@@ -197,7 +198,7 @@ FAULTS = [
     (without("name_model"), "error.at: error.document: error.missing name_model"),
     (
         setting("USGS_ASTRO_SAR_SENSOR_MODEL", "name_model"),
-        "error.at /name_model: error.unknown.close the sensor model",
+        "error.at /name_model: error.unknown.close sensor model",
     ),
     (without("image_lines"), "error.at: error.document: error.missing image_lines"),
     (setting(0, "image_samples"), "error.at /image_samples: error.whole-range 0 1 2147483648"),
@@ -205,56 +206,59 @@ FAULTS = [
         setting("x", "focal_length_model", "focal_length"),
         "error.at /focal_length_model/focal_length: error.number x",
     ),
-    (setting(0, "focal_length_model", "focal_length"), "error.at /focal_length_model/focal_length is zero"),
+    (
+        setting(0, "focal_length_model", "focal_length"),
+        "error.at /focal_length_model/focal_length: format.zero",
+    ),
     (without("detector_center", "line"), "error.at /detector_center: error.missing line"),
     (
         setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
-        "error.at /focal2pixel_samples has no inverse, together with",
+        "error.at /focal2pixel_samples: csm.inverse /focal2pixel_lines",
     ),
     (
         setting(None, "detector_center", "line"),
-        "error.at /detector_center/line is null, and no other field determines it;",
+        "error.at /detector_center/line: csm.null the line of the detector",
     ),
     (
         setting(None, "focal_length_model", "focal_length"),
-        "error.at /focal_length_model/focal_length is null, and no other field",
+        "error.at /focal_length_model/focal_length: csm.null the focal length",
     ),
     (
         setting(None, "focal2pixel_samples"),
-        "error.at /focal2pixel_samples is null, and no other field determines it;",
+        "error.at /focal2pixel_samples: csm.null three numbers",
     ),
     (
         setting(None, "detector_line_summing"),
-        "error.at /detector_line_summing is null, and no other field determines it;",
+        "error.at /detector_line_summing: csm.null the number of detector lines",
     ),
     (
         setting(None, "center_ephemeris_time"),
-        "error.at /center_ephemeris_time is null, and no other field determines it;",
+        "error.at /center_ephemeris_time: csm.null the time of the exposure",
     ),
     (setting(None, "radii", "semimajor"), "error.at /radii/semimajor: error.number: error.value None"),
     (setting([0.0, 1.0], "focal2pixel_lines"), "error.at /focal2pixel_lines: error.count 3 2"),
     (
         setting(0, "detector_sample_summing"),
-        "error.at /detector_sample_summing is not positive, or that of lines is not",
+        "error.at /detector_sample_summing: format.positive the sum of pixels 0.0",
     ),
     (
         setting({"fisheye": {}}, "optical_distortion"),
-        "error.at /optical_distortion: error.unknown the lens fisheye",
+        "error.at /optical_distortion: error.unknown lens fisheye",
     ),
-    (setting({}, "optical_distortion"), "error.at /optical_distortion has 0 models, not one"),
+    (setting({}, "optical_distortion"), "error.at /optical_distortion: format.count 0 1"),
     (
         setting([1.0], "optical_distortion", "radial", "coefficients"),
-        "error.at /optical_distortion/radial the lens radial has 3 coefficients,",
+        "error.at /optical_distortion/radial: error.at coefficients of the lens radial: error.numbers 3",
     ),
-    (setting({"lineExposureTimes": [1.0]}, "jitter"), "error.at /jitter is known of frames alone"),
-    (setting([], "line_scan_rate"), "error.at /line_scan_rate is empty"),
+    (setting({"lineExposureTimes": [1.0]}, "jitter"), "error.at /jitter: csm.jitter"),
+    (setting([], "line_scan_rate"), "error.at /line_scan_rate: format.empty"),
     (
         setting([[0.5, -2.0, 0.0]], "line_scan_rate"),
-        "error.at /line_scan_rate lines are first line, time, seconds per line,",
+        "error.at /line_scan_rate: error.at lines: error.kind rows of first line, time,",
     ),
     (setting([[0.5, -2.0]], "line_scan_rate"), "error.at /line_scan_rate/0: error.count 3 2"),
-    (setting("miles", "radii", "unit"), "error.at /radii/unit: error.unknown the unit miles m,km"),
-    (setting(2e9, "radii", "semiminor"), "error.at /radii are no semi-axes with 0 < semiminor <= semimajor:"),
+    (setting("miles", "radii", "unit"), "error.at /radii/unit: error.unknown unit miles m,km"),
+    (setting(2e9, "radii", "semiminor"), "error.at /radii: csm.radii 1700000.0 2000000000000.0"),
     (without("instrument_position", "positions"), "error.at /instrument_position: error.missing positions"),
     (
         setting([1.0, 2.0], "instrument_position", "positions", 3),
@@ -262,23 +266,23 @@ FAULTS = [
     ),
     (
         setting([[0, 0, 0]], "instrument_position", "velocities"),
-        "error.at /instrument_position/velocities has 1 records, positions 21",
+        "error.at /instrument_position/velocities: format.count 1 21",
     ),
     (
         setting(8, "instrument_position", "reference_frame"),
-        "error.at /instrument_position reference_frame of position, pointing and",
+        "error.at /instrument_position: csm.frames 1,8",
     ),
     (
         setting([0, 0, 0, 2], "instrument_pointing", "quaternions", 1),
-        "error.at /instrument_pointing/quaternions record 1 has the length 2, not 1",
+        "error.at /instrument_pointing/quaternions: error.at: csm.record 2: format.length 2.0",
     ),
     (
         setting([1.0] * 9, "body_rotation", "constant_rotation"),
-        "error.at /body_rotation/constant_rotation constant_rotation[0] is no",
+        "error.at /body_rotation/constant_rotation: error.at constant_rotation[0]: error.kind a rotation",
     ),
     (
         setting(1e9, "body_rotation", "ephemeris_times", 4),
-        "error.at /body_rotation/ephemeris_times ephemeris_times do not increase,",
+        "error.at /body_rotation/ephemeris_times: error.at ephemeris_times[5]: error.kind a finite time",
     ),
 ]
 
@@ -297,19 +301,18 @@ def test_lines_that_the_tables_do_not_reach_are_named(tmp_path):
     data = document()
     data["line_scan_rate"] = [[0.5, -2.0, 0.02]]
     own = image(tmp_path, data)
-    assert own.isd.remarks == (
-        "the 400 lines take 8 s by line_scan_rate, the table of instrument_pointing 4 s: the table is short"
-        " by 50.0 %",
-    )
-    with rejected(r"line 300 of I is at 1006.0 s, the tables reach from .* to 1004.1"):
+    (remark,) = own.isd.remarks
+    assert has_code(remark, "csm.duration", lines=400)
+    assert [remark.fields[name] for name in ("span", "table", "percent")] == pytest.approx([8, 4, 50])
+    with pytest.raises(InputError, check=coded("csm.reach", line=300, image="I", time=1006)):
         own.to_ground([100.0, 300.0], [1.0, 1.0])
 
 
 def test_ways_to_count_and_to_join_have_names(tmp_path):
-    for how in ({"pixels": "corner"}, {"interpolation": "cubic"}):
-        with rejected("is one of isis, csm"):
-            image(tmp_path, document(), **how)
-    with rejected("shapes"):
+    for name, value in (("pixels", "corner"), ("interpolation", "cubic")):
+        with rejected(f"argument.choice {name} isis,csm '{value}'"):
+            image(tmp_path, document(), **{name: value})
+    with rejected("format.shape lines (2,) (1,)"):
         image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])
 
 

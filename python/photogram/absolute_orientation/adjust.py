@@ -38,8 +38,7 @@ SUSPICIOUS = 1e-4
 """Root mean square residual, in sizes of the model, from which a cause is looked for; a good one is a few
 parts in a hundred thousand."""
 NO_FIT = 0.1  # And from which it is no orientation
-IN_A_PLANE = 3.0
-"""Points are in a plane as far as can be told when they are off it by less than this many rms residuals."""
+IN_A_PLANE = 3.0  # Largest distance of points from a common plane (rms residuals)
 ROUNDING = 1e-9  # Residuals below this fraction of the size of the model are rounding
 
 

@@ -28,8 +28,7 @@ PAIRS = 60
 places."""
 MOST = 5  # Hypotheses accepted one upon the other, at the most
 AS_WELL = 4.0  # A mirror image fits as well when its sum of squares is at most this multiple
-SAME_SCALE = 1e-3
-"""Relative difference from a foot within which a scale is said to be that of feet and metres."""
+SAME_SCALE = 1e-3  # Relative difference from the ratio of feet and metres
 SCALE_DEVIATIONS = 3.0
 ROUNDING = 1e-5  # And what coordinates of a few digits leave of it
 

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names, Panel, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, PURPLE, VERMILION, round_length
 

@@ -64,10 +64,8 @@ Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissectio
 
 
 AS_PUBLISHED = 4  # Iterations of the 1987 program, where nobody says how many
-OF_CAMERAS = 200
-"""Largest number of iterations if a camera has free parameters: weak networks have a curved valley."""
-OF_KNOTS = 400
-"""Iterations at the most with the knots of a splined lens: few views leave many of them to their priors."""
+OF_CAMERAS = 200  # Most iterations with free camera parameters
+OF_KNOTS = 400  # Most iterations with the knots of a splined lens
 NOTABLE_RISE = 1e-3  # Percent; less is rounding
 TURNS = 5  # So often at the most do tables of trajectories take over large corrections
 

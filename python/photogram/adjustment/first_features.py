@@ -20,8 +20,7 @@ from photogram.network.rays import meet_rays
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
 from photogram.words import phrase
 
-FLAT = 1e-3
-"""Points of a plane whose spread across their longest extent is less, in parts of this, lie on a line."""
+FLAT = 1e-3  # Largest relative width of points that form a line, not a plane
 
 
 def started(block: Block) -> Block:

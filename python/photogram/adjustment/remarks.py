@@ -21,10 +21,8 @@ from photogram.results.cameras import adjusted_cameras
 from photogram.words import Phrase, phrase
 
 NEAR = 1e-3  # A point nearer to a station than this part of the median of such distances is at its place
-NOTABLE_EXCESS = 1e-5
-"""Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
-MOST_CORRELATIONS = 8
-"""Correlations, and weak parameters of cameras with their figures, that a message lists at most."""
+NOTABLE_EXCESS = 1e-5  # Reported difference of the sum of redundancy numbers
+MOST_CORRELATIONS = 8  # Most correlations or weak parameters in a message
 HIGHEST_GIANT = 9000.0  # Metres: the flying height up to which Appendix F of the GIANT guide holds
 
 

@@ -48,8 +48,7 @@ SOLVED = (
 )
 """What a resection has as the core gives it."""
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
-DOUBTFUL = 3.0
-"""A station is near the danger cylinder when it is within this multiple of its standard deviation."""
+DOUBTFUL = 3.0  # Standard deviations: a nearer danger cylinder is reported
 
 
 @dataclass(frozen=True, eq=False)

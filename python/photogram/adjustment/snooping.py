@@ -45,10 +45,10 @@ from photogram.results.network_trial import (
     OBSERVATION,
     POSITION,
     NetworkTrial,
+    network_trial,
 )
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped, recorded
-from photogram.results.suspects import network_trial
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped

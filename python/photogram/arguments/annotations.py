@@ -30,8 +30,7 @@ from photogram.words import phrase
 
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
-_MARK = "_checks_arguments"
-"""An attribute of functions that check their arguments: names of several packages are checked once."""
+_MARK = "_checks_arguments"  # Attribute of functions that check their arguments
 _ARRAYS = {"NDArray": NDArray, "np": np, "Floats": Floats, "Indices": Indices, "Bools": Bools}
 """What arrays are called in annotations, where the names are imported for type checking only."""
 

@@ -232,7 +232,7 @@ def value_field(value: object) -> str | float | Phrase:
     if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
         return value
     try:
-        return phrase("error.value", value=ascii(value)[:80])
+        return phrase("error.value", value=" ".join(ascii(value).split())[:80])
     except Exception:  # a foreign object may fail at anything, a deep one at its depth
         return phrase("error.object", type=type(value).__name__)
 

@@ -118,7 +118,7 @@ def stated(
 
     from photogram import statement as made
     from photogram.formats.crs_results import placed
-    from photogram.results.statement.given_coordinates import System
+    from photogram.results.statement.comparison import System
 
     run = job.run(command)
     system = None
@@ -140,7 +140,7 @@ def stated(
 
 def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, bytes]:
     """Return all files of a statement, with a remark on each missing package."""
-    from photogram.results.statement.sheets import files_of_statement
+    from photogram.results.statement.tables import files_of_statement
 
     files = {folder / name: content for name, content in files_of_statement(found).items()}
     files[folder / "statement.json"] = found.to_json()

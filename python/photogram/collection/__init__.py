@@ -2,8 +2,9 @@
 
 from photogram.arguments.annotations import check_arguments
 from photogram.collection.adjust import adjust
-from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.collection import Collection
 from photogram.collection.formats import read, to_bytes
+from photogram.collection.parameters import PARAMETERS
 from photogram.collection.result import AdjustedCollection
 from photogram.collection.simulation import Simulation, simulate, simulate_turntable
 

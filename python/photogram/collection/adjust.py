@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from photogram.adjustment.adjustment import (
 )
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
-from photogram.collection.collection import Collection
 from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
 from photogram.messages import Message, Undetermined
 from photogram.network.core_arrays import CoreOptions
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import Collection
 
 __all__ = ["adjust", "adjusted"]
 
@@ -143,7 +145,14 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         messages.append(Undetermined(phrase("collection.no-covariances", error=str(error)), what=str(error)))
     # A point far off on parallel rays creeps alone, and is named itself.
     if solution.weak and not solution.weak_points:
-        messages.append(hardly_determined(solution.status, _unknowns(solution.weak, collection)))
+        photos: dict[int, list[str]] = {}
+        for photo, unknown in sorted(solution.weak, key=lambda pair: pair[1]):
+            photos.setdefault(unknown, []).append(str(photo))
+        unknowns = [
+            str(phrase("collection.weak-unknowns", parameter=collection.parameters[unknown], names=names))
+            for unknown, names in photos.items()
+        ]
+        messages.append(hardly_determined(solution.status, "; ".join(unknowns)))
     messages += rounded(solution.redundancy_excess)
     numbers = [str(point) for point in range(len(collection.point_positions))] if solution.weak_points else []
     messages += harmful_points(solution.weak_points, numbers) + _hardly_held(solution)
@@ -190,15 +199,3 @@ def _hardly_held(solution: _photocore.CollectionSolution) -> list[Message]:
     ratio = np.nan_to_num(sd[:, free] / np.nanmedian(sd[:, free], axis=0)).max(axis=1)
     names = [str(photo) for photo in np.flatnonzero(ratio > WORSE)]
     return [Message.of("collection.weak-photos", names=names, ratio=float(ratio.max()))] if names else []
-
-
-def _unknowns(of_photos: list[tuple[int, int]], collection: Collection) -> str:
-    """Return names of unknowns and of their photos."""
-    photos: dict[int, list[str]] = {}
-    for photo, unknown in sorted(of_photos, key=lambda pair: pair[1]):
-        photos.setdefault(unknown, []).append(str(photo))
-    names = collection.parameters
-    return "; ".join(
-        str(phrase("collection.weak-unknowns", parameter=names[unknown], names=numbers))
-        for unknown, numbers in photos.items()
-    )

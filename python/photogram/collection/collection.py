@@ -12,6 +12,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.knots import KNOTTED
@@ -28,11 +29,7 @@ if TYPE_CHECKING:
     from photogram.results.grouping import Grouping, Observables
     from photogram.statistics.snooping.taking_out import Settings
 
-__all__ = ["PARAMETERS", "Collection"]
-
-
-POSE = ("w1", "w2", "w3", "t1", "t2", "t3")  # Of a photo: angle-axis vector w (rad) and translation t
-PARAMETERS = (*POSE, "f", "k1", "k2")  # Of a photo with the camera `bal`: also f (pixels), k1, k2
+__all__ = ["Collection"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,17 +161,10 @@ class Collection(Valued, Brief):
     def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
         return dict(_photocore.camera_models())[self.camera]
 
-    @staticmethod
-    def parameters_of(camera: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return names and units of the k parameters of a photo with a camera of this model."""
-        powers = dict(_photocore.camera_models())[camera][1]
-        units = ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for _, power in powers)
-        return (*POSE, *(name for name, _ in powers)), units
-
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
-        return self.parameters_of(self.camera)[0]
+        return parameters_of(self.camera)[0]
 
     @property
     def _constant(self) -> NDArray[np.bool_]:
@@ -184,7 +174,7 @@ class Collection(Valued, Brief):
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the k parameters: `rad`, `px`; none for numbers and for lengths in the object space."""
-        return self.parameters_of(self.camera)[1]
+        return parameters_of(self.camera)[1]
 
     @property
     def formula(self) -> str:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.remarks import too_coarse
 from photogram.arguments.types import Indices
-from photogram.collection.collection import POSE, Collection
+from photogram.collection.parameters import POSE
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import available_memory
 from photogram.network.core_arrays import CoreOptions
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import Collection
 
 ROUGH, EXACT = 1e-7, 1e-12  # A smaller decrease of the sum of squares ends a round; EXACT with R of all rows
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.results.axes import Determined, Terms, image_axes
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section
@@ -21,18 +21,6 @@ if TYPE_CHECKING:
 @np.errstate(over="ignore", invalid="ignore")
 def collection_document(result: AdjustedCollection) -> Document:
     """Return the document of an adjusted collection."""
-    pictures = drawings(result)
-    cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
-    return network_document(
-        result,
-        "Adjustment of a collection of photos",
-        _size_section(result),
-        [control_section(result), stations_section(result), cameras],
-        photos=int(np.count_nonzero(result.photo_images)),
-    )
-
-
-def _size_section(result: AdjustedCollection) -> Section:
     given, variance = result.collection, result.variance_of_unit_weight
     counts = {
         "photos": result.photo_images > 0,
@@ -52,15 +40,30 @@ def _size_section(result: AdjustedCollection) -> Section:
         Fact("Cost", significant(result.cost, 7)),
         Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
     ]
-    return size_section(result, size, more, good)
+    pictures = drawings(result)
+    cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
+    return network_document(
+        result,
+        "Adjustment of a collection of photos",
+        size_section(result, size, more, good),
+        [control_section(result), stations_section(result), cameras],
+        photos=int(np.count_nonzero(result.photo_images)),
+    )
 
 
 def collection_members(result: AdjustedCollection) -> dict[str, Any]:
     """Return the members of the JSON document of an adjusted collection."""
+    named = zip(result.collection.parameters[len(POSE) :], result.collection.units[len(POSE) :], strict=True)
+    lengths, plain = list[str](), list[str]()
+    for name, unit in named:
+        (lengths if unit else plain).append(name)
     return {
         **network_members(result),
         "units": {
-            **_units(result),
+            "w1, w2, w3": "rad",
+            "t1, t2, t3, position": "unit of the object space",
+            ", ".join([*lengths, "residual_px"]): "pixel",
+            **({", ".join(plain): "1"} if plain else {}),
             "covariance": "products of these",
             "operations": "multiply-adds, each time the phase is carried out",
             "seconds": "s",
@@ -80,19 +83,6 @@ def collection_members(result: AdjustedCollection) -> dict[str, Any]:
         "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
         "camera": result.collection.camera,
         "parameters": result.collection.parameters,
-    }
-
-
-def _units(result: AdjustedCollection) -> dict[str, str]:
-    """Return the units of parameters, of positions and of residuals, what shares a unit together."""
-    names, units = result.collection.parameters[6:], result.collection.units[6:]
-    lengths = [name for name, unit in zip(names, units, strict=True) if unit]
-    plain = [name for name, unit in zip(names, units, strict=True) if not unit]
-    return {
-        "w1, w2, w3": "rad",
-        "t1, t2, t3, position": "unit of the object space",
-        ", ".join([*lengths, "residual_px"]): "pixel",
-        **({", ".join(plain): "1"} if plain else {}),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.results.findings import network_findings
 from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns
@@ -88,9 +88,6 @@ def _partials(result: AdjustedCollection) -> Floats:
     seen = np.flatnonzero(result.used_images)
     photos, points = photos[seen], points[seen]
 
-    def images(photos: Floats, points: Floats) -> Floats:
-        return _photocore.collection_images(collection.camera, photos, points)
-
     size = float(np.median(np.abs(points)))
     for k in range(len(found)):
         of_photo = k < photos.shape[1]
@@ -101,6 +98,6 @@ def _partials(result: AdjustedCollection) -> Floats:
             moved = [photos.copy(), points.copy()]
             column = k if of_photo else k - photos.shape[1]
             moved[0 if of_photo else 1][:, column] += sign * step
-            ends.append(images(*moved))
+            ends.append(_photocore.collection_images(collection.camera, *moved))
         found[k, seen] = (ends[0] - ends[1]) / (2 * step[:, np.newaxis])
     return found

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE
-from photogram.collection.result import AdjustedCollection
+from photogram.collection.parameters import POSE
 from photogram.network.cameras import Camera
 from photogram.plots.picture_data import Correlated, Curve, Curves, Plan
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
 from photogram.results.picture_data import PicturedNetwork
+
+if TYPE_CHECKING:
+    from photogram.collection import AdjustedCollection
 
 BEYOND = 1.1  # How far curves of distortion go on, of the largest observed radius
 ROWS = 51  # Radii of a curve

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE, Collection
 from photogram.collection.core_arrays import collection_network, collection_trial, named
+from photogram.collection.parameters import POSE
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.covariance import Failure
+from photogram.results.covariance import Adjusted, Failure, Things
 from photogram.results.network import AdjustedNetwork
-from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram import _photocore
+    from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,15 +16,17 @@ from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.as_block import as_block
-from photogram.collection.collection import POSE, Collection
 from photogram.collection.core_arrays import collection_network, collection_trial
 from photogram.collection.findings import collection_held
+from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.diagnosis.diagnose import Manner, check_block
 from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import exchanged_names
@@ -34,6 +37,9 @@ from photogram.statistics.snooping.starts import MEDIAN_OF_TWO
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import Collection
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0  # Robust standard deviations from which on an image is out at first, after a robust adjustment
@@ -84,21 +90,18 @@ def snoop_collection(
     result = adjust(cleaned, threads=threads, progress=progress, **options)
     placed = as_block(collection.replace(photo_parameters=result.photo_parameters))
     used = used_images(trial, outcome.out, len(collection.image_xy))
+    # The constants of a camera are no parameters that are held.
+    fixed = collection.photo_sd == 0
+    fixed[:, len(POSE) :] &= ~fixed[:, len(POSE) :].all(axis=0)
+    any_held = bool(fixed.any() or (collection.point_sd == 0).any())
     return finished(
         result,
         trial,
         outcome,
         settings,
-        held=lambda: collection_held(adjust(collection, **options)) if _has_held(collection) else [],
+        held=lambda: collection_held(adjust(collection, **options)) if any_held else [],
         exchanged=exchanged_names(placed, used, max(result.variance_of_unit_weight or 1.0, 1.0)),
     )
-
-
-def _has_held(collection: Collection) -> bool:
-    """Whether anything is held but the constants of a camera."""
-    held = collection.photo_sd == 0
-    held[:, len(POSE) :] &= ~held[:, len(POSE) :].all(axis=0)
-    return bool(held.any() or (collection.point_sd == 0).any())
 
 
 def started_robustly(
@@ -162,3 +165,44 @@ def check(network: Collection, threads: int | None) -> Diagnosis:
         section.remark(str(phrase("collection.no-robust-start", error=error)))
     sections, result = check_block(as_block(network), Manner({"threads": threads}))
     return Diagnosis("", [section, *sections], result)
+
+
+def as_block(collection: Collection) -> Block:
+    """Return the block of a collection: the same photos with a camera each, and points where rays meet.
+
+    Positions and attitudes are fixed where all components are; other weights of them are left out.
+    """
+    poses = collection.photo_parameters[:, : len(POSE)]
+    attitudes = Attitudes.of("rotation_vector_to_photo", poses[:, :3])
+    centres = -np.einsum("pij,pj->pi", attitudes.matrices, poses[:, 3:])
+    fixed = (collection.photo_sd[:, : len(POSE)] == 0).all(axis=1)[:, np.newaxis]
+    sd = np.broadcast_to(np.where(fixed, 0.0, math.inf), (len(poses), 3))
+    names = collection.parameters[len(POSE) :]
+    held = np.isfinite(collection.point_sd)
+    return Block(
+        photo_ids=[f"photo {number}" for number in range(len(poses))],
+        photo_positions=centres,
+        photo_attitudes=attitudes.values("omega_phi_kappa"),
+        photo_position_sd=sd,
+        photo_attitude_sd=sd,
+        cameras=[
+            Camera(
+                collection.camera,
+                dict(zip(names, values, strict=True)),
+                sd={name: one for name, one in zip(names, own, strict=True) if one > 0},
+                unit="px",
+            )
+            for values, own in zip(
+                collection.photo_parameters[:, len(POSE) :].tolist(),
+                collection.photo_sd[:, len(POSE) :].tolist(),
+                strict=True,
+            )
+        ],
+        point_ids=[f"point {number}" for number in range(len(collection.point_positions))],
+        point_positions=np.where(held, collection.point_positions, np.nan),
+        point_sd=collection.point_sd,
+        image_photos=collection.image_photos,
+        image_points=collection.image_points,
+        image_xy=collection.image_xy,
+        image_sd=collection.image_sd,
+    )

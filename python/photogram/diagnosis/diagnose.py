@@ -50,8 +50,7 @@ from photogram.words import phrase
 
 __all__ = ["Manner", "check_block", "diagnose"]
 
-FINAL_STATIONS = 5.0
-"""Stations count as adjusted when half the residuals are below so many standard deviations."""
+FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # So many times the usual residual before the adjustment comes from coarse stations
 MOST_SETS = 5  # Mistakes in the control as a whole that are put right one upon the other, at the most
 
@@ -125,7 +124,7 @@ def diagnose(
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
     if not len(block.image_xy):
-        raise argument_error("block", "missing", name="image observations")
+        raise argument_error("block", "no-images")
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):

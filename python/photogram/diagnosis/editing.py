@@ -43,8 +43,7 @@ from photogram.results.result import Result
 from photogram.show.page import Column, Table
 
 ROUNDS = 20  # Adjustments at the most
-COMPARABLE = 0.4
-"""Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
+COMPARABLE = 0.4  # Smaller test values (of the largest) may be consequences
 HOPELESS = 5.0
 """Spread of the test values above which photos that did not fit before the adjustment are left out.
 

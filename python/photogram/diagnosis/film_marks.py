@@ -24,15 +24,14 @@ from photogram.messages import Message
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
 from photogram.network.unknowns import Unknown
-from photogram.results.film_pictures import mark_residuals
+from photogram.results.film_report import mark_residuals
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 from photogram.words import phrase
 
 CERTIFICATE = "certificate"
-ALIKE = 0.7
-"""What has at least this part of the largest test value is named beside it: less may be its consequence."""
+ALIKE = 0.7  # Comparable test values, as a part of the largest
 FEWEST_FAILING = 3  # Marks of a photo that all fail
 
 
@@ -123,8 +122,7 @@ def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
 
 FEWEST = 4  # Marks of a photo: three are alike along any axis
 CHANCE = 1e-3  # Of a hint where nothing is wrong
-EXPLAINED = 0.7
-"""Of the weighted sum of squares of a photo's marks that is explained at least: half of it by one of four."""
+EXPLAINED = 0.7  # Least explained part of the weighted sum of squares of a photo
 ALONE = 1e-6  # Part of the largest column that the others must leave of one
 
 

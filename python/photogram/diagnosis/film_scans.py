@@ -77,8 +77,7 @@ FEWEST = 20  # Images of a photo
 WINDOWS = tuple(0.001 * 2.0**k for k in range(7))  # How far apart lines are, in parts of the scan
 FAR = 2  # So many of these on are those that are far
 CHANCE = 1e-3  # Of a hint where nothing is wrong
-OTHERWISE = 2.0
-"""Times by which z is larger than that of lines across: what is alike in both is no matter of lines."""
+OTHERWISE = 2.0  # Least ratio of z along lines to z across lines
 WORTH = 0.5  # Standard deviations of a reading that lines have in common at least
 TINY = 1e-9
 

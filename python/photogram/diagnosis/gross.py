@@ -24,8 +24,7 @@ BAD_PHOTO_SD = 4.3
 BREAK = 10.0  # A break in the pattern: so many robust standard deviations from what its photo suggests
 FLAGRANT = 24.0  # A break so large that it is grave though no single image explains it
 CHANCE = 2.0  # A break so many times the least one is grave with three rays too
-EXPLAINED = 0.35
-"""Leaving out one ray, or exchanging two names, explains a point when so much is left of its residuals."""
+EXPLAINED = 0.35  # Largest part of the residuals that remains after an explanation
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences that stand out by so many robust standard deviations."""
 FEWEST_CONTROL = 4  # Control points that a comparison needs

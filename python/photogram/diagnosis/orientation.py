@@ -17,11 +17,9 @@ from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 from photogram.words import Phrase, phrase
 
-SUSPICIOUS = 0.25
-"""Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
+SUSPICIOUS = 0.25  # Cost of a doubtful orientation (0: rays meet, 1: rays miss)
 BETTER = 0.5  # An explanation must lower the cost to this part of what it was
-UPRIGHT = 0.8
-"""Vertical component of the z axis of a near-vertical photo, at least; it looks along its negative z axis."""
+UPRIGHT = 0.8  # Least vertical component of the z axis of a near-vertical photo
 AS_GOOD = 1.5  # Another explanation is as good when its cost is below so many times the least
 MOST = 20  # Photos that are turned one by one, at most
 TURNS = (180, 90, -90)  # Degrees of kappa

@@ -18,10 +18,8 @@ from photogram.show.page import Column, Table
 from photogram.words import phrase
 
 FEWEST = 20  # Images of a photo that a test of its pattern needs
-WORTH = 0.3
-"""A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
-ROUNDING = 0.01
-"""Of the standard deviation of an image coordinate: smaller standard deviations of residuals are not used."""
+WORTH = 0.3  # Notable amplitude of a common pattern (sd of an image coordinate)
+ROUNDING = 0.01  # Least used sd of residuals (sd of an image coordinate)
 SHOWN = 5
 
 

@@ -30,7 +30,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.distributed.cut import UNKNOWNS, Counts, counted_work
 from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
-from photogram.distributed.driver import Driver, Outcome, Stop
+from photogram.distributed.driver import Driver, Outcome
 from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
 from photogram.distributed.files import alone
 from photogram.distributed.graph import alone_of, incidence_of, vertices_of
@@ -267,18 +267,10 @@ class Run:
         """
         self.plan(measured=False).check()
         options = self.manifest.options
-        stop = Stop(
-            options.limit,
-            options.max_iterations,
-            options.covariance,
-            options.unit_variance,
-            options.loss is not None,
-            options.criterion == "percent",
-        )
         found, mover = self.manifest, None
         if block is not None and found.datum is not None:
             mover = Mover(block, options, found.datum, found.held, found.middle)
-        return Driver(self.job, found.tree, self.executor, stop, progress, mover).run(resume=True)
+        return Driver(self.job, found.tree, self.executor, options, progress, mover).run(resume=True)
 
 
 @contextmanager
@@ -316,19 +308,15 @@ def opened(
                 raise InputError(phrase("parts.other-run"), file=folder)
         else:
             room = None if memory is None else int(SHARE * memory) - held
-            manifest = divided(division.parts_of(photos) or _parts_for(counted, photos, workers, room))
+            parts = division.parts_of(photos)
+            if parts is None:
+                # Some for each worker; more if the bytes for nodes do not suffice.
+                largest = max(photos // LEAST_PHOTOS, 1)
+                parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, largest)
+                while room is not None and 2 * parts <= largest and counted(parts).memory_bytes.max() > room:
+                    parts *= 2
+            manifest = divided(parts)
         most = None if memory is None else int(SHARE * memory) + others
         columns = 0 if manifest.datum is None else len(manifest.held)
         job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most, source, columns)
         yield Run(folder, manifest, executor, job, workers, memory, held)
-
-
-def _parts_for(counted: Callable[[int], Counts], photos: int, workers: int, room: int | None) -> int:
-    """Return how many parts a block is cut into: some for each worker, whose bytes for nodes are `room`."""
-    most = max(photos // LEAST_PHOTOS, 1)
-    parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, most)
-    while room is not None and 2 * parts <= most:
-        if counted(parts).memory_bytes.max() <= room:
-            break
-        parts *= 2
-    return parts

@@ -256,7 +256,12 @@ def counted_work(
         pieces *= 2
     deep = cut(positions, images, incidences, parts * pieces)
     tree = tree_of(parts)
-    node_of = _nodes_above(deep.tree, tree, pieces)
+    # The node of the coarse tree that each node of the finer one is part of
+    of_span = {tuple(span): node for node, span in enumerate((tree.spans * pieces).tolist())}
+    node_of = np.empty(len(deep.tree), dtype=np.int64)
+    for node in range(deep.tree.root, -1, -1):
+        span = tuple(deep.tree.spans[node].tolist())
+        node_of[node] = of_span[span] if span in of_span else node_of[deep.tree.parents[node]]
     outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
     inner: Floats = unknowns * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
     above = unknowns * np.array([len(each) for each in outer], dtype=float)
@@ -311,14 +316,4 @@ def outer_vertices(tree: Tree, owners: Indices, incidences: list[Incidence]) -> 
         below = [*own[node], *(found[child] for child in children)]
         touched = np.unique(np.concatenate(below)) if below else np.zeros(0, dtype=np.int64)
         found.append(touched[owners[touched] != node])
-    return found
-
-
-def _nodes_above(deep: Tree, tree: Tree, pieces: int) -> Indices:
-    """Return the node of the coarse tree that each node of a finer one is part of."""
-    of_span = {tuple(span): node for node, span in enumerate((tree.spans * pieces).tolist())}
-    found = np.empty(len(deep), dtype=np.int64)
-    for node in range(deep.root, -1, -1):
-        span = tuple(deep.spans[node].tolist())
-        found[node] = of_span[span] if span in of_span else found[deep.parents[node]]
     return found

@@ -38,22 +38,11 @@ from photogram.distributed.tasks import (
 from photogram.distributed.walks import Up, Walks
 from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.core_arrays import CoreOptions
 from photogram.results.iteration import Iteration
 from photogram.words import phrase
 
 RULES = _photocore.step_rules()  # The constants of the rules of steps, which are those of one process
-
-
-@dataclass(frozen=True)
-class Stop:
-    """When to stop: the options of :func:`photogram.adjust` of the same names."""
-
-    tolerance: float = 1e-5
-    max_iterations: int = 50
-    covariance: bool = True
-    unit_variance: str = "constrained"
-    reweighted: bool = False  # Whether a loss weights the observations
-    as_published: bool = False  # Whether steps are those of the 1987 program: the tolerance is its percentage
 
 
 @dataclass(frozen=True)
@@ -86,11 +75,11 @@ class Driver:
         job: Job,
         tree: Tree,
         executor: Executor,
-        stop: Stop,
+        options: CoreOptions,
         progress: Callable[[Progress], None] | None = None,
         mover: Mover | None = None,
     ) -> None:
-        self.job, self.stop, self._mover = job, stop, mover
+        self.job, self.options, self._mover = job, options, mover
         self._walks, self._course = Walks(job, tree, executor, progress), Course()
 
     def run(self, *, resume: bool = False) -> Outcome:
@@ -110,7 +99,8 @@ class Driver:
 
     def _run(self) -> Outcome:
         course = self._course
-        self._unknowns = self._counts()
+        found = np.array(self._walks.all(counted, phase="read")).sum(axis=0)
+        self._unknowns: tuple[int, int, int, int, int, int] = tuple(found.tolist())
         if course.ending is not None:
             return self._finish(None)
         up = self._up(Point(course.state, course.damping, course.curved))
@@ -121,7 +111,7 @@ class Driver:
             if self._mover is not None:
                 # A datum that is not carried is refused before anything is adjusted.
                 self._in_datum(self._mover, course.state)
-        return self._full_steps(up) if self.stop.as_published else self._damped_steps(up)
+        return self._full_steps(up) if self.options.criterion == "percent" else self._damped_steps(up)
 
     def _full_steps(self, up: Up) -> Outcome:
         """Take full steps, whatever becomes of the sum of squares (GIANT guide, section 6)."""
@@ -142,16 +132,16 @@ class Driver:
         """Return how full steps have ended, by what the last one has changed; None where they have not."""
         *_, last = sums = [each.weighted_sum_of_squares for each in self._course.iterations] or [math.nan]
         change = 100.0 * (last / sums[-2] - 1.0) if len(sums) > 1 else math.nan
-        if abs(change) < self.stop.tolerance:
+        if abs(change) < self.options.limit:
             return "converged"
-        if change >= self.stop.tolerance:
+        if change >= self.options.limit:
             return "diverged"
-        return "not converged" if len(self._course.iterations) >= self.stop.max_iterations else None
+        return "not converged" if len(self._course.iterations) >= self.options.max_iterations else None
 
     def _damped_steps(self, up: Up) -> Outcome:
         """Take steps that lower the sum of squares."""
         course = self._course
-        while len(course.iterations) < self.stop.max_iterations and up.at.damping <= RULES["most_damping"]:
+        while len(course.iterations) < self.options.max_iterations and up.at.damping <= RULES["most_damping"]:
             change = math.sqrt(max(up.decrease, 0.0))
             kind = self._judged(change) if up.at.damping == 0.0 else "damped"
             if kind in ("last", "rests"):
@@ -166,7 +156,7 @@ class Driver:
         """Return what a full step is, by its length and those before (`_photocore.judge_full_step`)."""
         course = self._course
         taken = [(each.damping, each.largest_change) for each in course.iterations]
-        unknowns, tolerance = self._unknowns[4], self.stop.tolerance
+        unknowns, tolerance = self._unknowns[4], self.options.limit
         return _photocore.judge_full_step(
             taken, change, chord=course.chord, unknowns=unknowns, tolerance=tolerance
         )
@@ -185,7 +175,7 @@ class Driver:
             before, moved = sums.sum(axis=0).tolist()
             self._walks.remove(after if moved < before else other)
             after = other if moved < before else after
-        elif chord and self._unknowns[5] and not self.stop.reweighted:
+        elif chord and self._unknowns[5] and self.options.loss is None:
             after = self._with_chord(up, after, change)
         self._walks.forget(up)
         relaxed = damping / 10.0 if damping / 10.0 >= RULES["least_damping"] else 0.0
@@ -220,7 +210,7 @@ class Driver:
         course = self._course
         old, course.before, course.state = course.before, course.state, at.state
         course.damping, course.curved = at.damping, at.curved
-        course.near = self.stop.reweighted and iteration.largest_change <= RULES["near"]
+        course.near = self.options.loss is not None and iteration.largest_change <= RULES["near"]
         course.iterations.append(iteration)
         course.write(self.job.folder, self.job.source)
         if old not in (course.before, course.state):
@@ -269,10 +259,10 @@ class Driver:
             up = self._up(Point(formed))
         sums = self._evaluated(after)[:4]
         freedom, variance = self._variance(sums)
-        if self.stop.covariance:
+        if self.options.covariance:
             datum = None if up.products is None else InDatum(up.products, last)
             self._walks.invert(up, after, variance, datum)
-            if self.stop.unit_variance == "redundancy":
+            if self.options.unit_variance == "redundancy":
                 # The nodes scale what they have found by q / r, of all but photos (docs/weights.md).
                 numbers = self._walks.all(redundancies, phase="invert")
                 freedom = math.fsum(share for _, *measured in numbers for share in measured)
@@ -309,7 +299,7 @@ class Driver:
     def _variance(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
         """Return degrees of freedom and variance of unit weight (GIANT guide, Appendix E)."""
         observations, weighted, unknowns, stations, *_ = self._unknowns
-        freedom, kind = observations + weighted - unknowns, self.stop.unit_variance
+        freedom, kind = observations + weighted - unknowns, self.options.unit_variance
         total = sum(sums)
         if kind == "unity":
             return freedom, 1.0
@@ -318,11 +308,6 @@ class Driver:
         if kind == "redundancy":  # these are known when all nodes are inverted
             return freedom, None
         return freedom, total / freedom if freedom > 0 else None
-
-    def _counts(self) -> tuple[int, int, int, int, int, int]:
-        found = self._walks.all(counted, phase="read")
-        observations, weighted, unknowns, stations, size, slow = np.array(found).sum(axis=0).tolist()
-        return observations, weighted, unknowns, stations, size, slow
 
     def _up(self, at: Point) -> Up:
         up = self._walks.up(at)

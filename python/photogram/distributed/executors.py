@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from photogram import _photocore
 from photogram.arguments.arrays import shown
@@ -38,36 +38,11 @@ LOOPBACK = "127.0.0.1"
 ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)  # Other texts make Dask look for files
 
 
-class Executor(Protocol):
-    """Does tasks; those that are given handles get what these stand for."""
-
-    def submit(
-        self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
-    ) -> Handle:
-        """Have a task done; handles among the arguments, and in lists among these, are replaced.
-
-        `near` is where another one was done, empty for anywhere; the higher its `cost`, the earlier it is
-        done of those that wait.
-        """
-
-    def places(self) -> list[str]:
-        """Return where tasks can be done, as :meth:`submit` takes it."""
-
-    def first(self, handles: Collection[Handle]) -> Handle:
-        """Wait until one of some tasks is done or has failed, and return it."""
-
-    def value(self, handle: Handle) -> Any:
-        """Return what a task has given; raise what it has raised."""
-
-    def forget(self, handles: Collection[Handle]) -> None:
-        """Let go of what tasks have given."""
-
-    def stop(self) -> None:
-        """Give up all tasks."""
-
-
 class Serial:
-    """Does every task at once, in this process; what tasks give is kept on disk, in the `directory`."""
+    """Does every task at once, in this process; what tasks give is kept on disk, in the `directory`.
+
+    Handles among the arguments of a task, and in lists among these, are replaced by what they stand for.
+    """
 
     def __init__(self, directory: Path | None = None) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="photogram-", dir=directory))
@@ -78,13 +53,18 @@ class Serial:
         """Do a task."""
         del near, cost
         self._count += 1
-        own = self._count
+        own = _Handle(self._count)
         try:
             found = function(*(self._resolved(each) for each in arguments))
-            self._keep(own, found)
+            try:
+                with open(self._path(own), "wb") as file:
+                    pickle.dump(found, file, protocol=5)
+            except OSError as error:
+                reason = error.strerror or str(error)
+                raise AdjustmentError(phrase("parts.not-written", file=self._folder, error=reason)) from None
         except Exception as error:
             self._failed[own] = error
-        return _Handle(own)
+        return own
 
     def places(self) -> list[str]:
         """Return the one place that there is."""
@@ -111,15 +91,6 @@ class Serial:
     def stop(self) -> None:
         """Remove everything."""
         shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _keep(self, number: int, found: object) -> None:
-        try:
-            with open(self._path(number), "wb") as file:
-                pickle.dump(found, file, protocol=5)
-        except OSError as error:
-            raise AdjustmentError(
-                phrase("parts.not-written", file=self._folder, error=error.strerror or str(error))
-            ) from None
 
     def _path(self, number: int) -> Path:
         return self._folder / f"{int(number)}.pickle"
@@ -151,7 +122,7 @@ class Workers:
     def submit(
         self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
     ) -> Future:
-        """Have a task done."""
+        """Have a task done, the earlier the higher its `cost`, by the worker `near` if it has one."""
         self._count += 1
         found = self._client.submit(
             function,
@@ -199,6 +170,9 @@ class Workers:
             self._client.cancel(futures, force=True)
 
 
+Executor = Serial | Workers
+
+
 @contextmanager
 def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
     """Connect to a scheduler, or start a cluster on this machine of so many workers and bytes of each.
@@ -209,7 +183,6 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
     import dask
 
     library = _library()
-
     if isinstance(cluster, library.Client):
         yield cluster
     elif isinstance(cluster, str) and cluster == "local":

@@ -28,7 +28,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution
     from photogram.results.covariance import Covariances
-    from photogram.results.network_trial import NetworkTrial
 
 _OF_PHOTOS = ("photo_positions", "photo_attitudes", "photo_cofactors", "photo_redundancy")
 _OF_POINTS = (
@@ -59,14 +58,10 @@ class InParts(Result):
         """Refuse; covariances of single photos, points and unknowns are there."""
         self._refuse()
 
-    def _trial(self) -> NetworkTrial:
-        self._refuse()
-
-    def _in(self, row: object) -> NoReturn:
-        self._refuse()
-
-    def _refuse(self) -> NoReturn:
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise AdjustmentError(phrase("parts.one-process"))
+
+    _trial = _in = _refuse
 
 
 def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InParts:
@@ -113,11 +108,9 @@ def _rest(
     """Return what a solution has beside arrays of photos, points and images."""
     redundancies = [each["redundancies"] for each in details]
     sums = None if None in redundancies else tuple(map(math.fsum, zip(*redundancies, strict=True)))
-    excess = (
-        None
-        if sums is None
-        else math.fsum(sums) - (outcome.counts[0] + outcome.counts[1] - outcome.counts[2])
-    )
+    observed = dict(_all(details, "observed"))
+    observations, weighted, unknowns = outcome.counts
+    excess = None if sums is None else math.fsum(sums) - (observations + weighted - unknowns)
     return {
         "status": outcome.status,
         "state": _photocore.BlockState([], [], [], [], "input", None, False),
@@ -149,7 +142,8 @@ def _rest(
         "cameras": _cameras(block, owners, details),
         "dropped": sorted((int(row), str(reason)) for row, reason in _all(details, "dropped")),
         "sums_of_squares": outcome.sums_of_squares,
-        "adjusted_observations": _observed(block, details),
+        # In the order of the groups of the whole block
+        "adjusted_observations": [observed[row] for rows, _ in block.observation_groups for row in rows],
         "degrees_of_freedom": outcome.degrees_of_freedom,
     }
 
@@ -165,12 +159,6 @@ def _added(tables: Iterable[dict[str, float]]) -> dict[str, float]:
         for name, value in each.items():
             total[name] = total.get(name, 0.0) + value
     return total
-
-
-def _observed(block: Block, details: list[dict[str, Any]]) -> list[Any]:
-    """Return what has become of observations, in the order of the groups of the whole block."""
-    by_row = dict(_all(details, "observed"))
-    return [by_row[row] for rows, _ in block.observation_groups for row in rows]
 
 
 def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> list[Any]:

@@ -80,8 +80,26 @@ class CoreEngine:
         datum = datum_of(part.block, solution, row, held=manifest.held)
         freedom = solution.degrees_of_freedom
         _write(folder, _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], freedom))
+        # What tables have no place for; rows are those of the whole block.
+        places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
+        observed = zip(places, solution.adjusted_observations, strict=True)
+        outcome = {
+            "sums_of_squares": solution.sums_of_squares,
+            "redundancies": solution.redundancies,
+            "behind": part.images[solution.images_behind].tolist(),
+            "folded": part.images[solution.images_folded].tolist(),
+            "loose": part.photos[solution.loose_photos].tolist(),
+            "weak_points": [(int(part.points[row]), *rest) for row, *rest in solution.weak_points],
+            "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
+            "cameras": solution.cameras,
+            "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
+            "observed": list(observed),
+            "relative_error": solution.relative_error,
+            "operations": solution.operations,
+            "seconds": solution.seconds,
+        }
         # The last of its files: with it the node is done.
-        write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
+        write_json(folder / OUTCOME, Encoder().value(outcome))
 
     def unknowns(self, run: Path, number: int, node: _photocore.Node) -> Indices:
         """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
@@ -143,24 +161,3 @@ class _Scaled:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._solution, name)
-
-
-def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
-    """Return what tables have no place for; rows are those of the whole block."""
-    places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
-    observed = zip(places, solution.adjusted_observations, strict=True)
-    return {
-        "sums_of_squares": solution.sums_of_squares,
-        "redundancies": solution.redundancies,
-        "behind": part.images[solution.images_behind].tolist(),
-        "folded": part.images[solution.images_folded].tolist(),
-        "loose": part.photos[solution.loose_photos].tolist(),
-        "weak_points": [(int(part.points[row]), *rest) for row, *rest in solution.weak_points],
-        "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
-        "cameras": solution.cameras,
-        "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
-        "observed": list(observed),
-        "relative_error": solution.relative_error,
-        "operations": solution.operations,
-        "seconds": solution.seconds,
-    }

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.graph import Homes, alone_of, photos_of, vertices_of
 from photogram.errors import InputError
@@ -128,7 +128,13 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     touched = owners == node
     touched[at_home.image_photos] = True
     touched[below.photos] = True
-    _touch(block, touched, own)
+    if own or block.mounts or block.timed:
+        rows = {name: row for row, name in enumerate(block.photo_ids)}
+        alone = alone_of(block) if own else {}
+        for each in own:
+            touched[[rows[name] for name in photos_of(each, alone)]] = True
+        # With photos that stand for photos on frames and trajectories
+        touched[vertices_of(block)[np.flatnonzero(touched)]] = True
     photos = np.flatnonzero(touched)
     names = [block.photo_ids[row] for row in photos]
     new_photos = np.full(len(touched), -1, dtype=np.int64)
@@ -200,18 +206,6 @@ def names_above(
         if not (each.is_held or id(each) in of_unknowns or alone.get(id(each)) in at_home)
     )
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
-
-
-def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
-    """Add the photos of observations, and those that stand for photos on frames and trajectories."""
-    if not (observations or block.mounts or block.timed):
-        return
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    alone = alone_of(block) if observations else {}
-    for each in observations:
-        touched[[rows[name] for name in photos_of(each, alone)]] = True
-    vertices = vertices_of(block)
-    touched[vertices[np.flatnonzero(touched)]] = True
 
 
 def write_part(folder: Path, part: Part) -> str:

@@ -21,6 +21,7 @@ __all__ = ["PartsPlan", "Rates", "Times", "measured_rates", "scheduled"]
 
 
 IMAGE = 200.0  # Multiply-adds of the formation of an image point
+BANDWIDTH = 1e9  # Bytes a second between workers: 10 Gbit Ethernet
 ITERATIONS = 4  # Formations of an adjustment from usual initial values
 SHARE = 0.8  # Of the memory of a worker that nodes may fill: messages under way take the rest
 
@@ -174,11 +175,8 @@ class PartsPlan:
         return lines
 
 
-def measured_rates(part: _photocore.Node, bandwidth: float = 1e9) -> Rates:
-    """Measure what this process does in a second, at one part, formed and inverted for nothing else.
-
-    `bandwidth` is in bytes a second between workers: 10 Gbit Ethernet.
-    """
+def measured_rates(part: _photocore.Node) -> Rates:
+    """Measure what this process does in a second, at one part, formed and inverted for nothing else."""
     prediction = part.prediction
     size = len(part.outer)
     start = time.perf_counter()
@@ -197,7 +195,7 @@ def measured_rates(part: _photocore.Node, bandwidth: float = 1e9) -> Rates:
     in_factor = min(prediction["factor"] / dense, 0.9 * forming)
     in_inverse = min(prediction["inverse"] / dense, 0.9 * inverting)
     rate = 2 * formation / (forming - in_factor + inverting - in_inverse)
-    return Rates(rate, dense, dense, bandwidth)
+    return Rates(rate, dense, dense, BANDWIDTH)
 
 
 @dataclass(frozen=True)

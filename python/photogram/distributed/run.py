@@ -98,9 +98,16 @@ def partition(
 ) -> Manifest:
     """Cut a block with all poses and common unknowns into parts on disk, in a folder that is made.
 
-    AdjustmentError: the folder cannot be written to; a datum is asked for, and the block is not free.
+    AdjustmentError: the folder cannot be written to; a datum is asked for, and the block is not free. Else as
+    of :func:`photogram.adjust`, before its first iteration.
     """
-    held = held_for_datum(block, options)
+    # An adjustment of the whole block holds them if nothing else gives a datum.
+    held: list[tuple[int, int]] = []
+    if not np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
+        try:
+            held = block_network(block, options).held_for_datum(threads=0)
+        except _photocore.BlockError as error:
+            raise named(block, *error.args) from None
     if datum is not None and not held:
         raise AdjustmentError(phrase("parts.not-free"))
     block = with_flights(block)
@@ -124,19 +131,6 @@ def partition(
         held,
         datum,
     )
-
-
-def held_for_datum(block: Block, options: CoreOptions) -> list[tuple[int, int]]:
-    """Return what an adjustment of a whole block would hold, nothing else giving a datum.
-
-    RankError, AdjustmentError: as of :func:`photogram.adjust`, before its first iteration.
-    """
-    if np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
-        return []
-    try:
-        return block_network(block, options).held_for_datum(threads=0)
-    except _photocore.BlockError as error:
-        raise named(block, *error.args) from None
 
 
 def divided(
@@ -187,7 +181,12 @@ def divided(
         held,
         datum,
     )
-    write_manifest(run, manifest)
+    # With it a partition is whole.
+    document = {name: getattr(manifest, name) for name in _PLAIN}
+    document["parts"] = (len(manifest.tree) + 1) // 2
+    document["outer"] = [each.rows for each in manifest.outer]
+    document["options"] = asdict(manifest.options)
+    write_json(run / MANIFEST, document)
     return manifest
 
 
@@ -215,23 +214,15 @@ def _weighted(
     return sum(int(np.count_nonzero(np.isfinite(each) & (each > 0))) for each in sd)
 
 
-def write_manifest(run: Path, manifest: Manifest) -> None:
-    """Write what all nodes have in common: with it a partition is whole."""
-    document = {name: getattr(manifest, name) for name in _PLAIN}
-    document["parts"] = (len(manifest.tree) + 1) // 2
-    document["outer"] = [each.rows for each in manifest.outer]
-    document["options"] = asdict(manifest.options)
-    write_json(run / MANIFEST, document)
-
-
 def read_manifest(run: Path) -> Manifest:
-    """Read what :func:`write_manifest` has written; InputError of another version, or of damage."""
+    """Read what all nodes have in common; InputError of another version, or of damage."""
     document = read_json(run / MANIFEST)
     if document.get("version") != _photocore.__version__:
         raise InputError(phrase("parts.other-version", version=_photocore.__version__), file=run / MANIFEST)
     options = document["options"]
-    for name in ("loss", "minimum"):
-        options[name] = _as_tuple(options[name])
+    loss, minimum = options["loss"], options["minimum"]
+    options["loss"] = loss and tuple(loss)
+    options["minimum"] = minimum and (minimum[0], minimum[1] and tuple(minimum[1]))
     plain = {name: document[name] for name in _PLAIN}
     plain["middle"] = tuple(plain["middle"])
     plain["held"] = [(photo, number) for photo, number in plain["held"]]
@@ -243,10 +234,6 @@ def read_manifest(run: Path) -> Manifest:
         options=CoreOptions(**options),
         **plain,
     )
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:

@@ -60,11 +60,8 @@ class Walks:
         places, parts = executor.places(), int(tree.spans[:, 1].max())
         self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
         self.nodes = range(len(tree))
-        heights = np.zeros(len(tree))
-        for node in range(tree.root - 1, -1, -1):
-            heights[node] = heights[tree.parents[node]] + 1
         # Deep nodes first: what waits for them waits longest.
-        self._costs = heights.tolist()
+        self._costs = tree.levels.tolist()
 
     def all(self, function: Callable[..., Any], *given: Any, phase: str) -> list[Any]:
         """Return what a task gives of each node."""
@@ -150,7 +147,15 @@ class Walks:
         """
         parents = self.tree.parents.tolist()
         waiting: dict[Handle, tuple[int, int]] = {}
-        reforming = Reforming(lambda node: self._form_again(up, node), lambda node: self._places[node])
+
+        def form_again(node: int) -> Handle:
+            below = [up.contributions[child] for child in self.tree.children[node]]
+            old = up.contributions[node]
+            up.contributions[node] = self.do(formed, node, up.at, below)
+            self.executor.forget([old])
+            return self.executor.submit(about, up.contributions[node])
+
+        reforming = Reforming(form_again, self._places)
         rounds = [0] * (len(self.tree) + 1)
         again: dict[int, list[int]] = {}
         failures = 0
@@ -190,14 +195,6 @@ class Walks:
                 self.tell(phase, sum(map(bool, rounds)), len(self.tree))
             for each in again.pop(node, []) if rounds[node] > 1 else self.tree.children[node]:
                 begin(each)
-
-    def _form_again(self, up: Up, node: int) -> Handle:
-        """Have a node formed again whose factor was lost; return the handle of what tells of it."""
-        below = [up.contributions[child] for child in self.tree.children[node]]
-        old = up.contributions[node]
-        up.contributions[node] = self.do(formed, node, up.at, below)
-        self.executor.forget([old])
-        return self.executor.submit(about, up.contributions[node])
 
     def do(self, function: Callable[..., Any], node: int, *given: Any) -> Handle:
         """Have a task of a node done, where it was last."""
@@ -242,18 +239,18 @@ class Reforming:
 
     A factor that waits for its task is the first that a worker gives up for another: the next one is formed
     there when the task is over. `form` has a node formed, and returns the handle of what tells that it is;
-    `place` gives the worker of a node.
+    `places` are the workers of the nodes.
     """
 
-    def __init__(self, form: Callable[[int], Handle], place: Callable[[int], str]) -> None:
-        self._form, self._place = form, place
+    def __init__(self, form: Callable[[int], Handle], places: list[str]) -> None:
+        self._form, self._places = form, places
         self._queues: defaultdict[str, deque[int]] = defaultdict(deque)
         self._busy: dict[int, str] = {}
         self.handles: dict[Handle, int] = {}
 
     def begin(self, node: int) -> None:
         """Have a node formed, at once where its worker forms no other one."""
-        place = self._place(node)
+        place = self._places[node]
         if place in self._busy.values():
             self._queues[place].append(node)
         else:

@@ -24,8 +24,7 @@ from photogram.network.cameras import Camera
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
 from photogram.show.quantity import members
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Line, Mark, Markers, band, error_bars
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel, band, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.findings import Findings, Tested

@@ -232,8 +232,7 @@ def _columns(radius: Floats, terms: int) -> Floats:
 
 
 SEMI_DIAGONALS = ("ll", "ul", "ur", "lr")
-ELSEWHERE = 4.0
-"""Notable distance of the point of symmetry from the origin of the radii, in standard deviations."""
+ELSEWHERE = 4.0  # Notable distance of the point of symmetry (standard deviations)
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
         "fisheye_opencv": ("opencv_fisheye", ("k1", "k2", "k3", "k4")),
     }
     if not isinstance(kind.value, str) or kind.value not in models:
-        raise unknown(kind, "the projection type", {**models, "perspective": 0, "fisheye": 0, "spherical": 0})
+        raise unknown(kind, "projection type", {**models, "perspective": 0, "fisheye": 0, "spherical": 0})
     model, names = models[kind.value]
     fx = each["focal_x"].number()
     return Camera(

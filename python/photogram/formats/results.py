@@ -46,7 +46,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
         pyarrow is not installed.
     """
     from photogram.collection.result_files import KIND as COLLECTION
-    from photogram.collection.result_files import read_collection_result
+    from photogram.collection.saved_result import read_collection_result
 
     readers: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
         BLOCK: read_block_result,

@@ -13,10 +13,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
+from photogram.io.sheets import UNPACKABLE, check_unpacked_size
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import Phrase, phrase
 

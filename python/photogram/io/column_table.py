@@ -181,7 +181,13 @@ class ColumnTable:
         """
         found = self.ready.get(column)
         if isinstance(found, np.ndarray):
-            return self._known(column, found, default, infinite=infinite, read=read)
+            # The file has numbers as such; NaN is an empty cell.
+            if not infinite and np.isinf(found).any():
+                row = int(np.argmax(np.isinf(found)))
+                raise self.cell_error(row, column, "error.finite", value=float(found[row]))
+            if read is not None:
+                return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
+            return found if np.isnan(default) else np.where(np.isnan(found), default, found)
         if column not in self.columns:
             return np.full(self.count, default)
         convert = finite_number if read is None else read
@@ -201,23 +207,6 @@ class ColumnTable:
                 message = message_of(error)
                 raise self.error(row, phrase("error.column", column=column, message=message)) from None
         return values
-
-    def _known(
-        self,
-        column: str,
-        found: Floats,
-        default: float,
-        *,
-        infinite: bool,
-        read: Callable[[str], float] | None,
-    ) -> Floats:
-        """Return numbers that the file has as such, as :meth:`numbers` has them; NaN stands for empty."""
-        if not infinite and np.isinf(found).any():
-            row = int(np.argmax(np.isinf(found)))
-            raise self.cell_error(row, column, "error.finite", value=float(found[row]))
-        if read is not None:
-            return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
-        return found if np.isnan(default) else np.where(np.isnan(found), default, found)
 
     def vectors(
         self,

@@ -8,7 +8,6 @@ the same result and the place of every cell.
 from __future__ import annotations
 
 import codecs
-import csv
 import itertools
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -23,7 +22,7 @@ from photogram.errors import InputError
 from photogram.io.column_table import ColumnTable, Names, merged
 from photogram.io.files import read_beginning, read_text, reading
 from photogram.io.places import Place
-from photogram.io.rows import DELIMITERS, LONGEST_RECORD
+from photogram.io.rows import DELIMITERS, LONGEST_RECORD, cells
 from photogram.words import Phrase, phrase
 
 LARGE = 1 << 20  # Bytes of a table above which the extension module reads it
@@ -56,7 +55,7 @@ def read_columns(
 
     def header(text: str) -> _Header:
         head, delimiter = _head(path, text, known, spelling, hint)
-        own = _lowered(head, delimiter)
+        own = tuple(cell.strip().lower() for cell in _split(head, delimiter))
         return head, own, _named(head, own, spelling, settled=hint is not None), delimiter
 
     return _read(path, header, numbers)
@@ -138,7 +137,7 @@ def _head(
             continue
         head = Place(path, record, line)
         for place in (head, comment):
-            if place is not None and known and _knows(place, known, spelling):
+            if place is not None and not set(known).isdisjoint(_spelled(place, spelling)):
                 return place, _delimiter(place)
         if known and comment is None:
             for number, row in enumerate(itertools.islice(_lines(text), record, TITLES), record + 1):
@@ -149,7 +148,7 @@ def _head(
                 raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
             raise head.error(phrase("cells.header", names=sorted(known)))
         return head, _delimiter(head)
-    if comment is not None and _knows(comment, known, spelling):
+    if comment is not None and not set(known).isdisjoint(_spelled(comment, spelling)):
         return comment, _delimiter(comment)
     raise Place(path).error(phrase("error.empty-file", content="table"))
 
@@ -164,38 +163,23 @@ def _lines(text: str) -> Iterator[str]:
         yield text[start:]
 
 
-def _lowered(place: Place, delimiter: str) -> tuple[str, ...]:
-    return tuple(cell.strip().lower() for cell in _split(place, delimiter))
-
-
 def _spelled(place: Place, spelling: Spelling) -> Sequence[str]:
-    return spelling(_lowered(place, _delimiter(place)))
-
-
-def _knows(place: Place, known: Collection[str], spelling: Spelling) -> bool:
-    return not set(known).isdisjoint(_spelled(place, spelling))
+    return spelling(tuple(cell.strip().lower() for cell in _split(place, _delimiter(place))))
 
 
 def _delimiter(head: Place) -> str:
     outside = re.sub(r'"[^"]*"', "", head.text or "")
-    for each in DELIMITERS:
-        if each in outside:
-            return each
-    return " " if len(outside.split()) > 1 else ","
+    default = " " if len(outside.split()) > 1 else ","
+    return next((each for each in DELIMITERS if each in outside), default)
 
 
 def _split(place: Place, delimiter: str) -> list[str]:
     text = place.text or ""
-    if len(text) > LONGEST_RECORD:
-        raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
-    if delimiter == " ":
+    if len(text) <= LONGEST_RECORD and delimiter == " ":
         return [whole or bare for whole, bare in _BLANKS.findall(text)]
-    if '"' not in text:
+    if len(text) <= LONGEST_RECORD and '"' not in text:
         return [cell.strip() for cell in text.split(delimiter)]
-    try:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
-    except (csv.Error, StopIteration) as error:
-        raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
+    return cells(place, delimiter, blanks=True)
 
 
 def _by_lines(

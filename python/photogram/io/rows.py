@@ -119,13 +119,18 @@ class Table:
             yield Row(dict(zip(self.columns, texts, strict=False)), place, self.delimiter != ",")
 
 
-def cells(place: Place, delimiter: str = ",") -> list[str]:
-    """Split a record at its commas, or another delimiter; quotation marks hold a cell together."""
+def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[str]:
+    """Split a record at its commas, or another delimiter; quotation marks hold a cell together.
+
+    `blanks`: whether blanks may precede quotation marks.
+    """
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
         raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
     try:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
+        return [
+            cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=blanks))
+        ]
     except csv.Error as error:
         raise place.error(phrase("error.parse", format="CSV", reason=str(error))) from None
 

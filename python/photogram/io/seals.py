@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -53,15 +54,11 @@ class Seals:
         return write
 
 
-class _Hashing:
-    """A file that is written from its beginning to its end."""
-
-    closed = False
+class _Hashing(io.RawIOBase):
+    """A file that is written from its beginning to its end; who has opened the file below closes it."""
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self.digest = hashlib.sha256()
-        self._at = 0
+        self._file, self._at, self.digest = file, 0, hashlib.sha256()
 
     def write(self, data: Any) -> int:
         self.digest.update(data)
@@ -71,17 +68,5 @@ class _Hashing:
     def tell(self) -> int:
         return self._at
 
-    def flush(self) -> None:
-        self._file.flush()
-
     def writable(self) -> bool:
         return True
-
-    def readable(self) -> bool:
-        return False
-
-    def seekable(self) -> bool:
-        return False
-
-    def close(self) -> None:
-        """Leave the file open: who has opened it closes it."""

@@ -1,20 +1,36 @@
-"""Sheets of Excel as text: one table, read by what reads all others (extra `excel`)."""
+"""Sheets of Excel as text (extra `excel`), and the limits of zip archives, which reject packed bombs."""
 
 from __future__ import annotations
 
 import io
+import lzma
 import math
+import struct
 import zipfile
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.io.archives import check_unpacked_size
 from photogram.words import phrase
 
 LARGEST = 1 << 29  # Bytes that a workbook may unpack to: larger ones are attacks
+MAX_RATIO, SMALL = 250, 1 << 26  # Members above SMALL bytes have at most this ratio of sizes
+UNPACKABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, struct.error)
 _NEEDS_OPENPYXL = phrase("error.package", what="an Excel workbook", package="openpyxl", extra="excel")
+
+
+def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> None:
+    """Reject members of an archive whose headers announce many times the bytes that they are packed into.
+
+    No member is unpacked beyond its header.
+    """
+    packed = sum(member.compress_size for member in members)
+    size = sum(member.file_size for member in members)
+    if size > max(SMALL, MAX_RATIO * packed):
+        fields = {"names": [member.filename for member in members], "packed": packed, "size": size}
+        raise InputError(phrase("file.expands", ratio=MAX_RATIO, **fields), file=path)
 
 
 def sheet_text(path: Path) -> str:

@@ -186,8 +186,13 @@ class Table:
 def increasing(name: str, values: ArrayLike) -> Floats:
     """Return (k,) finite times that increase."""
     times = np.atleast_1d(numbers(name, values))
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise kind_error(name, "increasing times", values)
+    if times.ndim != 1 or not len(times):
+        raise kind_error(name, "a list of times", values)
+    later = np.isfinite(times)
+    later[1:] &= times[1:] > times[:-1]
+    if not later.all():
+        row = int(np.argmin(later))
+        raise kind_error(f"{name}[{row}]", "a finite time after the previous one", float(times[row]))
     return times
 
 

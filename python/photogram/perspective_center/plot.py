@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, band
+from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, Panel, around, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED, round_length
 

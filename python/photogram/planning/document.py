@@ -15,9 +15,8 @@ from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
-from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.layout import labelled
-from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Shades
+from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
@@ -173,10 +172,12 @@ def _motion(pattern: Pattern) -> Table:
     ):
         name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
         rows.append((name, sd, None, ratio))
-    heads = {"Unknown": "name", "rms sd": "number", "Largest sd": "number", "Times better": "number"}
+    values = [[row[k] for row in rows] for k in range(4)]
     columns = [
-        Quantity([row[k] for row in rows], kind=kind, head=head, decimals=2 if k == 3 else None)
-        for k, (head, kind) in enumerate(heads.items())
+        Quantity(values[0], kind="name", head="Unknown"),
+        Quantity(values[1], head="rms sd"),
+        Quantity(values[2], head="Largest sd"),
+        Quantity(values[3], head="Times better", decimals=2),
     ]
     return Table("", pattern.name, columns)
 
@@ -197,11 +198,7 @@ def _control(pattern: Pattern) -> Table:
 
 
 def _layers(
-    key: str,
-    title: str,
-    patterns: Sequence[Pattern],
-    table: Callable[[Pattern], Table],
-    intro: str = "",
+    key: str, title: str, patterns: Sequence[Pattern], table: Callable[[Pattern], Table], intro: str = ""
 ) -> Section:
     tables = [made for pattern in patterns if (made := table(pattern)).visible]
     return Section(key, title, layered_tables(key, tables), intro)
@@ -243,12 +240,9 @@ def _comparison_section(patterns: Sequence[Pattern]) -> Section:
     best = [names[k] if own else "no difference" for k, own in zip(sd.argmin(axis=0), differ, strict=True)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(least > 0, most / least, np.nan)
+    rows = [f"{kind} {axis}" for axis in axes for kind in ("rms", "largest")]
     columns = [
-        Quantity(
-            [f"{of} {axis}" for axis in axes for of in ("rms", "largest")],
-            kind="name",
-            head="Standard deviation",
-        ),
+        Quantity(rows, kind="name", head="Standard deviation"),
         *(Quantity(own, head=f"{name} {unit}") for name, own in zip(names, sd, strict=True)),
         Quantity(best, kind="name", head="Best"),
         Quantity(ratios, head="Largest over smallest", decimals=2),

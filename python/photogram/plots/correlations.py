@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import Correlated
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
+from photogram.show.sketch.marks import Mark, Mesh, Panel, Shades, Texts
 from photogram.show.sketch.plot import Plot
 from photogram.words import phrase
 

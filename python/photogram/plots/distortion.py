@@ -10,8 +10,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import Curve, Curves
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Line, Mark, band
+from photogram.show.sketch.marks import Level, Line, Mark, Panel, band, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 from photogram.words import phrase

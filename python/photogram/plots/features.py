@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import Deviations
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Line, Mark, Markers
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Panel, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.words import phrase

@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import VectorField
-from photogram.show.sketch.declared import Panel, ScaleBar
-from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, round_length
 from photogram.words import phrase

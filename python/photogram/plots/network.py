@@ -10,7 +10,6 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
-from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import (
     NOWHERE,
     Arrows,
@@ -19,7 +18,9 @@ from photogram.show.sketch.marks import (
     Mark,
     Markers,
     Names,
+    Panel,
     Polygons,
+    ScaleBar,
     Shades,
     ellipse_axes,
     hexadecimal,

@@ -13,8 +13,7 @@ from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
 from photogram.plots.picture_data import Images, Pictured
 from photogram.plots.residuals import frame
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
+from photogram.show.sketch.marks import Mark, Markers, Mesh, Panel, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.words import phrase
 

@@ -10,8 +10,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.picture_data import Images
-from photogram.show.sketch.declared import Panel, ScaleBar
-from photogram.show.sketch.marks import Arrows, Mark, Markers
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Panel, ScaleBar
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED, round_length
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, band, bars
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, Panel, band, bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal

@@ -10,8 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.messages import unknown_name
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Line, Mark, band, error_bars
+from photogram.show.sketch.marks import Line, Mark, Panel, band, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, GREEN, INK, VERMILION
 from photogram.words import phrase

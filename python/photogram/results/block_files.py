@@ -14,10 +14,18 @@ from photogram.io.parquet import Column, Repeated
 from photogram.io.structure import Stand
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.core_arrays import CoreOptions
+from photogram.network.films import Film, Pattern, Readings, Reseau
+from photogram.network.frame import Frame
+from photogram.network.geometry import Spheroid
 from photogram.network.lens import Lens
 from photogram.network.motion import scanners
 from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
+from photogram.network.refraction import Refraction
+from photogram.network.rigs import Mount
 from photogram.network.trajectories import (
     Angles,
     Basis,
@@ -28,6 +36,11 @@ from photogram.network.trajectories import (
     Table,
     Trajectory,
 )
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.datum import ResultDatum
+from photogram.results.features import Feature, Features, Quantity
+from photogram.results.iteration import Iteration, Redundancies, SumsOfSquares
+from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -39,7 +52,9 @@ from photogram.results.result_files import (
     written,
 )
 from photogram.results.tables import TABLES
-from photogram.words import phrase
+from photogram.results.unknowns import AdjustedUnknown
+from photogram.statistics.findings import Removed
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -203,3 +218,31 @@ class KeptTrajectory(Stand):
 CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
 """Classes that a document of a block with trajectories may name."""
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
+
+
+VALUE_CLASSES = (
+    AdjustedCamera,
+    AdjustedUnknown,
+    Film,
+    Pattern,
+    Readings,
+    Reseau,
+    Camera,
+    CoreOptions,
+    Feature,
+    Features,
+    Frame,
+    Iteration,
+    Message,
+    Mount,
+    ObservedKind,
+    Phrase,
+    Quantity,
+    Redundancies,
+    Refraction,
+    Removed,
+    ResultDatum,
+    Spheroid,
+    SumsOfSquares,
+    Undetermined,
+)

@@ -19,11 +19,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.scores import quadratic
-from photogram.results.selection import photo_components
 
 if TYPE_CHECKING:
     from photogram import Result

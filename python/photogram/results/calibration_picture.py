@@ -11,8 +11,7 @@ from photogram.plots.distortion import side_by_side
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Ellipses, ellipse_axes
+from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
 from photogram.words import phrase

@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
-from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
+from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
@@ -153,25 +153,21 @@ def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
 
 def _pairs(found: Calibration) -> list[str]:
     """Name what is correlated by more than 0.95."""
+
+    def some(photos: Sequence[str]) -> str:
+        more = f" and {len(photos) - NAMED} others" if len(photos) > NAMED else ""
+        return f"photo {', '.join(photos[:NAMED])}{more}"
+
     alike = [(f"{each.first} and {each.second}", each.coefficient) for each in found.correlations]
     alike += [
-        (f"{each.parameter} and {each.component} of {_first_photos(each.photos)}", each.coefficient)
+        (f"{each.parameter} and {each.component} of {some(each.photos)}", each.coefficient)
         for each in found.poses
     ]
     return [f"{both} are correlated by {coefficient:.4f}" for both, coefficient in alike]
 
 
-def _first_photos(photos: Sequence[str]) -> str:
-    named = f"photo {', '.join(photos[:NAMED])}"
-    return named if len(photos) <= NAMED else f"{named} and {len(photos) - NAMED} others"
-
-
-def _image_axis(name: str, unit: str) -> Axis:
-    return Axis(name, unit, small="um", factor=1000.0) if unit == "mm" else Axis.of(name, unit)
-
-
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
-    axes = (_image_axis("", unit),)
+    axes = (Axis("", unit, small="um", factor=1000.0) if unit == "mm" else Axis.of("", unit),)
     inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
     rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
     added = "measured" if curve.direction == "backward" else "ideal"
@@ -199,19 +195,17 @@ def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
 
 
 def _field_remarks(result: Result, found: Calibration) -> list[str]:
-    field = lens_field(result, found.camera)
-    return [] if field is None else [_field_sentence(field, str(found.camera.camera.unit))]
-
-
-def _field_sentence(field: LensField, unit: str) -> str:
+    field, unit = lens_field(result, found.camera), str(found.camera.camera.unit)
+    if field is None:
+        return []
     factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
     at = field.largest
     x, y = field.positions[at]
     (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
-    return (
+    return [
         f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
         f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
-    )
+    ]
 
 
 def calibration_members(result: Result) -> list[dict[str, Any]]:

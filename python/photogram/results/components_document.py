@@ -12,8 +12,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import judged
 from photogram.show.page import Document, Drawing, Part, Remarks, Section
 from photogram.show.quantity import Quantity, Table, of_each
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Line, Mark, Markers
+from photogram.show.sketch.marks import Line, Mark, Markers, Panel
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.components import Component
@@ -40,7 +39,7 @@ def weighed_document(found: VarianceComponents, network: Document) -> Document:
     return replace(network, judgements=own.judgements, advice=own.advice, sections=sections)
 
 
-def components_section(found: VarianceComponents, title: str = "Variance components") -> Section:
+def components_section(found: VarianceComponents) -> Section:
     """Return the section: which standard deviations are wrong, factors with their intervals."""
     caption = "Factors of the given standard deviations with their intervals (95 percent)."
     parts: list[Part] = [
@@ -54,7 +53,7 @@ def components_section(found: VarianceComponents, title: str = "Variance compone
         "Factors of the standard deviations of groups of observations, estimated from the residuals. The"
         " adjustment has the given weights."
     )
-    return Section("components", title, parts, intro)
+    return Section("components", "Variance components", parts, intro)
 
 
 def components_table(found: VarianceComponents) -> Table:

@@ -17,8 +17,7 @@ from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
-from photogram.results.covariance import Failure
-from photogram.results.selection import photo_components
+from photogram.results.covariance import Failure, photo_components
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
+from photogram.results.covariance import adjusted
 from photogram.results.result import Result
-from photogram.results.selection import adjusted
 from photogram.words import phrase
 
 __all__ = ["Differences", "Largest", "differences"]

@@ -15,7 +15,6 @@ from photogram.network.structuring import structure
 from photogram.results.axes import point_axes
 from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
-from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_document, features_section
 from photogram.results.film_report import fiducial_members, film_members, films_section, scanner_members
 from photogram.results.network_document import (
@@ -40,6 +39,7 @@ from photogram.results.tables import (
     unheld,
     unknowns,
 )
+from photogram.results.trajectories import POSES, courses_table, notable, notable_courses
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records

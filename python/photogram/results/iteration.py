@@ -1,10 +1,10 @@
-"""The iterations of an adjustment."""
+"""The iterations of an adjustment, and sums of squares and of redundancy numbers by kinds of observations."""
 
 from __future__ import annotations
 
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Iteration"]
+__all__ = ["Iteration", "Redundancies", "SumsByKind", "SumsOfSquares"]
 
 
 @dataclass(frozen=True)
@@ -27,3 +27,32 @@ class Iteration:
     weighted_sum_of_squares: float
     largest_change: float
     damping: float
+
+
+@dataclass(frozen=True)
+class SumsByKind:
+    """Sums over kinds of observations."""
+
+    # Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras
+    camera: float
+    ground: float  # Of the held components of control
+    plates: float  # Of the image coordinates
+    observations: float = 0.0  # Of the observations beside images
+
+    @property
+    def measured(self) -> float:
+        """Of all but photos."""
+        return self.ground + self.plates + self.observations
+
+    @property
+    def total(self) -> float:
+        """All together."""
+        return self.camera + self.ground + self.plates + self.observations
+
+
+class SumsOfSquares(SumsByKind):
+    """Weighted sums of squares."""
+
+
+class Redundancies(SumsByKind):
+    """Sums of redundancy numbers."""

@@ -23,9 +23,8 @@ from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
 from photogram.network.unadjusted import Given
-from photogram.results.covariance import Covariances, Failure, Propagated
+from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
 from photogram.results.iteration import Iteration
-from photogram.results.selection import Adjusted, Selection
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized

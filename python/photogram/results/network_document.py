@@ -17,6 +17,8 @@ from photogram.results.network_sections import (
     images_section,
     photos_section,
     points_section,
+    weakest_photos,
+    weakest_points,
     weakest_tables,
 )
 from photogram.results.network_tables import (
@@ -28,7 +30,6 @@ from photogram.results.network_tables import (
     stations,
 )
 from photogram.results.tests import Tests
-from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table

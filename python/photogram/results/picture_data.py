@@ -27,7 +27,7 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
-from photogram.results.film_pictures import film_patterns, mean_mark_residuals
+from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.tests import Tests

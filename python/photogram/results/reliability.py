@@ -23,9 +23,8 @@ import numpy as np
 from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.covariance import Covariances
+from photogram.results.covariance import Covariances, Selection
 from photogram.results.network_trial import NetworkTrial
-from photogram.results.selection import Selection
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.quantity import Quantity, Table, members, records

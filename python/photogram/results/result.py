@@ -20,7 +20,7 @@ from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points, point_kinds
-from photogram.results.covariance import Failure
+from photogram.results.covariance import Adjusted, Failure, adjusted
 from photogram.results.datum import (
     ResultDatum,
     datum_messages,
@@ -30,10 +30,9 @@ from photogram.results.datum import (
     relative_datum,
 )
 from photogram.results.films import OnFilm
+from photogram.results.iteration import Redundancies, SumsOfSquares
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_kinds import ObservedKind, observed_kinds
-from photogram.results.selection import Adjusted, adjusted
-from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.trajectories import (
     AdjustedTrajectory,
     adjusted_trajectories,
@@ -219,12 +218,12 @@ class Result(OnFilm, AdjustedNetwork):
         return block_network(self.block, self.options)
 
     def _terms(self) -> Terms:
-        from photogram.results.block_terms import block_terms
+        from photogram.results.axes import block_terms
 
         return block_terms(self)
 
     def _determined(self) -> Determined:
-        from photogram.results.block_terms import determined
+        from photogram.results.axes import determined
 
         return determined(self)
 
@@ -234,7 +233,7 @@ class Result(OnFilm, AdjustedNetwork):
         return PicturedBlock(self)
 
     def _trial(self) -> NetworkTrial:
-        from photogram.results.suspects import network_trial
+        from photogram.results.network_trial import network_trial
 
         core = self._core_network().trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)

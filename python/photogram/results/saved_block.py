@@ -1,4 +1,4 @@
-"""The result of a block from the files of a folder."""
+"""The result of a block from the files of a folder (`docs/results.md`)."""
 
 from __future__ import annotations
 
@@ -10,66 +10,22 @@ from typing import Any
 import numpy as np
 
 from photogram.io.parquet import Sheet
-from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
-from photogram.network.core_arrays import CoreOptions
-from photogram.network.films import Film, Pattern, Readings, Reseau
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
-from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
-from photogram.results.block_files import CLASSES, parts_of_block
-from photogram.results.cameras import AdjustedCamera
-from photogram.results.datum import ResultDatum
-from photogram.results.features import Feature, Features, Quantity
-from photogram.results.iteration import Iteration
-from photogram.results.observation_kinds import ObservedKind
+from photogram.results.block_files import CLASSES, VALUE_CLASSES, parts_of_block
 from photogram.results.result import Result
 from photogram.results.result_files import (
     read_saved,
     rows_of,
-)
-from photogram.results.sums import Redundancies, SumsOfSquares
-from photogram.results.unknowns import AdjustedUnknown
-from photogram.statistics.findings import Removed
-from photogram.words import Phrase
-
-_CLASSES = (
-    AdjustedCamera,
-    AdjustedUnknown,
-    Film,
-    Pattern,
-    Readings,
-    Reseau,
-    Camera,
-    CoreOptions,
-    Feature,
-    Features,
-    Frame,
-    Iteration,
-    Message,
-    Mount,
-    ObservedKind,
-    Phrase,
-    Quantity,
-    Redundancies,
-    Refraction,
-    Removed,
-    ResultDatum,
-    Spheroid,
-    SumsOfSquares,
-    Undetermined,
 )
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
     saved = read_saved(
-        folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
+        folder, [*VALUE_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
     )
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}

@@ -15,8 +15,7 @@ from photogram.show.judgement import remarks_section
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Fact, Facts, Section
 from photogram.show.quantity import Quantity, Table, members, of_each
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Line, Markers, error_bars
+from photogram.show.sketch.marks import Line, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.variance_function import FunctionEstimate

@@ -13,8 +13,7 @@ from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
-from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, error_bars
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 

@@ -66,23 +66,18 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
         ]
     parts: list[Part] = [Facts("Made by", made)]
     if run is not None and run.inputs:
-        parts.append(_inputs(run))
+        columns = (Column("File", text=True), Column("Size", "bytes"), Column("SHA-256", text=True))
+        rows = [(printable(str(each.path)), each.size, each.sha256) for each in run.inputs]
+        note = f"and {run.others} more" if run.others else ""
+        parts.append(Table("Input files", columns, rows, note))
     if run is not None and run.options:
         given = {name: printable(value) for name, value in run.options.items()}
-        columns = (Column("Option", text=True), Column("Value", text=True))
-        parts.append(
-            Table("Options", columns, [*given.items()], "Those that were not given have their defaults.")
-        )
+        heads, note = ("Option", "Value"), "Those that were not given have their defaults."
+        parts.append(Table("Options", [Column(head, text=True) for head in heads], [*given.items()], note))
     if phases:
-        columns = (Column("Phase", text=True), Column("Time", "s", decimals=3))
-        parts.append(Table("Time spent in the adjustment", columns, [*phases.items()]))
+        spent = (Column("Phase", text=True), Column("Time", "s", decimals=3))
+        parts.append(Table("Time spent in the adjustment", spent, [*phases.items()]))
     intro = (
         "What is needed to make this page again. Everything above is the same in every run; times are not."
     )
     return Section("reproducibility", "Reproducibility", parts, intro)
-
-
-def _inputs(run: Run) -> Table:
-    columns = (Column("File", text=True), Column("Size", "bytes"), Column("SHA-256", text=True))
-    rows = [(printable(str(each.path)), each.size, each.sha256) for each in run.inputs]
-    return Table("Input files", columns, rows, f"and {run.others} more" if run.others else "")

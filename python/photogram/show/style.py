@@ -7,7 +7,6 @@ The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design")
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
@@ -67,12 +66,12 @@ def need_matplotlib() -> None:
         raise ModuleNotFoundError(said, name="matplotlib") from None
 
 
-def styled(further: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:
-    """Return a context in which axes, letters and legends are those of the house, with further settings."""
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which axes, letters and legends are those of the house."""
     need_matplotlib()
     import matplotlib as mpl
 
-    settings: Any = {**SETTINGS, **(further or {})}
+    settings: Any = SETTINGS
     return mpl.rc_context(settings)
 
 

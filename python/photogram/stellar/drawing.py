@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.sketch.declared import Panel, ScaleBar, spread
-from photogram.show.sketch.marks import Arrows, Line, Mark, Polygons, boxes
+from photogram.show.sketch.marks import Arrows, Line, Mark, Panel, Polygons, ScaleBar, boxes, spread
 from photogram.show.sketch.marks import band as area
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, INK, MARKED, SKY

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.sketch.declared import Panel, ScaleBar, around
-from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers
+from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, Panel, ScaleBar, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.drawing import band, bells, curves, vectors

@@ -10,8 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sketch.declared import Panel, ScaleBar, around, spread
-from photogram.show.sketch.marks import Level, Line, Mark, Markers
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Panel, ScaleBar, around, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes

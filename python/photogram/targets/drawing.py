@@ -11,8 +11,7 @@ import numpy as np
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Shades
+from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Panel, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
 from photogram.targets.calibration_difference import CameraDifference

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.archives import UNPACKABLE, check_unpacked_size
+from photogram.io.sheets import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
 from photogram.words import phrase
 

@@ -14,8 +14,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.hull import hull
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
 from photogram.show.quantity import Axis, Quantity, Table, of_each
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Mark, Markers, Polygons
+from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels

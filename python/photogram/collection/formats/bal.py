@@ -17,9 +17,8 @@ from photogram.collection.collection import Collection
 from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
-from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 ROOM = 64  # Characters that a number and the white space after it take at the most, in the mean over a file
 HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Numbers of the first line, of an image, of a photo, of a point
@@ -27,8 +26,7 @@ HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Numbers of the first line, of an image
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
     """Read a collection."""
-    counts, numbers = _numbers(path, pieces)
-    photos, points, images = counts.photos, counts.points, counts.images
+    (photos, points, images), numbers = _numbers(path, pieces)
     first_photo = HEAD + IMAGE * images
     first_point = first_photo + PHOTO * photos
     rows = numbers[HEAD:first_photo].reshape(images, IMAGE)
@@ -64,29 +62,10 @@ def to_bytes(collection: Collection) -> bytes:
     return "\n".join([head, *images, *values, ""]).encode()
 
 
-@dataclass(frozen=True)
-class _Counts:
-    """How many photos, points and images the first line announces."""
-
-    photos: int
-    points: int
-    images: int
-
-    @property
-    def numbers(self) -> int:
-        """Numbers of the whole file."""
-        return HEAD + IMAGE * self.images + PHOTO * self.photos + POINT * self.points
-
-    @property
-    def phrase(self) -> Phrase:
-        """The content of the file for messages."""
-        sizes = {"photos": self.photos, "points": self.points, "images": self.images}
-        return phrase("collection.counts", numbers=self.numbers, **sizes)
-
-
-def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[_Counts, Floats]:
+def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[tuple[int, int, int], Floats]:
     """Read as many numbers as the first line announces, and no more text than they can take."""
-    counts: _Counts | None = None
+    counts: tuple[int, int, int] | None = None
+    most, wanted = HEAD, phrase("collection.head")
     parts: list[Floats] = []
     read = length = 0
     for piece in pieces:
@@ -94,20 +73,23 @@ def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[_Counts, Floats]:
         if counts is None and len(numbers) >= HEAD:
             if not whole(numbers[:HEAD]).all():
                 raise at(path, 0, phrase("collection.first-line"))
-            counts = _Counts(*(int(count) for count in numbers[:HEAD]))
-        wanted = phrase("collection.head") if counts is None else counts.phrase
-        if counts is not None and read + len(numbers) > counts.numbers:
-            raise at(path, counts.numbers, phrase("collection.beyond", content=wanted))
+            photos, points, images = map(int, numbers[:HEAD].tolist())
+            counts = photos, points, images
+            most = HEAD + IMAGE * images + PHOTO * photos + POINT * points
+            sizes = {"photos": photos, "points": points, "images": images}
+            wanted = phrase("collection.counts", numbers=most, **sizes)
+        if counts is not None and read + len(numbers) > most:
+            raise at(path, most, phrase("collection.beyond", content=wanted))
         read += len(numbers)
         if not good:
             raise at(path, read, phrase("collection.not-finite", content=wanted))
         parts.append(numbers)
         length += len(piece)
-        if length > PIECE + ROOM * (counts.numbers if counts is not None else HEAD):
+        if length > PIECE + ROOM * most:
             raise InputError(phrase("collection.too-long", content=wanted), file=path)
         # The parts, and what is made of them.
         require(4 * read * numbers.itemsize, f"{path}: {read} numbers")
-    if counts is None or read < counts.numbers:
+    if counts is None or read < most:
         raise InputError(phrase("collection.ends", content=wanted), file=path)
     return counts, np.concatenate(parts)
 

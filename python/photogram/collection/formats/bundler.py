@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +42,9 @@ class _Numbers:
         self.path = path
         self.words = len(header[0].split())  # Of the first line
         self.taken = 0
-        self.values = self._all(first[header.end() :], pieces)
-
-    def _all(self, first: bytes, pieces: Iterator[bytes]) -> Floats:
         parts: list[Floats] = []
         read = 0
-        piece: bytes | None = first
-        while piece is not None:
+        for piece in chain([first[header.end() :]], pieces):
             numbers, good = _photocore.read_numbers(piece)
             read += len(numbers)
             if not good:
@@ -55,8 +52,7 @@ class _Numbers:
             parts.append(numbers)
             # The parts, and what is made of them.
             require(4 * read * numbers.itemsize, f"{self.path}: {read} numbers")
-            piece = next(pieces, None)
-        return np.concatenate(parts)
+        self.values = np.concatenate(parts)
 
     def take(self, count: int, what: str) -> Floats:
         """Return the next numbers."""

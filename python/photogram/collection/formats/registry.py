@@ -42,11 +42,6 @@ def recognised(path: Path) -> tuple[Collection, Format]:
     """Read a collection, packed by bzip2 or gzip or not, and say what format it has.
 
     All unknowns are free, and the standard deviation of image coordinates is one pixel.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or holds something else; names file, line and what stands there.
     """
     with turned(f"reading {path}"):
         content = pieces(path)

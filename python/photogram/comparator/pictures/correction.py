@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.pictures.vectors import MAIN, MM, OF_COMPARATOR, plan
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Contours, Line, Mark, Markers, Shades
+from photogram.show.sketch.marks import Contours, Line, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, round_length
 

@@ -18,8 +18,7 @@ from photogram.comparator.pictures.vectors import (
     spacing,
 )
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Ellipses, Mark, Markers
+from photogram.show.sketch.marks import Ellipses, Mark, Markers, Panel, around
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, round_length
 

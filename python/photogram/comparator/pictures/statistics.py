@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.pictures.vectors import ACCENT, MAIN
-from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Line, Polygons, Texts, boxes
+from photogram.show.sketch.marks import Line, Panel, Polygons, Texts, boxes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK
 

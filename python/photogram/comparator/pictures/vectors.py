@@ -11,8 +11,7 @@ import numpy as np
 from photogram.comparator.case import exchanged
 from photogram.comparator.pointing import Ellipse
 from photogram.errors import InputError
-from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names
+from photogram.show.sketch.marks import Arrows, Ellipses, Mark, Markers, Names, Panel, around
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import BLUE, FAINT, SOFT, VERMILION, round_length
 from photogram.words import phrase

@@ -20,8 +20,9 @@ def of_quaternions(place: Failing, quaternions: Floats) -> Floats:
     """Return the (n, 3, 3) matrices of (n, 4) unit quaternions w, x, y, z of a file, applied as C v."""
     lengths = np.linalg.norm(quaternions, axis=1)
     if not (np.abs(lengths - 1) < MAX_LENGTH_DIFFERENCE).all():
-        worst = float(lengths[np.argmax(np.abs(lengths - 1))])
-        raise place.error(phrase("format.length", length=worst))
+        row = int(np.argmax(np.abs(lengths - 1)))
+        length = phrase("format.length", length=float(lengths[row]))
+        raise place.error(phrase("error.at", what=phrase("csm.record", n=row + 1), message=length))
     return Attitudes.of("quaternion", quaternions).matrices
 
 

@@ -46,7 +46,7 @@ def read_isd(path: Path) -> Isd:
     keywords = tree.get("naif_keywords", {})
     model = tree["name_model"]
     if model.text() not in _KINDS:
-        raise unknown(model, "the sensor model", _KINDS)
+        raise unknown(model, "sensor model", _KINDS)
     kind = cast("Any", _KINDS[model.text()])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
     code = _instrument(tree, keywords)
@@ -114,7 +114,7 @@ def _check_frames(tree: Tree) -> None:
 def _unit(tree: Tree) -> float:
     unit = tree.get("unit", "km")
     if unit.text() not in UNITS:
-        raise unknown(unit, "the unit", UNITS)
+        raise unknown(unit, "unit", UNITS)
     return UNITS[unit.text()]
 
 
@@ -205,16 +205,14 @@ def _lens(tree: Tree, focal_length: float) -> Lens | None:
         raise optics.error(phrase("format.count", n=len(models), required=1))
     model = models[0]
     if model not in _MEMBERS:
-        raise unknown(Tree(model, optics.file, optics.path), "the lens", _MEMBERS)
+        raise unknown(Tree(model, optics.file, optics.path), "lens", _MEMBERS)
     own = optics[model]
     members = ("coefficients",) if "coefficients" in own else _MEMBERS[model]
     found = [value for name in members for value in _flat(own[name])]
     if not any(found) and model == "radial":
         return None
-    try:
+    with at_place(own):
         return Lens(cast("LensModel", model), tuple(found), focal_length if model == "radtan" else 1.0)
-    except ValueError as error:
-        raise own.error(str(error)) from None
 
 
 def _flat(tree: Tree) -> list[float]:

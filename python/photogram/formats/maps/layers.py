@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Layer", "chosen_crs", "map_layers"]
 
-MOST_ELLIPSES = 20_000
-"""Error ellipses of points at most, unless more are asked for: where there are more they cover each other."""
+MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
 SUSPICIOUS = 3.0  # Test values beyond are on the map
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("e", "n", "u")

@@ -39,8 +39,7 @@ from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
 from photogram.words import Phrase, option_sd, phrase
 
-SIMILAR = 10.0
-"""How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
+SIMILAR = 10.0  # Least improvement of the fit by a similarity transformation
 DETERMINED = 3.0  # How much wider than their misfit positions must spread across their line to turn a model
 
 

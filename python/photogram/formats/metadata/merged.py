@@ -205,8 +205,7 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     return found + [Message(phrase("photos.remark", remark=text, n=count)) for text, count in remarks.items()]
 
 
-MAX_INTERVAL_DIFFERENCE = 2.0
-"""Seconds between two pictures by their EXIF, which has whole seconds, and by the events."""
+MAX_INTERVAL_DIFFERENCE = 2.0  # Seconds; EXIF has whole seconds
 
 
 def read_gnss_file(

@@ -19,8 +19,7 @@ from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
-REGULARISED = "regularise"
-"""The detail, and the column of boards, of the weak priors that a calibration adds to its cameras."""
+REGULARISED = "regularise"  # Detail and column of the weak camera priors of a calibration
 TIMES = "times of photos on frames"
 """The detail: seconds by the clocks of cameras, by the names of photos of a board."""
 

@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
-OTHER_LENS = 5.0
-"""Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
+OTHER_LENS = 5.0  # Difference to the certificate of another lens (mm)
 _SD = ("sd_radial", "sd_tangential")
 _DISTANCES = ("c", "f", "fx", "fy")
 SMALLEST_DISTANCE = 0.1  # Smallest principal distance, as a part of the width of the image

@@ -175,7 +175,7 @@ class OutputSet:
             path = os.path.join(self._stagings[target.directory].path, str(len(self._staged)))
             mode = stat.S_IMODE(target.status.st_mode) & PERMISSIONS if target.status else 0o666
             descriptor = os.open(path, os.O_WRONLY | NEW, mode)
-            file = _opened(descriptor, target)
+            file: io.BufferedWriter = io.BufferedWriter(_Raw(descriptor, target.given))
             self._staged.append(_Staged(target, path, file))
             if target.status:
                 _keep_owner(descriptor, target.status, mode)
@@ -284,10 +284,6 @@ def _stream(target: Target) -> io.BufferedWriter:
                 if stream is not None:
                     stream.flush()
             descriptor = os.dup(target.descriptor)
-    return _opened(descriptor, target)
-
-
-def _opened(descriptor: int, target: Target) -> io.BufferedWriter:
     return io.BufferedWriter(_Raw(descriptor, target.given))
 
 

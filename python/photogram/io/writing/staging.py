@@ -211,24 +211,18 @@ def _path(staging: Staging) -> str:
 
 
 def _dead_marks(directory: str) -> list[tuple[str, set[str]]]:
-    """Return the marks of dead runs in a directory, with the places that they name."""
+    """Return the marks of dead runs in a directory, with the places that they name, other lines left out."""
     found = []
     with suppress(OSError):
         for name in sorted(os.listdir(directory)):
             match = MARK_NAME.fullmatch(name)
             if match and not alive(directory, match[1]):
-                path = os.path.join(directory, name)
-                found.append((path, _named(path, directory)))
+                path, places = os.path.join(directory, name), set[str]()
+                found.append((path, places))
+                with suppress(OSError), open(path, encoding="utf-8", errors="replace") as lines:
+                    for line in lines:
+                        with suppress(ValueError):
+                            place = json.loads(line)
+                            if isinstance(place, str):
+                                places.add(os.path.normpath(os.path.join(directory, place)))
     return found
-
-
-def _named(path: str, directory: str) -> set[str]:
-    """Return the places that a mark names; what is none of its lines is passed over."""
-    places = set()
-    with suppress(OSError), open(path, encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            with suppress(ValueError):
-                name = json.loads(line)
-                if isinstance(name, str):
-                    places.add(os.path.normpath(os.path.join(directory, name)))
-    return places

@@ -106,7 +106,9 @@ class Guard:
         if target.status and _identity(target.status) in self._read:
             raise InputError(phrase("file.over-input"), file=path)
         above = set(_above(target.place))
-        keys = _keys(target)
+        # What two targets that are one have in common
+        keys: list[object] = [_spelling(target.place)]
+        keys += [_identity(target.status)] if target.status else []
         if any(key in self._files for key in keys):
             raise InputError(phrase("file.same-output"), file=path)
         under = next((self._files[each] for each in above if each in self._files), None)
@@ -122,12 +124,6 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path], directories: 
     guard = Guard(inputs, directories)
     for path in outputs:
         guard.add(path)
-
-
-def _keys(target: Target) -> list[object]:
-    """Return what two targets that are one have in common."""
-    spelling = _spelling(target.place)
-    return [spelling, _identity(target.status)] if target.status else [spelling]
 
 
 def _spelling(place: str) -> str:

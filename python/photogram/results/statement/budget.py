@@ -21,10 +21,18 @@ from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, grouped
-from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
+from photogram.results.network_trial import (
+    ATTITUDE,
+    CONTROL,
+    IMAGE,
+    KINDS,
+    OBSERVATION,
+    POSITION,
+    BlockSuspects,
+    observations_of_core,
+)
 from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
-from photogram.results.suspects import BlockSuspects, observations_of_core
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase

@@ -12,7 +12,6 @@ from photogram.results.footprints import footprints
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.show.sketch.declared import Panel, ScaleBar, around, spread
 from photogram.show.sketch.marks import (
     Arrows,
     Ellipses,
@@ -22,9 +21,13 @@ from photogram.show.sketch.marks import (
     Markers,
     Mesh,
     Names,
+    Panel,
+    ScaleBar,
     Shades,
+    around,
     ellipse_axes,
     error_bars,
+    spread,
 )
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length

@@ -4,20 +4,293 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.results.statement.annexes import annexes
-from photogram.results.statement.comparison import control_places
-from photogram.results.statement.drawings import differences
+from photogram import _photocore
+from photogram.results.cameras import AdjustedCamera, units
+from photogram.results.distortion import distortion_curve
+from photogram.results.features import Features, unit_deviations
+from photogram.results.features_report import through
+from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.comparison import control_places, in_order
+from photogram.results.statement.document import kinds_of
+from photogram.results.statement.drawings import differences, overlap
+from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.tables import Columns, decimals_for, localized
-from photogram.show.page import Document, Drawing, Fact, Judgement, Part, Remarks, Section, Text
-from photogram.show.quantity import Table
+from photogram.results.statement.grounds import fixed_values
+from photogram.results.statement.tables import (
+    Columns,
+    annex,
+    check_points,
+    decimals_for,
+    left_out_points,
+    localized,
+    removed_observations,
+    test_lengths,
+)
+from photogram.results.statement.texts import Texts
+from photogram.show.judgement import verdict_table
+from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
+from photogram.show.quantity import Axis, Quantity, Table
 
 if TYPE_CHECKING:
     from photogram import Statement
+
+MAX_FINE_SOURCES = 12  # Of a budget, besides the kinds of observations
+MAX_RADII = 11
+BLANK = " "  # Head of a column without a name
+
+
+def annexes(statement: Statement) -> list[Section]:
+    """Return the annexes; those without content are omitted by the page."""
+    texts, result = statement.texts, statement.result
+    checks = [
+        check_points(statement),
+        *([] if statement.of_all is None else [_radii(texts, statement.of_all)]),
+    ]
+    held = fixed_values(texts, result) or texts("annex.c.nothing")
+    budgets = [part for each in statement.taken_apart for part in _budget(texts, each)]
+    left_out = left_out_points(texts, statement.left_out)
+    metrology = _metrology(statement)
+    return [
+        annex(texts, "a", checks),
+        annex(texts, "b", [left_out], texts("annex.b.note")),
+        annex(texts, "c", budgets, texts("annex.c.note", held=held)),
+        annex(texts, "d", [part for each in result.cameras for part in _camera(statement, each)]),
+        annex(texts, "e", _adjustment(statement), texts.text(result.verdict.message)),
+        annex(texts, "f", _survey(statement)),
+        *([annex(texts, "h", metrology)] if metrology else []),
+        annex(texts, "g", _files(statement)),
+    ]
+
+
+def _radii(texts: Texts, own: Figures) -> Table:
+    columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
+    radii = {name: radius for name, radius in own.radii.items() if radius is not None}
+    number = partial(columns.number, decimals=decimals, unit=texts.unit)
+    upper = [math.nan if radius.upper is None else radius.upper for radius in radii.values()]
+    quantities = [
+        columns.text(BLANK, [name.upper() for name in radii]),
+        number("sample", [radius.sample for radius in radii.values()]),
+        number("upper", upper),
+        number("moments", [own.of_moments[name] for name in radii]),
+        number("mixture", [own.mixture.get(name, math.nan) for name in radii]),
+    ]
+    return Table("radii", texts("table.radii"), quantities, texts("table.radii.note"))
+
+
+def _budget(texts: Texts, own: Budget) -> list[Table]:
+    """Return the sources of a budget, kinds and the largest finer ones, and the largest observations."""
+    columns = Columns(texts)
+    finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
+    if len(own.at("camera")) < 2:
+        finer = [each for each in finer if each.level != "camera"]
+    finer = sorted(finer, key=lambda source: -source.contribution)[:MAX_FINE_SOURCES]
+    kinds = own.at("kind")
+    sources, blank = [*kinds, *finer], [None] * len(finer)
+    estimated = own.freedom.of_kind if own.freedom.basis == "components" else {}
+    dof = [estimated.get(each.name, math.inf) for each in kinds]
+    origins = [texts("from.estimated" if math.isfinite(nu) else "from.given") for nu in dof]
+    names = [texts.kind(each.name) for each in kinds]
+    names += [f"– {texts(f'level.{each.level}', name=each.subject)}" for each in finer]
+
+    def shares(u: list[float], share: list[float]) -> list[Quantity]:
+        percent = [100 * each for each in share]
+        number = columns.number("u", u, unit=own.unit, figures=2)
+        return [number, columns.number("share", percent, 1, "%")]
+
+    tables = [
+        [
+            columns.text("source", names),
+            columns.number("number", [each.number for each in sources]),
+            *shares([each.u for each in sources], [each.share for each in sources]),
+            columns.number("dof", [*dof, *blank], 1),
+            columns.text("from", [*origins, *[""] * len(finer)]),
+        ],
+        [
+            columns.text("observation", [texts.observation(each.observation) for each in own.largest]),
+            columns.number("sd", [each.sd for each in own.largest]),
+            columns.number("sensitivity", [each.sensitivity for each in own.largest]),
+            *shares(
+                [math.sqrt(each.contribution) for each in own.largest], [each.share for each in own.largest]
+            ),
+        ],
+    ]
+    titles = budget_line(texts, own), texts("table.single", quantity=own.subject)
+    return [Table("budget", title, quantities) for title, quantities in zip(titles, tables, strict=True)]
+
+
+def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
+    """Return parameters and correlations of a camera, and its distortion with standard deviations."""
+    texts, columns, sd = statement.texts, Columns(statement.texts), camera.sd
+    of, estimated = units(camera.camera), camera.estimated
+    axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
+    names = [camera.names[k] for k in estimated]
+    value = Quantity(
+        camera.values, axes, "value", head=columns.head("value"), figures=6, of=np.arange(len(of))
+    )
+    origins = [texts("from.estimated" if k in estimated else "from.given") for k in range(len(of))]
+    parameters = [
+        columns.text("parameter", camera.names),
+        columns.text(BLANK, of),
+        value,
+        columns.number("sd", sd, figures=2),
+        columns.text("from", origins),
+    ]
+    title = texts("table.camera", camera=camera.name)
+    tables = [Table("camera", title, parameters, deviations=sd[np.newaxis])]
+    if len(names) > 1:
+        matrix = camera.correlations[np.ix_(estimated, estimated)]
+        numbers = [
+            Quantity(column, head=name, decimals=2) for name, column in zip(names, matrix.T, strict=True)
+        ]
+        title = texts("table.correlations", camera=camera.name)
+        tables.append(Table("correlations", title, [columns.text("parameter", names), *numbers]))
+    curve = distortion_curve(statement.result, camera)
+    if curve is not None:
+        unit, inside = statement.result.block.image_unit, np.flatnonzero(curve.radii <= curve.observed)
+        rows = inside[np.unique(np.linspace(0, len(inside) - 1, MAX_RADII).round().astype(int))]
+        decimals = decimals_for(curve.sd[rows])
+        distortion = [
+            columns.number("radius", curve.radii[rows], unit=unit),
+            columns.number("correction", curve.values[rows], decimals, unit),
+            columns.number("sd", curve.sd[rows], decimals, unit),
+        ]
+        tables.append(Table("distortion", texts("table.distortion", camera=camera.name), distortion))
+    return tables
+
+
+def _adjustment(statement: Statement) -> list[Part]:
+    """Return sums by kind, tests, removed observations, residuals of control and check points."""
+    texts, columns = statement.texts, Columns(statement.texts)
+    kinds = kinds_of(statement.result)
+    counts, redundancy, squares = zip(*kinds.values(), strict=True)
+    sums = [
+        columns.text("kind", [texts.kind(name) for name in kinds]),
+        columns.number("number", counts),
+        columns.number("redundancy", redundancy, 1),
+        columns.number("squares", squares, 1),
+    ]
+    caption = texts("page.overlap.caption")
+    drawing = Drawing(
+        "map-overlap", texts("page.overlap"), caption, partial(overlap, statement.result, texts)
+    )
+    return [
+        Table("kinds", texts("table.kinds"), sums),
+        verdict_table(statement.result.verdict, texts),
+        removed_observations(statement),
+        _markers(statement),
+        drawing,
+    ]
+
+
+def _markers(statement: Statement) -> Table:
+    """Return rms and largest residual of the images of every control and check point."""
+    texts, columns, result = statement.texts, Columns(statement.texts), statement.result
+    block, kinds, n = result.block, result.point_kinds, len(result.point_kinds)
+    squares = np.where(result.used_images[:, np.newaxis], result.residuals, 0.0) ** 2
+    total = np.bincount(result.image_points, weights=squares.sum(axis=1), minlength=n)
+    counts = np.bincount(result.image_points[result.used_images], minlength=n)
+    largest = np.zeros(n)
+    np.maximum.at(largest, result.image_points, np.sqrt(squares.sum(axis=1)))
+    rows = in_order(block, np.flatnonzero((kinds != "pass") & (counts > 0)))
+    number = partial(columns.number, decimals=2, unit=block.image_unit)
+    quantities = [
+        columns.text("point", [block.point_ids[row] for row in rows]),
+        columns.text("use", [texts(f"use.{kind}") for kind in kinds[rows]]),
+        columns.number("photos", counts[rows]),
+        number("rms", np.sqrt(total[rows] / counts[rows])),
+        number("largest", largest[rows]),
+    ]
+    return Table("markers", texts("table.markers"), quantities)
+
+
+def _survey(statement: Statement) -> list[Table]:
+    texts, columns, own = statement.texts, Columns(statement.texts), statement.survey
+    if own.system is None:
+        return []
+    decimals = max(3, decimals_for(own.sd))
+    coordinates = [
+        columns.number(
+            texts.word("axis", name), column, 8 if unit == "deg" else decimals, texts.word("unit", unit)
+        )
+        for (name, unit), column in zip(own.system.axes, own.positions.T, strict=True)
+    ]
+    quantities = [
+        columns.text("point", own.names),
+        columns.text("use", [texts(f"use.{kind}") for kind in own.kinds]),
+        *coordinates,
+        columns.directions("sd", own.sd, decimals, texts.unit),
+    ]
+    note = texts("assume.crs", crs=own.system.crs) if own.system.crs else ""
+    return [Table("survey", texts("annex.f"), quantities, note)]
+
+
+def _files(statement: Statement) -> list[Part]:
+    texts, columns, files = statement.texts, Columns(statement.texts), statement.inputs
+    facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
+    if statement.command:
+        facts.append(Fact(texts("page.command"), statement.command))
+    quantities = [
+        columns.text(texts("page.file"), [each.path.name for each in files]),
+        columns.number("size", [each.size for each in files], unit=texts("unit.bytes"), decimals=0),
+        columns.text("SHA-256", [each.sha256 for each in files]),
+    ]
+    return [Facts(texts("page.program"), facts), Table("files", texts("table.files"), quantities)]
+
+
+def _metrology(statement: Statement) -> list[Part]:
+    texts, columns, parts = statement.texts, Columns(statement.texts), list[Part]()
+    features, lengths, measures = (
+        statement.result.features,
+        statement.standards.lengths,
+        statement.standards.iso_19157,
+    )
+    if features is not None and len(features):
+        parts.append(_features(texts, features))
+    if lengths is not None:
+        sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
+        drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
+        parts += [test_lengths(texts, lengths), drawing]
+    if measures:
+        quantities = [
+            columns.text("measure", [each["measure"] for each in measures]),
+            columns.number("id", [each["measure_id"] for each in measures]),
+            columns.text("value", [_measured(texts, each["value"]) for each in measures]),
+            columns.text(BLANK, [each["unit"] for each in measures]),
+        ]
+        parts.append(Table("iso", texts("table.iso"), quantities))
+    return parts
+
+
+def _measured(texts: Texts, value: Any) -> str:
+    values = value if isinstance(value, list) else [value]
+    return " / ".join("–" if each is None else texts.significant(each, 3) for each in values)
+
+
+def _features(texts: Texts, features: Features) -> Table:
+    """Return the quantities of features: two figures of the smallest deviation among those of one unit."""
+    columns = Columns(texts)
+    every = [(feature, own) for feature in features for own in feature.quantities]
+    names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
+    axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
+    numbers = [
+        Quantity(
+            np.array([getattr(own, key) for _, own in every]), axes, "value", head=columns.head(key), of=of
+        )
+        for key in ("value", "sd", "expanded")
+    ]
+    quantities = [
+        columns.text("feature", names),
+        columns.text("quantity", [texts.word("measured", own.name) for _, own in every]),
+        *numbers,
+        columns.text(BLANK, [own.unit for _, own in every]),
+    ]
+    note = f"k = {texts.number(features.k, 2)}"
+    return Table("features", texts("table.features"), quantities, note, deviations=unit_deviations(features))
+
 
 _CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with classes
 
@@ -78,8 +351,8 @@ def _figures(statement: Statement) -> list[Part]:
         *(number(key, [getattr(sized, key) for _, sized, _ in shown]) for key in ("mean", "sd", "rmse")),
         columns.text("interval", intervals),
         number("predicted", [predicted.predicted_rmse for *_, predicted in shown]),
-        number("survey", [_survey(own, part)[0] for part, *_ in shown]),
-        number("combined", [_survey(own, part)[1] for part, *_ in shown]),
+        number("survey", [_survey_rmse(own, part)[0] for part, *_ in shown]),
+        number("combined", [_survey_rmse(own, part)[1] for part, *_ in shown]),
         number("largest", [sized.largest for _, sized, _ in shown]),
         columns.text("point", [sized.point for _, sized, _ in shown]),
     ]
@@ -97,7 +370,7 @@ def _figures(statement: Statement) -> list[Part]:
     return [Table("figures", texts("table.figures", unit=texts.unit), quantities)]
 
 
-def _survey(own: Figures, part: str) -> tuple[float, float]:
+def _survey_rmse(own: Figures, part: str) -> tuple[float, float]:
     """Return RMSE of the survey, and combined with what was statement, of parts that standards have."""
     if part == "plan":
         return own.rmse_h2, own.rmse_h

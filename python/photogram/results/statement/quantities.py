@@ -15,7 +15,7 @@ from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
 from photogram.results.cameras import units
-from photogram.results.selection import Item, adjusted
+from photogram.results.covariance import Item, adjusted
 from photogram.results.statement.request import invalid
 from photogram.words import Phrase, phrase
 

@@ -1,4 +1,10 @@
-"""What standards say of the figures of a statement: those that were asked for."""
+"""What standards say of the figures of a statement: those that were asked for.
+
+Sections 2.3 and 2.6 of the specification of the statement. The factors of the National Standard for Spatial
+Data Accuracy (FGDC-STD-007.3-1998) hold for axes of nearly equal RMSE; beyond, and beside, the radius stands
+that holds 95 % of errors with the matrix of mean products that was found. Numbers of measures of ISO 19157
+are those of the edition of 2013, annex D; names as the same table in GeoAPI has them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +13,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -16,7 +24,6 @@ from photogram.network.observations import Control
 from photogram.results.statement import asprs
 from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
 from photogram.results.statement.figures import Figures, root_mean
-from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.lengths import (
@@ -27,15 +34,31 @@ from photogram.results.statement.lengths import (
     length_test,
     measured_lengths,
 )
-from photogram.results.statement.nssda import Nssda, nssda
 from photogram.results.statement.quantities import unknown
-from photogram.results.statement.request import Asked, lengths_in
+from photogram.results.statement.request import Asked, invalid, lengths_in
 from photogram.show.quantity import members
+from photogram.statistics.error_radii import circular_error
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
 
+ENOUGH = 20  # Required check points
+VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
+"""Factors of RMSE_z, of the radial RMSE, and of the mean of the RMSE of both axes."""
+LEAST_RATIO = 0.6  # Ratio of the RMSE of the axes below which the factors are not valid
+ABSOLUTE = "absolute (external) positional accuracy"  # Of check points
+RELATIVE = "relative (internal) positional accuracy"  # Of lengths, and of differences between points
+MEASURES = {
+    "bias": (128, "bias of positions"),
+    "le90": (35, "linear map accuracy at 90 % significance level"),
+    "le95": (36, "linear map accuracy at 95 % significance level"),
+    "rmse": (39, "root mean square error"),
+    "ce90": (44, "circular error at 90 % significance level"),
+    "ce95": (45, "circular error at 95 % significance level"),
+    "rmse_plan": (47, "root mean square error of planimetry"),
+    "ellipse": (50, "uncertainty ellipse"),
+}
 _METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
 _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 
@@ -76,6 +99,29 @@ class Asprs:
             "remarks": [vars(each) for each in self.remarks],
             "leave_one_out": dict(self.left_out),
         }
+
+
+@dataclass(frozen=True)
+class Nssda:
+    """Accuracy of n check points at 95 %, in the linear unit; None where there is no figure."""
+
+    count: int  # n
+    ratio: float | None  # Of the smaller RMSE of an axis to the larger
+    accuracy_r: float | None  # Horizontal, by the mean RMSE of the axes; None if the ratio is below 0.6
+    accuracy_r_equal: float | None  # Horizontal, by the radial RMSE, as if both axes had the same
+    # Radius of 95 % from the mean products of differences, for any ratio
+    ce95: float | None
+    accuracy_z: float | None  # Vertical
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are as many check points as are asked for."""
+        return self.count >= ENOUGH
+
+    @property
+    def wording(self) -> str:
+        """Which sentence holds: `tested` with check points, `compiled` (to meet) without."""
+        return "tested" if self.count else "compiled"
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +253,29 @@ def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
     return {"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)}
 
 
+def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
+    """Return the accuracy of `count` check points at 95 %.
+
+    `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
+    on its diagonal; None where there are none in plan. `rmse_z` is that of the heights, in the linear unit;
+    None where there are none.
+    """
+    if rmse_z is not None and not rmse_z >= 0:
+        raise invalid("rmse_z", "error.not-negative", rmse_z)
+    vertical = None if rmse_z is None else VERTICAL * rmse_z
+    if moments is None:
+        return Nssda(count, None, None, None, None, vertical)
+    matrix = numbers("moments", moments)
+    if matrix.shape != (2, 2):
+        raise invalid("moments", "error.shape", shape="(2, 2)", actual=str(matrix.shape))
+    ce95 = float(circular_error(matrix[np.newaxis], 0.95)[0])
+    small, large = sorted(math.sqrt(each) for each in np.diag(matrix).tolist())
+    ratio = small / large if large > 0 else 1.0
+    mean = EITHER * (small + large) / 2
+    equal = RADIAL * math.hypot(small, large)
+    return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
+
+
 def _nssda(of_all: Figures | None) -> Nssda | None:
     if of_all is None:
         return None
@@ -268,11 +337,31 @@ def _iso(
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
             "ellipse": _ellipse(of_all.moments),
         }
-        found += measures(values, scope=counted(of_all.n, "check point"), **more)
+        found += measures(values, ABSOLUTE, scope=counted(of_all.n, "check point"), **more)
     if lengths is not None:
         scope = counted(len(lengths.lines), "length")
-        found += measures({"rmse": lengths.test.rms}, scope=scope, element=RELATIVE, **more)
+        found += measures({"rmse": lengths.test.rms}, RELATIVE, scope=scope, **more)
     return found
+
+
+def measures(
+    values: Mapping[str, object], element: str, *, unit: str, date: str, scope: str
+) -> list[dict[str, Any]]:
+    """Return figures as measures of data quality, for JSON: by their keys in `MEASURES`, without None."""
+    return [
+        {
+            "element": element,
+            "measure": MEASURES[key][1],
+            "measure_id": MEASURES[key][0],
+            "value": value,
+            "unit": unit,
+            "evaluation": "direct external",
+            "date": date,
+            "scope": scope,
+        }
+        for key, value in values.items()
+        if value is not None
+    ]
 
 
 def _ellipse(moments: Floats) -> list[float] | None:

@@ -16,10 +16,17 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
-from photogram.results.statement.comparison import Compared, compared, control_places
+from photogram.results.statement.comparison import (
+    NOTHING,
+    Compared,
+    Survey,
+    System,
+    compared,
+    control_places,
+    surveyed,
+)
 from photogram.results.statement.document import budget_member, figures_member, statement_members
 from photogram.results.statement.figures import figures
-from photogram.results.statement.given_coordinates import NOTHING, Survey, System, surveyed
 from photogram.results.statement.grounds import Grounds, removed_observations
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout

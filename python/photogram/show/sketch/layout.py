@@ -11,10 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.show.sketch.declared import Panel, Sketch
-from photogram.show.sketch.letters import Box, widest, width, wrapped
-from photogram.show.sketch.marks import Labelled, Level, Line, Markers, Polygons
-from photogram.show.sketch.ticks import Ticks, ticks
+from photogram.show.sketch.letters import Box, Ticks, ticks, widest, width, wrapped
+from photogram.show.sketch.marks import Labelled, Level, Line, Markers, Panel, Polygons, Sketch
 
 HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
 HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0

@@ -9,9 +9,9 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.show.sketch import marks
-from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import NAME, NOTE
 from photogram.show.sketch.letters import Box, free_side, width
+from photogram.show.sketch.marks import Panel, Sketch
 from photogram.show.style import FAINT, INK, ORDERED, signed, styled
 from photogram.words import phrase
 

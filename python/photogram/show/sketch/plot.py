@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Panel, Sketch
 from photogram.show.sketch.svg import svg_of
 from photogram.show.style import new_figure, styled
 from photogram.words import phrase

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import (
     BAR_LINE,
     COLOUR_BAR,
@@ -35,8 +34,8 @@ from photogram.show.sketch.layout import (
     right_end,
     right_side,
 )
-from photogram.show.sketch.letters import Box, widest, width
-from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, stops
+from photogram.show.sketch.letters import Box, Ticks, ticks, widest, width
+from photogram.show.sketch.marks import Labelled, Panel, Shades, Sketch, hexadecimal, stops
 from photogram.show.sketch.svg_marks import (
     Attributes,
     element,
@@ -48,7 +47,6 @@ from photogram.show.sketch.svg_marks import (
     svg,
     text,
 )
-from photogram.show.sketch.ticks import Ticks, ticks
 from photogram.show.style import FAINT, INK, SETTINGS
 
 TICK_LENGTH = 3.5
