@@ -280,7 +280,7 @@ def test_a_station_that_is_held_at_a_wrong_place_is_named_first(made, every):
     assert verdict.headline.startswith(f"Gross errors likely: 1) {named}")
     assert str(Phrase("part.fixed")) in verdict.headline
     # By so much the sum of squares falls where it is free.
-    [test] = [each for each in verdict.tests if each.name.startswith("Fixed values")]
+    [test] = [each for each in verdict.tests if each.name.startswith(str(Phrase("test.held")))]
     sd[2] = np.inf
     free = adjust(held.replace(photo_position_sd=sd))
     fall = adjust(held).sums_of_squares.total - free.sums_of_squares.total
@@ -293,7 +293,7 @@ def test_nothing_is_said_of_what_is_held_rightly(made):
     held = made.block.replace(photo_positions=made.truth.photo_positions, photo_position_sd=sd)
     verdict = adjust(held).verdict
     assert verdict.code == "accepted"
-    assert not any(each.name.startswith("Fixed values") for each in verdict.tests)
+    assert not any(each.name.startswith(str(Phrase("test.held"))) for each in verdict.tests)
 
 
 def test_fixed_control_at_a_wrong_place_is_named_first(made):

@@ -570,7 +570,7 @@ def test_the_example_of_a_line_scanner(capsys):
         result.plot.trajectory(name="nowhere")
     with pytest.raises(InputError, match="must be in the span"):
         result.trajectories["strip"].poses([1e3])
-    with pytest.raises(InputError, match="no photo on a trajectory"):
+    with pytest.raises(InputError, check=as_check("error.unknown photo on a trajectory none")):
         result.project("none", [[0.0, 0.0, 0.0]])
 
 
@@ -620,7 +620,7 @@ def test_two_clocks_of_one_name_are_refused_at_one_time_too():
         for _ in range(2)
     ]
     empty = {"image_photos": [], "image_points": [], "image_xy": np.zeros((0, 2)), "image_sd": 1.0}
-    with pytest.raises(InputError, check=as_check("block.repeated-object clock receiver")):
+    with pytest.raises(InputError, check=as_check("block.repeated-object unknown clock receiver")):
         Block(
             photo_positions=np.zeros((0, 3)),
             photo_attitudes=np.zeros((0, 3)),
