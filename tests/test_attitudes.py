@@ -159,7 +159,7 @@ def test_refusals() -> None:
             lambda: Attitudes.of("yaw_pitch_roll", [[1, 0, 0]], mounting="up"),
             "mounting is one of top forward",
         ),
-        (lambda: Attitudes(right).covariances("matrix"), "no covariances"),
+        (lambda: Attitudes(right).covariances("matrix"), "attitude.no-covariances"),
         (lambda: Attitudes.of("omega_phi_kappa", [[1, 0, 0]], np.eye(3)), "covariances has the shape"),
     ]
     for attempt, message in refused:

@@ -285,5 +285,5 @@ def test_every_command_ends_by_them_and_says_what_to_do(tmp_path, command):
     assert f"Verdict\n-------\n{said}" in (out / "report.txt").read_text()
     page = (out / "report.html").read_text()
     assert said in page
-    assert "Look at the check points that are named" in page
+    assert "Look at the named check points" in page
     assert "Nothing needs to be done" not in page

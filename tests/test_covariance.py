@@ -11,6 +11,7 @@ import pytest
 from example_scripts import load
 from golden_data import golden
 from golden_network import free_network
+from message_codes import as_check
 from photogram import Attitudes, InnerConstraints, InputError, OutOfMemoryError, adjust
 
 
@@ -117,11 +118,11 @@ def test_what_has_no_covariance_is_refused(small, monkeypatch):
     for selection, message in (
         (("points", point), "a selection must be a pair"),
         ("point", "a selection must be a pair"),
-        (("point", "nowhere"), "no point 'nowhere'"),
-        (("camera", "nothing"), "no camera 'nothing'"),
+        (("point", "nowhere"), "error.absent point nowhere"),
+        (("camera", "nothing"), "error.absent camera nothing"),
         ([("photo", 3)], "names of the kind photo"),
     ):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, check=as_check(message)):
             covariances.covariance(selection)
     with pytest.raises(InputError, check=lambda error: error.phrase.fields["message"].code == "error.finite"):
         covariances.propagate(lambda p: p * np.nan, ("point", point))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from message_codes import as_check
 from photogram import AdjustmentError, InnerConstraints, InputError, MinimumConstraints, adjust, simulate
 from photogram.network import rotation_matrix
 
@@ -97,7 +98,7 @@ def test_attitudes_carry_the_datum_as_the_dense_transformation_has_it(block, min
 def test_attitudes_alone_leave_the_rest_as_it_was_refused(minimum):
     with pytest.raises(InputError, check=lambda error: error.code == "free.few"):
         minimum.in_datum(InnerConstraints(points=[], attitudes=None))
-    with pytest.raises(InputError, match="radius is a positive length"):
+    with pytest.raises(InputError, check=as_check("error.at radius: error.positive 0.0")):
         InnerConstraints(attitudes=None, radius=0.0)
 
 

@@ -23,7 +23,7 @@ def fixed(block, photos, attitude=0.0):
 
 
 def held(result):
-    found = [str(each) for each in result.messages if "held at their initial values" in str(each)]
+    found = [str(each) for each in result.messages if each.code == "free.minimum"]
     return found[0] if found else ""
 
 

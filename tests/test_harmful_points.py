@@ -7,10 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from message_codes import has_code
 from photogram import Block, adjust, diagnose, simulate, snoop
 from photogram.diagnosis.key_numbers import held_values
 from photogram.network import project
 from photogram.results.network_sections import weakest_photos, weakest_points
+from photogram.words import Phrase
 
 
 @pytest.fixture(scope="module")
@@ -274,17 +276,16 @@ def test_a_station_that_is_held_at_a_wrong_place_is_named_first(made, every):
     sd[2] = 0.0
     held = made.block.replace(photo_positions=positions, photo_position_sd=sd)
     verdict = adjust(held).verdict
-    name = made.block.photo_ids[2]
-    assert verdict.headline.startswith(f"Gross errors likely: 1) position of photo {name}, which is held")
-    assert "give it a standard deviation" in verdict.headline
+    named = Phrase("named.held", {"named": Phrase("named.position", {"photo": made.block.photo_ids[2]})})
+    assert verdict.headline.startswith(f"Gross errors likely: 1) {named}")
+    assert str(Phrase("part.fixed")) in verdict.headline
     # By so much the sum of squares falls where it is free.
-    [test] = [each for each in verdict.tests if each.name.startswith("held values")]
+    [test] = [each for each in verdict.tests if each.name.startswith(str(Phrase("test.held")))]
     sd[2] = np.inf
     free = adjust(held.replace(photo_position_sd=sd))
     fall = adjust(held).sums_of_squares.total - free.sums_of_squares.total
     assert test.value == pytest.approx(fall, rel=0.01)
-    said = [str(each) for each in snoop(held).result.messages]
-    assert any(f"position of photo {name}, which is held, explains more" in each for each in said)
+    assert any(has_code(each, "line.held", name=named) for each in snoop(held).result.messages)
 
 
 def test_nothing_is_said_of_what_is_held_rightly(made):
@@ -292,7 +293,7 @@ def test_nothing_is_said_of_what_is_held_rightly(made):
     held = made.block.replace(photo_positions=made.truth.photo_positions, photo_position_sd=sd)
     verdict = adjust(held).verdict
     assert verdict.code == "accepted"
-    assert not any(each.name.startswith("held values") for each in verdict.tests)
+    assert not any(each.name.startswith(str(Phrase("test.held"))) for each in verdict.tests)
 
 
 def test_fixed_control_at_a_wrong_place_is_named_first(made):
@@ -301,8 +302,10 @@ def test_fixed_control_at_a_wrong_place_is_named_first(made):
     positions[control[1]] += [0.0, 40.0, 0.0]
     sd = np.where(np.isfinite(made.block.point_sd), 0.0, np.inf)
     verdict = adjust(made.block.replace(point_positions=positions, point_sd=sd)).verdict
-    name = made.block.point_ids[control[1]]
-    assert verdict.headline.startswith(f"Gross errors likely: 1) control point {name}, which is held")
+    named = Phrase(
+        "named.held", {"named": Phrase("named.control", {"point": made.block.point_ids[control[1]]})}
+    )
+    assert verdict.headline.startswith(f"Gross errors likely: 1) {named}")
 
 
 @pytest.mark.parametrize("name", ["hall 3, photo", "A on photo B", "7, which is held", "the photo of P"])

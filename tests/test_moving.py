@@ -8,6 +8,7 @@ import pytest
 
 from example_scripts import load
 from golden_data import golden as golden_file
+from message_codes import as_check
 from nested_codes import raises
 from photogram import Block, Camera, InputError, Position, Spheroid, adjust
 from photogram.network import (
@@ -565,11 +566,11 @@ def test_the_example_of_a_line_scanner(capsys):
     assert abs(clock.position[0] - 0.012) < 3 * clock.sd[0]
     assert capsys.readouterr().out.count("\n") == 4
     assert [panel.up for panel in result.plot.trajectory().panels] == ["position, m", "rotation, rad"]
-    with pytest.raises(InputError, match="no trajectory nowhere"):
+    with pytest.raises(InputError, check=as_check("error.unknown trajectory nowhere strip")):
         result.plot.trajectory(name="nowhere")
     with pytest.raises(InputError, match="must be in the span"):
         result.trajectories["strip"].poses([1e3])
-    with pytest.raises(InputError, match="no photo on a trajectory"):
+    with pytest.raises(InputError, check=as_check("error.unknown photo on a trajectory none")):
         result.project("none", [[0.0, 0.0, 0.0]])
 
 
@@ -581,7 +582,7 @@ def test_known_readout_times_of_one_length_are_one():
 
 
 def test_a_scanner_without_a_trajectory_needs_the_time_of_its_pose():
-    with pytest.raises(InputError, match="the scanner A needs a trajectory, or the time of its own pose"):
+    with pytest.raises(InputError, check=as_check("error.at photo A: error.requires lines")):
         Timed("A", lines=Lines([[0.0, 0.0, 0.01]]), line_sensor=SENSOR)
 
 
@@ -619,7 +620,7 @@ def test_two_clocks_of_one_name_are_refused_at_one_time_too():
         for _ in range(2)
     ]
     empty = {"image_photos": [], "image_points": [], "image_xy": np.zeros((0, 2)), "image_sd": 1.0}
-    with pytest.raises(InputError, match="two unknowns are called clock receiver"):
+    with pytest.raises(InputError, check=as_check("block.repeated-object unknown clock receiver")):
         Block(
             photo_positions=np.zeros((0, 3)),
             photo_attitudes=np.zeros((0, 3)),

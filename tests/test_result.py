@@ -16,6 +16,7 @@ from photogram import Attitudes, Block, Result, Spheroid, adjust, simulate
 from photogram.network import project
 from photogram.show.cells import written
 from photogram.show.forms import titled_lines
+from photogram.words import Phrase
 
 ARCSEC = 180 * 3600 / math.pi
 SPACES: dict[str, dict[str, Any]] = {
@@ -435,7 +436,7 @@ def test_what_is_no_number_is_null():
     assert document["covariance_scale"] == 1.0
     assert document["check_points"][0]["difference"][2] is None
     assert document["check_points"][0]["difference"][0] is not None
-    assert any("there is no control" in message for message in document["messages"])
+    assert str(Phrase("free.weights.photos")) in document["messages"]
     assert facts(result, "size")["Variance of unit weight"] == "undefined"
     assert "covariances are scaled by 1" in result.report()
 

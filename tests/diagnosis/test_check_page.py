@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.show.page import Facts, Table
+from photogram.show.page import Facts
+from photogram.show.quantity import Table
 
 
 @pytest.mark.parametrize("feet", [False, True])
@@ -21,7 +22,7 @@ def test_the_page_says_what_the_verdict_says(feet):
     (tests,) = [section for section in page.sections if section.key == "tests"]
     (table,) = tests.parts
     assert isinstance(table, Table)
-    assert len(table.rows) == len(found.verdict.tests) > 3
+    assert len(table.columns[0].values) == len(found.verdict.tests) > 3
 
 
 def test_iterations_are_no_findings():

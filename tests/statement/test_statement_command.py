@@ -10,6 +10,7 @@ from golden_statement import BLOCK
 import photogram
 from photogram.formats import read
 from photogram.formats.format_coordinates import in_topocentric
+from photogram.words import Phrase
 
 FILES = (
     *("budget.csv", "check_points.csv", "leave_one_out.csv"),
@@ -107,11 +108,11 @@ def test_tables_have_a_row_for_each_point_and_source(run, site):
     ("options", "said"),
     [
         (["--class-h", "5"], "a length must have a unit"),
-        (["--class-h", "5 parsec"], "no unit of length"),
+        (["--class-h", "5 parsec"], "'parsec'"),
         (["--area", "5m"], "an area must have a unit"),
         (["--without", "C07"], "POINT="),
-        (["--standard", "din"], "no standard"),
-        (["--budget", "point C99 z"], "no point"),
+        (["--standard", "din"], "'din'"),
+        (["--budget", "point C99 z"], "'C99'"),
         (["--text", "missing.toml"], "missing.toml"),
         (["--sd", "checks=1"], "rates, bases, check, as images=0.5"),
     ],
@@ -213,7 +214,9 @@ def test_settings_beside_a_result_that_are_of_another_block_are_told_and_not_tak
     Path("here/images.csv").write_text(Path("here/images.csv").read_text().replace("t046", "t999"))
     done = run("statement", "here/data", "--out", "stated")
     assert done.exit_code == 0, done.output
-    assert "of another block" in " ".join(done.stderr.split())
+    settings = Path("here/project.toml").resolve()
+    remark = Phrase("command.other-block", {"settings": str(settings), "folder": "here/data"})
+    assert str(remark) in " ".join(done.stderr.split())
     assert json.loads(Path("stated/statement.json").read_text())["client"] is None
 
 

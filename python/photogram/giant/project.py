@@ -115,11 +115,12 @@ def project_files(project: Project, directory: Path, *, overwrite: bool = False)
     texts = project.records()
     targets = {name: directory / name for name in NAMES}
     if directory.exists():
-        for name, present in present_files(directory).items():
-            names = [path.name for path in present]
-            if present and not overwrite:
-                raise InputError(phrase("giant.overwrite", names=names), file=directory)
+        files = present_files(directory)
+        if not overwrite and (names := [path.name for present in files.values() for path in present]):
+            raise InputError(phrase("giant.overwrite", names=names), file=directory)
+        for name, present in files.items():
             if len(present) > 1:
+                names = [path.name for path in present]
                 raise InputError(phrase("giant.several", name=name, names=names), file=directory)
             targets[name] = next(iter(present), targets[name])
     return {targets[name]: to_bytes(records) for name, records in texts.items()}

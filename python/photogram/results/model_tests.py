@@ -223,6 +223,7 @@ def score_test(
         No such camera, terms that are estimated, partials of another shape, effects that the unknowns of the
         block take up altogether.
     """
+    _require_block(result)
     block = result.block
     m = len(block.image_xy)
     if partials is None:
