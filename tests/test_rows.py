@@ -47,7 +47,7 @@ def read_numbers(path):
         ("id,y\n1,2\n", 1, "the column x is missing"),
         ("id,x\n1,2,3\n", 2, "has 3 cells, but the table has 2 columns"),
         ("id,x\n1\n", 2, "has 1 cells, but the table has 2 columns"),
-        (f"id,x\n1,{'9' * 140_000}\n", 2, f"the record has 140002 characters; {LONGEST_RECORD} are the most"),
+        (f"id,x\n1,{'9' * 140_000}\n", 2, f"the record has 140002 characters; .*{LONGEST_RECORD}"),
         (f"id,x\n1,{'9' * 90_000}\n", 2, r"column x: must be a number, got '9999.*'... \(90000 characters\)"),
         (f"id,x{',' * 420_000}\n1,2\n", 1, "the record has 420004 characters"),
         (f"id,x{',' * 90_000}\n1,2\n", 2, "has 2 cells, but the table has 90002 columns"),

@@ -57,7 +57,7 @@ def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
     import difflib  # a wrong name is rare
 
     known = list(names)
-    if len(known) > MANY:
+    if not known or len(known) > MANY:
         return Phrase("error.absent", {"kind": kind, "name": name})
     if close := difflib.get_close_matches(name, known, 1, 0.5):
         return Phrase("error.unknown.close", {"kind": kind, "name": name, "close": close[0]})

@@ -299,7 +299,7 @@ def test_tags_without_a_denominator_say_nothing():
 
 
 BAD_LINES = {
-    "cells": ("1\t2\t3\n", "format.words n=3 required=11 cells"),
+    "cells": ("1\t2\t3\n", "format.words n=3 required=11 words"),
     "week": (LINE.format(1, "0.1, 0.1, 0.1", 50).replace("[2264]", "2264"), "photos.week value=2264"),
     "sd": (LINE.format(1, "0.1, nan, 0.1", 50), "standard deviation: error.number value=nan"),
     "latitude": (

@@ -386,7 +386,7 @@ def test_what_tables_cannot_hold(tmp_path):
     curved = lines.replace(timed=[replace(each, line_sensor=lensed) for each in lines.timed])
     with rejected("plain.bent-line down"):
         formats.to_files(project_of(curved, tmp_path), "plain")
-    with rejected(r"COLMAP.*: the photo L1 is of a line scanner"):
+    with rejected("format.scanner L1"):
         formats.to_files(own, "colmap")
     drone = project_of(block, tmp_path, sizes=((3000, 2000),))
     lost = formats.cannot_hold(drone, "colmap")

@@ -214,10 +214,10 @@ def test_a_project_names_the_folder_itself(flown):
     toml.write_text(text + '[photos]\ndirectory = "photos"\n')
     assert len(positions(formats.read(folder))) == 6
     toml.write_text(text + '[photos]\ndirectory = "nowhere"\n')
-    with refused("there is no folder nowhere"):
+    with refused("error.key table=photos key=directory message=error.absent kind=folder name=nowhere"):
         formats.read(folder)
     toml.write_text(text + '[photos]\ndirectory = "photos"\nmrk_antenna = 3\n')
-    with refused("true or false"):
+    with refused("error.key table=photos key=mrk_antenna message=error.flag value=3"):
         formats.read(folder)
 
 

@@ -92,14 +92,14 @@ def test_rotations_that_are_the_other_way_round_are_found(tmp_path):
     ("file", "old", "new", "words"),
     [
         ("image.im", "8670.000", "8.670", ["image.im", "record 1", "reduced.distance"]),
-        ("image.im", "-1480.7692", "-1480,7692", ["record 2", "x: '-1480,7692' is not a number"]),
+        ("image.im", "-1480.7692", "-1480,7692", ["record 2", "x: error.number value=-1480,7692"]),
         (
             "orientation.ori",
             "0.998950838367",
             "0.598950838367",
             ["orientation.ori", "record 1", "format.rotation"],
         ),
-        ("control.con", "-22.15520", "x", ["control.con", "record 1", "X: must be a number, got 'x'"]),
+        ("control.con", "-22.15520", "x", ["control.con", "record 1", "X: error.number value=x"]),
     ],
 )
 def test_a_fault_is_named_with_its_line(tmp_path, file, old, new, words):

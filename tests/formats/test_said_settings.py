@@ -69,5 +69,5 @@ def test_other_formats_have_no_settings(folder: Path) -> None:
     for name, content in to_files(said(folder, "sd.control=0.1"), "bundler").items():
         (folder / "other" / name).parent.mkdir(exist_ok=True)
         (folder / "other" / name).write_bytes(content)
-    with rejected("is no plain project but .*--set"):
+    with rejected("format.settings Bundle file"):
         said(folder / "other", "adjust.loss=huber")

@@ -189,7 +189,7 @@ def read_exposures(path: Path) -> dict[int, Exposure]:
 def _exposure(place: Place) -> Exposure:
     cells = [each.strip() for each in (place.text or "").split("\t")]
     if len(cells) < 11:
-        raise place.error(phrase("format.words", n=len(cells), required="11 cells between tabs"))
+        raise place.error(phrase("format.words", n=len(cells), required="11 words between tabs"))
     number, seconds, week, *rest = cells
     if not (week.startswith("[") and week.endswith("]")):
         raise place.error(phrase("photos.week", value=week))

@@ -183,8 +183,12 @@ class Observation:
             deviations = shaped(f"sd of {self.name}", sd, (r,), missing=True)
             with np.errstate(over="ignore", under="ignore"):
                 own = deviations[use] ** 2
-            if not ((deviations[use] > 0) & (own > 0) & np.isfinite(own)).all():
+            if not (deviations[use] > 0).all():
                 raise argument_error(f"sd of {self.name}", "positive", value=deviations.tolist())
+            if not ((own > 0) & np.isfinite(own)).all():  # squares must be numbers
+                raise argument_error(
+                    f"sd of {self.name}", "range", low=1e-150, high=1e150, value=deviations.tolist()
+                )
             return np.asarray(np.diag(np.where(use, deviations, 1.0) ** 2))
         if sd is not None or covariance is None:
             raise argument_error(self.name, "exclusive", first="sd", second="covariance")
