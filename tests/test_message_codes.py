@@ -1,7 +1,9 @@
 """Messages are codes with fields: no program reads a sentence."""
 
+import ast
 import json
 import pickle
+import re
 from pathlib import Path
 
 import pytest
@@ -69,6 +71,40 @@ def test_a_remark_has_a_code():
     assert (remark.code, remark.phrase.fields["n"]) == ("read.repeated", 2)
     assert str(remark) == str(remark.phrase)
     assert Message("a text of a file").code == ""
+
+
+FROM_DATA = ("kind.", "measured.", "reason.", "unit.")
+"""Families whose codes are composed of names that the core returns."""
+
+
+def strings_of(path):
+    """Return strings of a file, patterns of its strings with fields, and codes of its messages."""
+    strings, patterns, codes = set(), [], set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            strings.add(node.value)
+        elif isinstance(node, ast.JoinedStr):
+            texts = [part.value if isinstance(part, ast.Constant) else None for part in node.values]
+            if any(text and re.match(r"[a-z][a-z_-]+\.", text) for text in texts):
+                patterns.append("".join(".+" if text is None else re.escape(text) for text in texts))
+        elif isinstance(node, ast.Call) and getattr(node.func, "id", "").lower() == "phrase" and node.args:
+            codes.add(getattr(node.args[0], "value", ""))
+    return strings, patterns, {code for code in codes if isinstance(code, str) and code}
+
+
+def test_every_code_has_a_sentence_and_every_sentence_is_printed():
+    files = [strings_of(path) for path in Path(photogram.__file__).parent.rglob("*.py")]
+    strings = set().union(*(each[0] for each in files))
+    patterns = [re.compile(pattern) for each in files for pattern in each[1]]
+    sentences = table_of("en").keys()
+    base = {code: re.sub(r"(\.one(\.\w+)?)?(\.cli)?$", "", code) for code in sentences}
+    assert set().union(*(each[2] for each in files)) <= sentences | set(base.values())
+
+    def is_printed(code):
+        return code in strings or any(pattern.fullmatch(code) for pattern in patterns)
+
+    unused = [code for code in sentences if not (is_printed(code) or is_printed(base[code]))]
+    assert [code for code in unused if not code.startswith(FROM_DATA)] == []
 
 
 def test_an_error_has_a_code_at_each_place():

@@ -79,9 +79,9 @@ def test_variance_redundancy_and_datum(calibrated: Result, expected: dict[str, A
     assert np.sqrt(calibrated.variance_of_unit_weight) == pytest.approx(expected["sigma0"], abs=5e-7)
     assert calibrated.degrees_of_freedom == expected["redundancy"]
     assert calibrated.redundancy.sum() == pytest.approx(expected["redundancy"], rel=1e-6)
-    held = [str(message) for message in calibrated.messages if "held at their initial values" in str(message)]
-    assert len(held) == 1
-    assert "Y of 19" in held[0]
+    fixed = [each.phrase.fields["fixed"] for each in calibrated.messages if each.code == "free.minimum"]
+    assert len(fixed) == 1
+    assert "Y of 19" in ", ".join(map(str, fixed[0]))
 
 
 def test_camera_to_the_printed_digits(calibrated: Result, expected: dict[str, Any]) -> None:

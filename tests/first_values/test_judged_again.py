@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from golden_data import shared
+from message_codes import has_code
 from photogram import adjust, adjust_started, first_values, formats
 from photogram.results.result import NOT_PHOTOGRAPHED, REJECTED
 
@@ -50,8 +51,8 @@ def test_its_control_is_held_at_what_the_images_contradict(calibrated):
     """The sheet is not flat: a corner that is let go is 2.6 mm, 40 standard deviations, off."""
     assert (calibrated.verdict.code, calibrated.verdict.exit) == ("gross-errors", 4)
     headline = calibrated.verdict.headline
-    said = re.search(r"1\) control point 1004, which is held \(T = (\d+)\)", headline)
-    assert "held without error is no observation: give it a standard deviation (`Block.point_sd`)" in headline
+    said = re.search(r"1\) control point 1004 \(fixed\) \(T = (\d+)\)", headline)
+    assert has_code(calibrated.verdict.message, "part.fixed.control")
     block = calibrated.block
     row = block.point_ids.index("1004")
     sd = block.point_sd.copy()

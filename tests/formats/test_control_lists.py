@@ -210,7 +210,11 @@ def test_options_say_what_columns_and_words_are(tmp_path):
     project = given(path, turned, columns="x=Osten[ft],y=-Sueden,z=Hoch")
     place = project.block.point_ids.index("103")
     np.testing.assert_allclose(project.block.point_positions[place], [38.9226 * 0.3048, 90.3168, 5.1614])
-    for bad, say in (("point=Nummer", "'Nummer'"), ("east=x", "'east'"), ("point,x,y=Y", "either")):
+    for bad, say in (
+        ("point=Nummer", "format.unknown heading in --columns Nummer"),
+        ("east=x", "'east'"),
+        ("point,x,y=Y", "either"),
+    ):
         with rejected(say):
             given(path, turned, columns=bad)
 
@@ -218,7 +222,7 @@ def test_options_say_what_columns_and_words_are(tmp_path):
 def test_two_columns_that_may_be_heights_are_settled_by_the_option_of_the_message(tmp_path):
     # H is Hochwert beside R, and a height elsewhere.
     path, text = tmp_path / "list.csv", table("d", ["a", "b", "c"]).replace("point,x,y,z", "Nr,R,H,Z")
-    with rejected("table.same-columns z h,z h"):
+    with rejected("cells.same-columns z h,z h"):
         given(path, text)
     with rejected(r"--columns x=r,y=h \(a guess\)"):
         given(path, text, columns="z=z")

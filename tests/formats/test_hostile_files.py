@@ -37,7 +37,7 @@ def reads(path, match, root="document"):
 
 def test_an_archive_that_would_grow_without_end_is_refused_by_its_header(tmp_path):
     path = packed(tmp_path / "bomb.xml", b"<document>" + b" " * 80_000_000 + b"</document>")
-    reads(path, r"doc\.xml would expand from \d{5} to 80000021 bytes")
+    reads(path, r"file\.expands ratio=250 names=\['doc\.xml'\] packed=\d{5} size=80000021")
 
 
 @pytest.mark.parametrize(
@@ -217,7 +217,7 @@ def test_a_column_of_text_in_parquet_has_numbers_where_they_are_asked_for(tmp_pa
 def test_a_camera_that_shows_everything_in_one_point_is_named():
     block = photogram.simulate(strips=1, photos_per_strip=3, points_per_photo=12, seed=5).block
     flat = photogram.Camera("pinhole", {"fx": 1e-30, "fy": 1e-30, "cx": 1000.0, "cy": 800.0}, name="flat")
-    with pytest.raises(InputError, match="the camera flat shows all that is near its axis in one point"):
+    with pytest.raises(InputError, match="camera flat"):
         without_lenses(
             block.replace(cameras=[flat], photo_cameras=np.zeros(3, int), principal_distances=None)
         )

@@ -40,7 +40,13 @@ FAULTS = [
         "none,",
         ["record 2", "error.not-applicable position_reference position none"],
     ),
-    ("lines", "trajectories.csv", "strip 7", "strip 8", ["there is no trajectory 'strip 7'"]),
+    (
+        "lines",
+        "trajectories.csv",
+        "strip 7",
+        "strip 8",
+        ["error.column trajectory: error.unknown.close trajectory strip 7"],
+    ),
     (
         "lines",
         "trajectory_positions.csv",
@@ -74,7 +80,13 @@ FAULTS = [
         ["record 3", "'strip 8'"],
     ),
     ("lines", "line_times.csv", "L1,1000.0", "L1,0.0", ["record 3", "error.column line: plain.increase"]),
-    ("lines", "line_times.csv", "L2,", "L3,", ["record 4", "no photo 'L3'"]),
+    (
+        "lines",
+        "line_times.csv",
+        "L2,",
+        "L3,",
+        ["record 4", "error.column photo: error.unknown.close photo L3"],
+    ),
     ("lines", "line_times.csv", ",0.002\nL2", ",0\nL2", ["record 2", "seconds per line"]),
     (
         "lines",
@@ -94,7 +106,13 @@ FAULTS = [
     ("lines", "photos.csv", "L1,down", "L1,", ["record 2", "column camera"]),
     ("lines", "photos.csv", "strip 7", "strip 8", ["record 2", "column trajectory", "'strip 8'"]),
     ("lines", "photos.csv", "rig,ahead", "rig,behind", ["record 3", "plain.no-sensor-of-rig rig behind"]),
-    ("lines", "photos.csv", "rig,ahead", "pair,ahead", ["record 3", "column rig: there is no rig 'pair'"]),
+    (
+        "lines",
+        "photos.csv",
+        "rig,ahead",
+        "pair,ahead",
+        ["record 3", "error.column rig: error.unknown rig pair rig"],
+    ),
     (
         "lines",
         "photos.csv",
@@ -104,7 +122,13 @@ FAULTS = [
     ),
     ("lines", "gnss.csv", "strip 7,201.0", "strip 7,", ["record 2", "column time: must have a value"]),
     ("lines", "gnss.csv", "strip 7,201.0", ",201.0", ["record 2", "error.exclusive photo trajectory"]),
-    ("lines", "rates.csv", "strip 7,201.0", "strip 9,201.0", ["record 2", "no trajectory 'strip 9'"]),
+    (
+        "lines",
+        "rates.csv",
+        "strip 7,201.0",
+        "strip 9,201.0",
+        ["record 2", "error.unknown.close trajectory strip 9"],
+    ),
     ("lines", "gnss_groups.csv", "receiver,0.001", "receiver,0.002", ["other values", "column clock"]),
     ("lines", "attitude_groups.csv", "gyro,", "gyro,x", ["record 3", "column bias_x"]),
     (
@@ -112,7 +136,7 @@ FAULTS = [
         "covariances.csv",
         "strip 7 rotation 0",
         "strip 7 rotation 50",
-        ["record 2", "no rotation coefficient"],
+        ["record 2", "error.unknown.close rotation coefficient strip 7 rotation 50"],
     ),
 ]
 
@@ -149,7 +173,13 @@ def test_a_fault_is_named_with_file_record_and_text(moving_projects, name, file,
         ),
         ("drone", "photos.csv", "sd_omega", "1", ["photos.csv, record 2", "plain.moving-attitude"]),
         ("drone", "photos.csv", "line_rate", "1.5", ["photos.csv, record 2", "plain.line-rate"]),
-        ("drone", "photos.csv", "trajectory", "one", ["photos.csv, record 2", "no trajectory 'one'"]),
+        (
+            "drone",
+            "photos.csv",
+            "trajectory",
+            "one",
+            ["photos.csv, record 2", "error.column trajectory: error.unknown trajectory one"],
+        ),
         ("drone", "cameras.csv", "readout_begin", "1", ["cameras.csv, record 2"]),
         ("drone", "velocities.csv", "group", "one", None),
     ],

@@ -122,13 +122,18 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("level_points", "lake,t", "lake,x", ["level_points.csv", "record 2", "column point", "no point"]),
-        ("level_points", "0.01", "", ["record 2", "error.column sd: table.no-sd level_points"]),
+        (
+            "level_points",
+            "lake,t",
+            "lake,x",
+            ["level_points.csv", "record 2", "error.column point: error.unknown.close point x01"],
+        ),
+        ("level_points", "0.01", "", ["record 2", "error.column sd: cells.no-sd level_points"]),
         (
             "level_points",
             "pond",
             "Lake",
-            ["record 4", "column level", "error.column level: table.similar Lake lake"],
+            ["record 4", "column level", "error.column level: cells.similar Lake lake"],
         ),
         ("planes", "1,2,3", "1,,3", ["planes.csv", "record 2", "some of x, y, z are empty"]),
         ("planes", "0,0,1", "0,0,0", ["planes.csv", "record 2", "a vector with a positive length"]),
@@ -154,7 +159,12 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
             ["record 2", "column sd_y", "error.column sd_y: error.empty"],
         ),
         ("instruments", "tape,1", "tape,x", ["instruments.csv", "record 2", "column scale", "'x'"]),
-        ("covariances", "plane,roof", "plane,rof", ["covariances.csv", "record 2", "no plane 'rof'"]),
+        (
+            "covariances",
+            "plane,roof",
+            "plane,rof",
+            ["covariances.csv", "record 2", "error.unknown.close plane rof roof"],
+        ),
         (
             "covariances",
             "rotation x,rotation_x",
@@ -167,7 +177,12 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
             "k1,K9",
             ["record 6", "error.unknown.close parameter of the camera drone k9 k2"],
         ),
-        ("covariances", "camera,drone,k1,k2", "camera,phone,k1,k2", ["record 8", "no camera 'phone'"]),
+        (
+            "covariances",
+            "camera,drone,k1,k2",
+            "camera,phone,k1,k2",
+            ["record 8", "error.unknown.close camera phone"],
+        ),
         ("covariances", "k1,k2,-5e-9", "k1,k2,-5e-7", ["record 6", "symmetric and positive definite"]),
         ("height_differences", "0.002", "0", ["height_differences.csv", "record 2"]),
     ],

@@ -383,7 +383,7 @@ def test_a_round_trip_gives_the_same_adjustment(example, tmp_path):
             ["images.csv", "record 5", "error.column point: error.no-name"],
         ),
         ("images.csv", "DJI_0101,t03", "DJI_0101,NaN", ["record 5", "error.column point: error.no-name NaN"]),
-        ("images.csv", "DJI_0101,t03", "DJI_0101,T03", ["images.csv", "error.column point: table.similar"]),
+        ("images.csv", "DJI_0101,t03", "DJI_0101,T03", ["images.csv", "error.column point: cells.similar"]),
         ("images.csv", "DJI_0101,t03", "dji_0101,t03", ["record 5", "column photo"]),
         (
             "images.csv",
@@ -439,7 +439,7 @@ def test_a_fault_is_named_with_file_row_and_column(example, file, old, new, word
 def test_names_that_differ_by_blanks_inside_are_an_error(example):
     text = (example / "images.csv").read_text().replace("t01", "t 2").replace("t03", "t  2")
     (example / "images.csv").write_text(text)
-    with rejected("error.column point: table.similar t  2 t 2"):
+    with rejected("error.column point: cells.similar t  2 t 2"):
         formats.read(example)
 
 

@@ -97,11 +97,11 @@ def test_ranges_of_photos_come_back(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"length": 0.0}, "length of range P - A is not positive"),
-        ({"length": np.nan}, "not finite"),
+        ({"length": 0.0}, "length of range P - A: must be positive, got 0"),
+        ({"length": np.nan}, "length of range P - A: .*finite.* nan"),
         ({"sd": 0.0}, "sd of range"),
         ({"lever_arm": [0.0, np.inf, 0.0]}, "lever_arm of range"),
-        ({"instrument": "gun"}, "is no Instrument"),
+        ({"instrument": "gun"}, "instrument of range: .*Instrument.*'gun'"),
         ({"photo": "A", "point": ""}, "point|name|range"),
     ],
 )

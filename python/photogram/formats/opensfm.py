@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
@@ -234,7 +234,7 @@ def _tracks(
         try:
             xy.append((finite_number(cells[3]), finite_number(cells[4])))
         except ValueError as error:
-            raise Place(path, record, line).error(str(error)) from None
+            raise Place(path, record, line).error(message_of(error)) from None
         photos.append(photo)
         tracks.append(point)
     if left:

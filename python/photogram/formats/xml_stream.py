@@ -12,7 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
@@ -81,7 +81,7 @@ class Element:
         try:
             return finite_number(text)
         except ValueError as error:
-            raise self.error(str(error)) from None
+            raise self.error(message_of(error)) from None
 
     def number(self, name: str, default: float | None = None) -> float:
         """Return the number of a child."""
@@ -96,7 +96,7 @@ class Element:
         try:
             return whole_number(found.text.strip(), highest=2**53)
         except ValueError as error:
-            raise found.error(str(error)) from None
+            raise found.error(message_of(error)) from None
 
     def attribute(self, name: str, default: float | None = None) -> float:
         """Return an attribute as a number."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.places import at_place
 from photogram.io.records import Record, Source, parse_integer, parse_real
 from photogram.show.angles import ARCSEC
@@ -42,7 +42,7 @@ class Card(Record):
             raise self._error(first, last, error) from None
 
     def _error(self, first: int, last: int, error: ValueError) -> InputError:
-        return self.error(phrase("error.columns", first=first, last=last, message=str(error)))
+        return self.error(phrase("error.columns", first=first, last=last, message=message_of(error)))
 
     def reals(self, first: int, width: int, count: int, decimals: int = 8) -> list[float]:
         """Return consecutive fields of equal width."""
@@ -223,8 +223,9 @@ def _descriptors(card: Card) -> tuple[dict[int, int], float]:
         try:
             numbers = [int(word) for word in words[:13]]
             mean_error = float(words[13].upper().replace("D", "E")) if len(words) > 13 else 0.0
-        except ValueError as error:
-            raise card.error(phrase("error.at", what="options", message=str(error))) from None
+        except ValueError:
+            numbers_only = phrase("error.numbers", count=13, value=" ".join(words))
+            raise card.error(phrase("error.at", what="options", message=numbers_only)) from None
     else:
         widths = [1, 1, 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, 2]
         ends = np.cumsum(widths).tolist()

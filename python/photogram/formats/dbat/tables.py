@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.errors import message_of
 from photogram.formats.dbat.content import Content
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
@@ -55,7 +56,7 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
             try:
                 known[text] = whole_number(text, highest=2**53)
             except ValueError as error:
-                raise table.error(row, phrase("error.at", what=column, message=str(error))) from None
+                raise table.error(row, phrase("error.at", what=column, message=message_of(error))) from None
         found.append(known[text])
     return found
 
