@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
+from message_codes import as_check
 from nested_codes import raises
 from photogram import AdjustmentError, Block, Camera, InputError, RankError, adjust, predict
 from photogram.adjustment.undetermined import in_words
@@ -140,9 +141,10 @@ def test_principal_distances_are_perspective_cameras_that_are_held(small_block):
 
 
 def test_what_takes_no_lens_says_so(block, tmp_path):
-    with pytest.raises(InputError, match="checks: 24 mm lens has the model brown"):
+    camera = "error.value: block.unsupported.camera 24 mm lens brown"
+    with pytest.raises(InputError, check=as_check(f"error.at checks: {camera}")):
         Rays.of(block).directions()
-    with pytest.raises(InputError, match="GIANT files: 24 mm lens has the model brown"):
+    with pytest.raises(InputError, check=as_check(f"error.at GIANT files: {camera}")):
         Project.from_block(block)
 
 

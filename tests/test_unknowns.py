@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
+from message_codes import as_check
 from nested_codes import raises
 from photogram import (
     Attitudes,
@@ -230,7 +231,7 @@ def test_poses_on_frames_follow_from_these(scripts):
     np.testing.assert_allclose(again.unknowns[0].position, sensor.position, atol=1e-12)
     assert again.unknowns[0].sd.tolist() == [0.0] * 6
     assert len(again.block.unknowns) == 1
-    with pytest.raises(InputError, match="predict: the block has photos on frames"):
+    with pytest.raises(InputError, check=as_check("error.at predict: error.value: block.unsupported.mounts")):
         predict(block.replace(observations=()))
 
 
