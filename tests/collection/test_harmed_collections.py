@@ -11,7 +11,7 @@ import pytest
 import photogram
 from photogram import Message, _photocore, snoop
 from photogram.collection import Collection, adjust, simulate
-from photogram.collection.as_block import as_block
+from photogram.collection.snooping import as_block
 from photogram.results.network_sections import weakest_photos, weakest_points
 
 GIVEN = simulate(photos=8, points=60, coarseness=0.2, seed=4).collection
