@@ -366,11 +366,12 @@ _SCRIPT = """<?xml version="1.0" encoding="UTF-8"?>
 
 def _aicon() -> list[Files]:
     """Return the files of AICON that the tests of this format write."""
-    sys.path.insert(0, str(FORMAT_TESTS))
+    folders = [str(FORMAT_TESTS), str(FORMAT_TESTS.parent)]
+    sys.path[:0] = folders
     try:
         from test_aicon import block_of_tests, write_files
     finally:
-        sys.path.remove(str(FORMAT_TESTS))
+        del sys.path[: len(folders)]
     with TemporaryDirectory() as folder:
         write_files(block_of_tests(), Path(folder))
         return [{each.name: each.read_bytes() for each in Path(folder).iterdir()}]
