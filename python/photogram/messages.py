@@ -15,8 +15,7 @@ MOST_NAMES = 12  # Names that a message lists at most
 
 MANY = 2_000  # Names among which no nearest one is looked for
 
-MOST_CHARACTERS = 200
-"""Characters of a record that a message shows at most; the cards of all programs have fewer."""
+MOST_CHARACTERS = 200  # Characters of a record in a message
 
 
 def shortened(text: str, most: int = MOST_CHARACTERS) -> str:

@@ -43,8 +43,7 @@ Representation = Literal[
 ]
 Mounting = Literal["top forward", "top right", "top back", "top left"]
 
-_TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
-"""F: vision axes (x right, y down, z forward) from photo axes, and back."""
+_TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])  # F: vision axes from photo axes
 _ORTHONORMAL = 1e-6  # What the product of a matrix with its transpose may differ from the identity by
 _LEAST_LENGTH = 1e-100  # Of a quaternion: the square of a shorter one is not a number to divide by
 

@@ -10,8 +10,7 @@ from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, local_frames, photo_axes
 from photogram.network.motion import on_shared
 
-PARALLEL = 1e-8
-"""Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
+PARALLEL = 1e-8  # Determinant of the mean normal matrix of parallel rays
 
 
 SMALL_FRAME = 0.01  # The radius of a frame, as a part of the principal distance, at least

@@ -17,8 +17,7 @@ from photogram.words import phrase
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]
 
 
-MINUTES_PER_RADIAN = 3437.7468
-"""CONV of the program, too large by 8.5e-9 of itself; all its angles in minutes are meant by it."""
+MINUTES_PER_RADIAN = 3437.7468  # CONV of the program, too large by 8.5e-9
 
 
 def single(values: Floats) -> Floats:

@@ -34,8 +34,7 @@ CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos
 INSEPARABLE = 0.9999  # Largest R^2 of a parameter that is separable from the others
 FROM_PRIOR = 0.05  # With a lower redundancy number the weight determines the parameter, not the images
-FAR = 5.0
-"""A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
+FAR = 5.0  # Change of a weighted parameter that contradicts it (a priori sd)
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_pa
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
-LEVEL_OF_PATTERNS = 0.001
-"""Patterns are looked for in many ways: only what is very unlikely by chance is told."""
+LEVEL_OF_PATTERNS = 0.001  # Low, because several patterns are tested
 NOTABLE = 0.3  # Smallest mean residual that matters, in standard deviations
 CLIPPED = 3.0  # Limit of test values
 VISIBLE = 0.1  # Smallest redundancy number in the test of normality

@@ -20,8 +20,7 @@ from photogram.statistics.findings import Agreement, Tested
 from photogram.statistics.limits import global_test
 from photogram.words import Phrase
 
-SINGULAR = 1e-12
-"""Variance, in those of the components, below which a direction has none: known without error, and held."""
+SINGULAR = 1e-12  # Least relative variance of a direction
 BORDER = 2.0 / SINGULAR  # Exceeds T over the squares of scaled differences if C is regular
 
 

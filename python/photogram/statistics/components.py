@@ -34,13 +34,11 @@ __all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimat
 LEAST_REDUNDANCY = 5.0  # Smallest redundancy of a group with an estimated variance
 LEAST_SHARE = 0.01  # Smallest ratio of its redundancy and its number of observations
 REFUSED = 1.0  # Smallest redundancy for any estimate of a variance
-MOST_CONDITION = 100.0
-"""Of the Helmert matrix, scaled to unit diagonal: beyond it components cannot be told apart."""
+MOST_CONDITION = 100.0  # Of the Helmert matrix with unit diagonal
 LIMIT_OF_STEP = 10.0  # Largest ratio of factors in a step
 LOWER_BOUND = 0.01  # Smallest component, as a part of the given variance
 BY_HELMERT = 5  # Interval of Helmert steps, since Foerstner's converge linearly
-WORTH_CHANGING = (0.64, 1.56)
-"""Components within these limits (standard deviations wrong by less than 25 percent) change nothing."""
+WORTH_CHANGING = (0.64, 1.56)  # Other factors change standard deviations by 25 percent
 NODES = 4  # Nodes of the integral of the likelihood ratio
 
 

@@ -27,8 +27,7 @@ from photogram.arguments.arrays import probability
 from photogram.errors import InputError
 from photogram.words import phrase
 
-LEVEL = 0.05
-"""Probability of a false alarm of the global test, and of any single test among all of an adjustment."""
+LEVEL = 0.05  # Of the global test, and of all single tests together
 
 
 def critical_normal(level: float) -> float:

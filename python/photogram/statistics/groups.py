@@ -25,8 +25,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
-INVISIBLE = 1e-6
-"""Directions with less redundancy than this are not seen: eigenvalues of rank defects are below 1e-14."""
+INVISIBLE = 1e-6  # Eigenvalue: a direction with less redundancy is invisible
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,7 @@ ATTITUDE_ERROR, FIELD_ERROR = math.radians(1.5), 0.05
 _STEP = 1.3  # Ratio of consecutive fields of view; each covers half of the distance to the next
 _MAX_IMAGES = 200
 _TIMEOUT_MS = 5000
-_MAGNITUDES = (6.0, 9.0)
-"""Faintest stars of the data base for fields of 40 degrees and more, and of 5 and less."""
+_MAGNITUDES = (6.0, 9.0)  # Faintest stars for fields of 40 and of 5 degrees
 
 
 @dataclass(frozen=True, eq=False)

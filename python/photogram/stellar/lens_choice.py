@@ -23,8 +23,7 @@ from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase
 
 LEVEL = 0.01  # Probability that terms that are zero are kept
-NOTABLE = 0.2
-"""Least displacement by a term somewhere in the frame, in standard deviations of an image coordinate."""
+NOTABLE = 0.2  # Displacement by a term (sd of an image coordinate)
 _GRID = 9
 DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC
 

@@ -17,8 +17,7 @@ from photogram.arguments.types import Floats, Indices
 
 ACCEPTED = 1e-6  # Expected number of equally good chance matches below which an exposure is accepted
 DOUBTFUL = 1e-2  # Expected number up to which an exposure that is not accepted may show the stars
-LOG_ODDS = math.log(1e9)
-"""Logarithm of the odds of D. Lang et al. above which their form accepts an exposure."""
+LOG_ODDS = math.log(1e9)  # Odds of acceptance by D. Lang et al.
 CERTAIN = 0.95  # Probability of a star that an image requires before the camera is calibrated
 FALSE = 0.1  # share of images without a star, for single images
 _WRONG = 0.25  # the same in the odds of an exposure

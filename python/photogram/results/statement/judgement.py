@@ -24,8 +24,7 @@ from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
 NOT_USABLE = 4  # Exit code
-HEIGHT_KINDS = 10.0
-"""Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
+HEIGHT_KINDS = 10.0  # Mean difference of two kinds of heights (sd)
 NAMED = 10
 _CASES = {
     "missed": "missed",

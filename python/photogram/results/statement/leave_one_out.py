@@ -23,8 +23,7 @@ from photogram.results.statement.honest import LEVEL
 if TYPE_CHECKING:
     from photogram import Result
 
-PREDICTABLE = 0.01
-"""Eigenvalue of R_g below which the rest does not predict a direction: the point holds the datum along it."""
+PREDICTABLE = 0.01  # Least eigenvalue of R_g of a predictable direction
 
 
 @dataclass(frozen=True, eq=False)

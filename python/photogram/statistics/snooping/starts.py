@@ -27,8 +27,7 @@ from photogram.words import Phrase, phrase
 
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 MEDIAN_OF_TWO = 1.1774100225154747  # Median of the length of a vector of two of them
-OPTIMISTIC = 2.0
-"""Standard deviations that are too small by more than this are told from gross errors by the median."""
+OPTIMISTIC = 2.0  # Factor of standard deviations that the median shows
 ENOUGH = 20  # Smallest number of test values for a median
 
 
@@ -69,8 +68,7 @@ def robust_factor(values: Floats) -> float:
     return float(np.median(values)) / MEDIAN if values.size else 1.0
 
 
-MANY = 0.05
-"""Share of the images beyond `FAR` robust standard deviations from which on a robust start is needed."""
+MANY = 0.05  # Share of images beyond `FAR` that requires a robust start
 FAR = 5.0
 CANDIDATE = 4.4
 """Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
@@ -186,8 +184,7 @@ def _on_points_aside(
     return replace(choosing, tests=first).on_gone_points(points)
 
 
-BENT = 10.0
-"""Standard deviations; a median of all test values beyond it is of a bent network, or of absurd weights."""
+BENT = 10.0  # Median of test values of a distorted network (sd)
 
 
 def _runs_off(work: TakingOut) -> bool:
