@@ -326,4 +326,4 @@ def test_what_is_held_is_not_tested_in_parts():
     parts, whole = adjust_in_parts(wrong, Division(parts=2)), adjust(wrong)
     assert parts.verdict.code == whole.verdict.code == "model"
     names = [{each.name.split(":")[0] for each in result.verdict.tests} for result in (parts, whole)]
-    assert names[1] - names[0] >= {"held values"}
+    assert names[1] - names[0] >= {"fixed values"}

@@ -46,7 +46,8 @@ def test_a_datum_is_that_of_one_process(tmp_path):
     block = freed(photogram.simulate(strips=2, photos_per_strip=8, points_per_photo=40, seed=3).block)
     project = project_of(block, tmp_path / "free")
     said = called(project, "--parts", 2, "--out", tmp_path / "batches", code=1)
-    assert "nothing gives the block a datum" in " ".join(said.split())
+    assert f"{project / 'project.toml'}: " in said
+    assert "photogram.adjust_in_parts" in said
     # With its images in CSV it is read whole.
     pd.read_parquet(project / "images.parquet").to_csv(project / "images.csv", index=False)
     (project / "images.parquet").unlink()

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from test_parts import OPTIONS, tied_block
 
+from nested_codes import raises
 from photogram import Distance, InputError, Position
 from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.formats import Project, Wishes, read, to_files
@@ -110,8 +111,11 @@ def test_a_photo_that_is_not_there_is_named(project, tmp_path):
     table = pd.read_parquet(folder / "images.parquet")
     table.loc[7, "photo"] = "nowhere"
     table.to_parquet(folder / "images.parquet")
-    with pytest.raises(InputError, match=r"images\.parquet: there is no photo 'nowhere'"):
+    with raises(InputError, "error.unknown") as raised:
         Streamed(folder, Wishes(), tmp_path / "parts").counted(2)
+    assert raised.value.file.name == "images.parquet"
+    fields = raised.value.phrase.fields
+    assert (fields["kind"], fields["name"]) == ("photo", "nowhere")
 
 
 def test_features_are_refused(project, tmp_path):

@@ -10,7 +10,7 @@ from given_targets import rig_small
 from typer.testing import CliRunner
 
 from described import refusal
-from photogram import Camera, InputError, RankError, adjust, formats
+from photogram import Camera, RankError, adjust, formats
 from photogram.cli import app
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, read, simulate_corners
@@ -157,7 +157,7 @@ def test_an_offset_is_weighed_in_the_table_of_rigs(tmp_path):
     assert again.adjust().offsets["b"].sd[0] < 1e-5
     frames = pandas.DataFrame({"frame": ["a01"], "rig": ["rig"], "photo": ["b01"], "sensor": ["b"]})
     frames.to_csv(tmp_path / "frames.csv", index=False)
-    with pytest.raises(InputError, match="has a time_offset of b: its photos are on trajectories"):
+    with refusal("plain.frame-offset rig=rig sensor=b"):
         formats.read(tmp_path)
 
 
@@ -219,6 +219,8 @@ def test_what_is_known_of_an_offset_weighs_it(folder):
     assert abs(weighed.values[0] - LATE) < 2e-5
     with refusal("targets.no-offset-of camera=a names=['b']"):
         read(folder, **known, offsets={"a": (0.0, 0.0)})
+    with refusal("targets.no-offsets camera=b"):
+        read(folder, sd0=0.1, model="opencv4", offsets={"b": (0.0, 0.0)})
 
 
 def test_it_is_an_option_of_the_command(folder, tmp_path):
@@ -234,7 +236,7 @@ def test_it_is_an_option_of_the_command(folder, tmp_path):
     assert float(clock[-6]) == 1e-6
     assert "54 points held where given, which nothing tests" in " ".join(report.split())
     for words, said in (
-        (["--offset", "b=0"], "--sync offset makes them unknowns"),
+        (["--offset", "b=0"], "the camera b does not have an offset; --sync offset "),
         (["--sync", "offset", "--offset", "b=x"], "must be CAMERA=S or CAMERA=S,SD"),
         (["--sync", "offset", "--offset", "b=1,-1"], "must be CAMERA=S or CAMERA=S,SD"),
     ):

@@ -100,7 +100,7 @@ def test_table_with_levels_cameras_views_and_times(tmp_path):
     [
         (["image,point,x,y", "a,6,1,2"], 2, "error.column column=point message=targets.no-point point=6"),
         (["image,point,x,y", "a,0,1,"], 2, "y"),
-        (["image,point,x,y", "a,0,1,wide"], 2, "column y"),
+        (["image,point,x,y", "a,0,1,wide"], 2, "error.number value=wide"),
         (["image,point,x,y,sd", "a,0,1,2,0"], 2, "error.column column=sd message=error.positive value=0.0"),
         (["image,point,y", "a,0,1"], 1, "x"),
         (

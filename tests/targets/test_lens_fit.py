@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from described import refusal
-from photogram import Camera, InputError
+from photogram import Camera
 from photogram.targets.lens_fit import fitted, grid_of_pixels, is_perspective
 
 SIZE = (6016, 4016)
@@ -75,7 +75,7 @@ def test_what_sees_behind_is_known_from_what_does_not():
 
 
 def test_what_cannot_be_fitted_is_refused():
-    with pytest.raises(InputError, match="there is no lens"):
+    with refusal("error.unknown.close kind=lens model name=opencv9"):
         fitted(STEREOGRAPHIC, "opencv9", SIZE)
     with refusal("targets.no-held model=opencv_pinhole names=['k9'] known=['fx', 'fy',"):
         fitted(STEREOGRAPHIC, "opencv5", SIZE, held=["k9"])

@@ -98,7 +98,7 @@ def with_knot_sd(
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):
-            raise argument_error("knot_sd", "positive", value=knot_sd)
+            raise argument_error("knot_sd", "positive-numbers", count=2, value=knot_sd)
         if regularise is not None:
             raise InputError(phrase("error.exclusive", first="knot_sd", second="regularise"))
         if not any(each.model == KNOTTED for each in cameras):

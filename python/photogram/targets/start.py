@@ -170,8 +170,9 @@ class Start(Valued, Brief):
         places = {each.name: row for row, each in enumerate(self.cameras)}
         there = [name for name, row in places.items() if self.tied[row] and self.sync == "offset"]
         if strange := [name for name in known if name not in there]:
-            fields = {"camera": strange[0], "names": there or ["none"]}
-            raise InputError(phrase("targets.no-offset-of", **fields))
+            if not there:
+                raise InputError(phrase("targets.no-offsets", camera=strange[0]))
+            raise InputError(phrase("targets.no-offset-of", camera=strange[0], names=there))
         offsets, sd = np.array(self.offsets), np.array(self.sd_offsets)
         for name, own in known.items():
             offsets[places[name]], sd[places[name]] = own
