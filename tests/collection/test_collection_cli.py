@@ -67,7 +67,7 @@ def test_faults_of_the_input_are_named(run, tmp_path):
     (tmp_path / "problem.txt").write_text("2 1 2\n0 0 1 1\n2 0 1 1\n" + 21 * "0\n")
     done = run("collection", "problem.txt")
     assert done.exit_code == 1
-    assert "problem.txt, record 3: 2 is no photo" in done.output
+    assert "problem.txt, record 3: the number of a photo must be 0 to 1, got 2" in done.output
     assert run("collection").exit_code == 2
     assert run("collection", "--example", "--sd", "-1").exit_code == 1
     for words, said in (((), "requires --loss"), (("--snoop",), "cannot be combined with --scale")):

@@ -76,8 +76,8 @@ def test_what_has_no_covariance_is_refused(result):
     covariances = result.covariances()
     for selection, message in (
         (("step", 1), "a selection must be a pair of a kind"),
-        (("photo", 6), "there is no photo '6'"),
-        (("point", -1), "there is no point '-1'"),
+        (("photo", 6), "the photo '6' is unknown"),
+        (("point", -1), "the point '-1' is unknown"),
         (("point", 1.5), "names of the kind point"),
         (("point", True), "names of the kind point"),
     ):

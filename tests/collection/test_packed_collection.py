@@ -17,23 +17,21 @@ NUMBERS = 3 + 4 * 36455 + 9 * 21 + 3 * 11315
 
 @pytest.mark.parametrize("pack", [bytes, bz2.compress, gzip.compress], ids=["plain", "bzip2", "gzip"])
 @pytest.mark.parametrize(
-    ("filling", "message"),
-    [
-        (b"0 ", f"numbers beyond the {NUMBERS} numbers"),
-        (b"  ", "is far longer than the"),
-        (b"00", "no number"),
-    ],
+    ("filling", "code"),
+    [(b"0 ", "collection.beyond"), (b"  ", "collection.too-long"), (b"00", "file.long-number")],
 )
-def test_a_file_longer_than_its_first_line_says(tmp_path, pack, filling, message):
+def test_a_file_longer_than_its_first_line_says(tmp_path, pack, filling, code):
     path = tmp_path / "problem"
     path.write_bytes(pack(HEAD + filling * 6_000_000))
     tracemalloc.start()
     try:
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError) as error:
             read(path)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+    assert error.value.code == code
+    assert str(error.value.phrase.fields.get("content", NUMBERS)).startswith(str(NUMBERS))
     # The text has twelve million characters.
     assert peak < 8_000_000
 

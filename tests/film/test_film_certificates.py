@@ -153,7 +153,7 @@ def test_certificates_that_cannot_be_are_refused(tmp_path: Path) -> None:
     (tmp_path / "project.toml").write_text(
         '[project]\nformat = 1\n[units]\nimage = "mm"\n[film]\ncertificate = "none.toml"\n'
     )
-    with pytest.raises(InputError, match=r"there is no file 'none.toml'"):
+    with pytest.raises(InputError, match=r"the file 'none.toml' is unknown"):
         read(tmp_path)
 
 

@@ -97,7 +97,7 @@ def test_deviations_of_marks_may_be_said_beside_a_plain_project(folder: Path) ->
     observations = read(folder, wishes=wishes).block.observations
     found = {float(np.max(each.sd)) for each in observations if isinstance(each, Fiducial)}  # type: ignore[arg-type]
     assert found == {0.3}
-    with pytest.raises(InputError, match="which has no fiducial_images: --sd"):
+    with pytest.raises(InputError, match="--sd fiducial_images requires a plain project"):
         read(Path(str(ARCHIVE)).parent / "galveston", wishes=wishes)
     with pytest.raises(InputError, match="one of photos, images, points, fiducials, fiducial_images"):
         deviations(["fiducial=0.3"])

@@ -40,7 +40,7 @@ def test_tables_of_a_project_come_of_them(tmp_path: Path) -> None:
     tables = read_marks(written(own, tmp_path / "micmac")).tables("rc10")
     for name, columns in tables.items():
         (tmp_path / f"{name}.csv").write_bytes(csv_text(columns))
-    with pytest.raises(InputError, match=r"give sd, or \[sd\] fiducial_images"):
+    with pytest.raises(InputError, match=r"or as fiducial_images to \[sd\]"):
         project_again(tmp_path)
     tables["fiducial_images"]["sd"] = [0.2] * len(tables["fiducial_images"]["photo"])
     (tmp_path / "fiducial_images.csv").write_bytes(csv_text(tables["fiducial_images"]))
