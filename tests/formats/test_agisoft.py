@@ -67,11 +67,11 @@ def test_a_table_of_markers_is_control(tmp_path):
     ("old", "new", "words"),
     [
         ('type="frame"', 'type="rpc"', ["record 5", "format.unknown what=type of the sensor value=rpc"]),
-        ("<f>3612.5</f>", "<f>x</f>", ["record 13", "must be a number, got 'x'"]),
+        ("<f>3612.5</f>", "<f>x</f>", ["record 13", "error.number value=x"]),
         (
             "<p1>-0.00025</p1>",
             "<p1>-0.00025</p1><p3>1e999</p3>",
-            ["record 13", "must be a number, got '1e999'"],
+            ["record 13", "error.number value=1e999"],
         ),
         (
             'sensor_id="0" component_id="0" label="DJI_0001"',

@@ -125,7 +125,7 @@ def truth_digits(text, value):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("<Width>4000</Width>", "<Width>x</Width>", ["record 11", "must be an integer, got 'x'"]),
+        ("<Width>4000</Width>", "<Width>x</Width>", ["record 11", "error.whole value=x"]),
         ("XRightYDown", "XRightYSide", ["XRightYSide", "XRightYDown"]),
         (
             "<K1>-0.071</K1>",

@@ -14,7 +14,7 @@ FAULTS = [
     ("drone", "cameras.csv", "3000,2000", ",", ["record 2", "plain.picture-edges"]),
     ("drone", "cameras.csv", "0.02,inf", "0.02,-1", ["record 2", "sd of readout rows"]),
     ("drone", "photos.csv", "DJI_0,drone", "DJI_0,phone", ["record 2", "column camera"]),
-    ("drone", "velocities.csv", "DJI_0,", "DJI_9,", ["record 2", "no photo 'DJI_9'"]),
+    ("drone", "velocities.csv", "DJI_0,", "DJI_9,", ["record 2", "error.unknown.close photo DJI_9"]),
     ("drone", "velocities.csv", "DJI_0,", "DJI_0,x", ["record 2", "column vx"]),
     ("lines", "trajectories.csv", "polynomial", "polynom", ["record 2", "column position", "polynom"]),
     ("lines", "trajectories.csv", "hermite", "cubic", ["record 2", "column interpolation", "cubic"]),

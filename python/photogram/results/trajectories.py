@@ -25,11 +25,11 @@ from photogram.network.trajectories import Basis, Coefficient, Polynomial, Traje
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity, of_each
 from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
+    from photogram.show.quantity import Quantity
 
 __all__ = [
     "AdjustedTrajectory",
@@ -382,6 +382,8 @@ def notable_courses(result: Result) -> tuple[list[Course], str]:
 
 def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
     """Return trajectories, quantity by quantity."""
+    from photogram.show.quantity import Axis, Quantity, of_each  # an adjustment needs no tables
+
     axes = (Axis.of("position", linear_unit), Axis.turned("rotation"))
     of = np.array([("position", "rotation").index(each.what) for each in every], dtype=np.int64)
 
