@@ -10,7 +10,7 @@ import pytest
 
 import photogram
 from golden_data import golden
-from nested_codes import raises
+from message_codes import raises
 from photogram import Attitudes
 from photogram.network.attitudes import Representation
 

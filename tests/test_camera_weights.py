@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from nested_codes import raises
+from message_codes import raises
 from photogram import Camera, InputError, _photocore, adjust
 from photogram.network import rotation_matrix
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from message_codes import as_check
-from nested_codes import raises
+from message_codes import as_check, raises
 from photogram import AdjustmentError, Block, Camera, InputError, RankError, adjust, predict
 from photogram.adjustment.undetermined import in_words
 from photogram.giant import Project

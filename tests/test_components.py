@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     Block,
     InputError,

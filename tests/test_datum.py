@@ -12,7 +12,7 @@ import pytest
 from example_scripts import load
 from golden_data import golden
 from golden_network import free_network
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     AdjustmentError,
     Block,

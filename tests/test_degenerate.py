@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import degenerate as of
-from nested_codes import codes
+from message_codes import nested_codes
 from photogram import Camera, LeverArm, Position, RankError, adjust, formats, read_result
 from photogram.network import Drift, EqualHeight, OnPlumbLine, PlumbLine, Shift
 from photogram.words import Phrase
@@ -196,7 +196,7 @@ def test_free_networks_hold_what_is_open_and_say_it(make, count, expected):
     result = adjust(make())
     assert len(result.datum.held) == count
     (remark,) = [each for each in result.messages if each.code == "free.minimum"]
-    assert codes(remark.phrase.fields["levels"]) == expected
+    assert nested_codes(remark.phrase.fields["levels"]) == expected
 
 
 def with_errors(block, seed=0, start=2.0, tilt=0.002):

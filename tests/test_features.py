@@ -9,10 +9,10 @@ import pytest
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
+from message_codes import rejected
 from photogram import InnerConstraints, Spheroid, adjust, features, formats, read_result, simulate
 from photogram.results.features import named_points
 from photogram.results.fitting import with_features
-from rejections import rejected
 
 
 @pytest.fixture(scope="module")

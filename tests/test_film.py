@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from golden_data import DATA, golden
-from message_codes import coded
-from nested_codes import raises
+from message_codes import coded, raises
 from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
 from photogram.formats import Project, read

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import InputError
 from photogram.network import Lens, LineSensor
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import AdjustmentError, InputError, OutOfMemoryError, adjust, memory, simulate
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection

@@ -8,8 +8,7 @@ import pytest
 
 from example_scripts import load
 from golden_data import golden as golden_file
-from message_codes import as_check
-from nested_codes import raises
+from message_codes import as_check, raises
 from photogram import Block, Camera, InputError, Position, Spheroid, adjust
 from photogram.network import (
     Attitude,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from message_codes import raises
 from moving_blocks import rolling, scanned
-from nested_codes import raises
 from photogram import Camera, InputError, Position
 from photogram.network import (
     Attitude,

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from message_codes import coded, has_code
+from message_codes import coded, has_code, raises
 from moving_blocks import rolling, scanned
-from nested_codes import raises
 from photogram import (
     AdjustmentError,
     Block,

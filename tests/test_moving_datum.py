@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from message_codes import raises
 from moving_blocks import READOUT, exponential, heading, rolling
-from nested_codes import raises
 from photogram import (
     AdjustmentError,
     Block,

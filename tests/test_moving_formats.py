@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from message_codes import raises, refused
 from moving_blocks import rolling, scanned
-from nested_codes import raises
 from photogram import InputError, Spheroid, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
 from photogram.formats import FORMATS, cannot_hold, to_files
@@ -16,7 +16,6 @@ from photogram.formats.project import Repeated
 from photogram.formats.supplements import repeated_remarks
 from photogram.network import Polynomial, Table, Timed, Trajectory
 from photogram.network.block import of_images_alone
-from refusals import refused
 
 OTHERS = [name for name, each in FORMATS.items() if each.write is not None and name != "plain"]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from message_codes import raises
 from moving_blocks import rolling, scanned
-from nested_codes import raises
 from photogram import (
     AdjustmentError,
     Camera,

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, InputError, adjust, predict, simulate
 from photogram.collection import Collection
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from nested_codes import raises
+from message_codes import raises
 from photogram import Attitudes, Block, Distance, InputError, Position, Spheroid, adjust, predict, simulate
 from photogram.giant import Project
 from photogram.network import (

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nested_codes import raises
+from message_codes import raises
 from noise import measured
 from photogram import (
     AdjustmentError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import AdjustmentError, adjust, simulate
 
 BLOCK = simulate(strips=2, photos_per_strip=5, position_sd=30.0, attitude_sd=0.02).block

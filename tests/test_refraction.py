@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, network, simulate
 from photogram.giant import Common, Project, read_project, write_project
 from photogram.giant.assembly import job_refraction

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import binom, chi2
 
 import photogram.adjustment.resection
-from nested_codes import raises
+from message_codes import raises
 from photogram import AdjustmentError, InputError, RankError, Spheroid, resect
 from photogram.network import project, rotation_matrix
 

@@ -9,7 +9,8 @@ from photogram import InputError, Message
 from photogram.comparator import Place
 from photogram.io.numbers import finite_number, is_whole_number, whole_number
 from photogram.io.rows import LONGEST_RECORD, Table, cells, read_rows
-from photogram.messages import MOST_CHARACTERS, quoted
+from photogram.messages import MOST_CHARACTERS
+from photogram.words import quoted
 
 
 def written(tmp_path, text):

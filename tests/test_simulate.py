@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import photogram
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, Camera, InputError, Spheroid, network, simulate
 
 GALVESTON = (math.radians(-95.0), math.radians(29.7), 0.0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     Attitudes,
     Block,

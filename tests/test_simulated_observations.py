@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import Attitudes, InputError, Spheroid, adjust, simulate
 from photogram.network import with_distances, with_gnss, with_inertial, with_rig
 

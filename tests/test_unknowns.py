@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from message_codes import as_check
-from nested_codes import raises
+from message_codes import as_check, raises
 from photogram import (
     Attitudes,
     Distance,

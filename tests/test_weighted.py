@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, InputError, Result, Spheroid, adjust, predict, simulate
 from photogram.giant import Project, read_project
 from photogram.show.cells import written

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.words import Phrase, quoted
+from photogram.words import Phrase
 
-__all__ = ["Message", "Undetermined", "quoted"]
+__all__ = ["Message", "Undetermined"]
 
 MOST_NAMES = 12  # Names that a message lists at most
 
@@ -40,15 +40,6 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
 def printable(text: str) -> str:
     """Return a text with U+FFFD for each character that does not print: no terminal should get it."""
     return "".join(character if character.isprintable() else "\ufffd" for character in text)
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence that refuses a name: the known one that was meant, or all of them."""
-    import difflib  # a wrong name is rare
-
-    names = list(known)
-    close = difflib.get_close_matches(word, names, 1, 0.5)
-    return f"; did you mean {close[0]}?" if close else f", but {', '.join(names)}"
 
 
 def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:

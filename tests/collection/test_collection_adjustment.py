@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import AdjustmentError, InputError
 from photogram.collection import PARAMETERS, Collection, adjust, simulate, simulate_turntable
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import AdjustmentError
 from photogram.collection import adjust, simulate
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from described import refusal
+from message_codes import refusal
 from photogram import Camera, adjust, comparator, simulate
 
 DECK = Path(str(files("photogram") / "examples" / "comparator" / "comparator-3.txt"))

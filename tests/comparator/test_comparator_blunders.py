@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from plates import QUICK, case_2_session, noisy
 
-from described import described, refusal
+from message_codes import described, refusal
 from photogram import InputError
 from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv
 from photogram.comparator.combined_solution import CombinedPolynomial

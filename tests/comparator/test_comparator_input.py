@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from plates import PRINTED, QUICK, STRAIGHT, case_2, case_2_session, document, noisy, table
 
-from described import described, refusal
+from message_codes import described, refusal
 from photogram import InputError
 from photogram.comparator import (
     Grid,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from plates import PRINTED, QUICK, STRAIGHT, bent, case_2, case_2_session, noisy, printed_correction
 
-from described import described
+from message_codes import described
 from photogram import AdjustmentError, InputError
 from photogram.comparator import (
     Correction,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plates import QUICK, bent
 
-from described import refusal
+from message_codes import refusal
 from photogram import InputError
 from photogram.comparator import (
     Grid,

@@ -6,7 +6,7 @@ from test_parts import tied_block
 
 import photogram
 from example_scripts import load
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     AdjustmentError,
     AsPublished,

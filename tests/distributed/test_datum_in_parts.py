@@ -5,7 +5,7 @@ import pytest
 from test_blocks import agrees, freed
 
 import photogram
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     AdjustmentError,
     Camera,

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from test_parts import OPTIONS, tied_block
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import Distance, InputError, Position
 from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.formats import Project, Wishes, read, to_files

@@ -8,9 +8,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from golden_data import shared
+from message_codes import rejected
 from photogram import InputError
 from photogram.io.pvl import Group, Quantity, label_text, parsed
-from rejections import rejected
 
 FILE = Path("some.lbl")
 

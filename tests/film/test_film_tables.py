@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from message_codes import refused
 from photogram import InputError, adjust
 from photogram.formats import Project, read, to_files
 from photogram.formats.adjusted import adjusted
 from photogram.network import Fiducial, KnownFilm
-from refusals import refused
 from test_film import project
 
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from message_codes import refused
 from photogram import InputError
 from photogram.formats import Project, Wishes, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
 from photogram.network import Fiducial
-from refusals import refused
 from test_film import project, project_again
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_codes import raises
+from message_codes import raises
 from photogram import InputError, _photocore, adjust
 from photogram.film import interior_orientation
 from photogram.formats import Project, Wishes, read, to_files

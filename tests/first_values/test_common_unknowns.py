@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, InputError, Spheroid, adjust, simulate
 from photogram.adjustment.first_features import started
 from photogram.network import (

@@ -7,7 +7,7 @@ import pytest
 import photogram
 from example_scripts import load
 from golden_data import shared
-from nested_codes import raises
+from message_codes import raises
 from photogram import (
     AdjustmentError,
     Block,

@@ -7,10 +7,10 @@ from damaged import check_damaged
 from test_opensfm import only
 from test_plain_project import EXAMPLE, written
 
+from message_codes import fields_of, refused
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import Frame, supplements
 from photogram.formats.self_check import agreement
-from refusals import fields_of, refused
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from damaged import check_damaged
 
+from message_codes import fields_of, refused
 from photogram import Camera, Distance, InnerConstraints, adjust, formats, simulate
-from refusals import fields_of, refused
 
 VALUES = {"c": -28.785, "xp": 0.017, "yp": 0.057, "A1": -1.1e-4, "A2": 1.5e-7, "A3": 1e-10}
 VALUES |= {"B1": 5.8e-6, "B2": -8.6e-6, "C1": -7e-5, "C2": -3e-5, "r0": 13.488}

@@ -8,10 +8,10 @@ from block import check_adjustment, check_poses, same_blocks, sample, truth, wit
 from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
+from message_codes import refused
 from photogram import Attitudes, adjust, formats
 from photogram.formats.self_check import agreement
 from photogram.words import option_sd
-from refusals import refused
 
 FILES = ("matrix_pixels_ydown_v2.1.xml", "angles_millimetres_yup_v3.2.xml")
 

@@ -6,11 +6,10 @@ from block import check_poses, same_blocks, sample, truth
 from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
-from message_codes import has_code
+from message_codes import has_code, refused
 from photogram import InputError, adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.self_check import agreement
-from refusals import refused
 
 GALVESTON = EXAMPLE.parent / "galveston"
 

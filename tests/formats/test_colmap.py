@@ -18,10 +18,10 @@ from block import (
 from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
+from message_codes import refused
 from photogram import Attitudes, Camera, InnerConstraints, adjust, formats
 from photogram.formats.colmap.content import MODELS
 from photogram.formats.self_check import agreement
-from refusals import refused
 
 
 @pytest.mark.parametrize("dress", ["text", "text_legacy", "binary"])

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from message_codes import rejected
 from photogram import InputError, formats
 from photogram.formats.column_words import column_of, role_of, units_of
 from photogram.formats.columns import columns_given, degrees
 from photogram.formats.supplements import with_control
 from photogram.io.numbers import marks_of
-from rejections import rejected
 
 LISTS = Path(__file__).parents[1] / "data" / "control_lists"
 CHECKS = {"102", "103", "105"}

@@ -22,11 +22,11 @@ from control_networks import (
 )
 
 from golden_data import SHARED, needs
+from message_codes import refused
 from photogram import InputError
 from photogram.formats.isis import binary_network, network_text, read_network
 from photogram.formats.isis.reading import is_network
 from photogram.io.pvl import Group
-from refusals import refused
 
 NETWORKS = SHARED / "moving" / "control_network"
 PUBLISHED = (

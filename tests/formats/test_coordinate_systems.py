@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from test_plain_project import EXAMPLE, change, written
 
+from message_codes import refused
 from photogram import InputError, adjust, formats
 from photogram.formats import Frame
 from photogram.formats.supplements import with_control
 from photogram.io.delimited import read_columns
 from photogram.words import Phrase
-from refusals import refused
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")

@@ -8,6 +8,7 @@ import pytest
 
 from ephemeris_seconds import added_to_ephemeris_seconds
 from golden_data import SHARED, needs
+from message_codes import refused
 from photogram import Block, adjust
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
@@ -15,7 +16,6 @@ from photogram.formats.csm.isd import Positions
 from photogram.formats.csm.photos import trajectory_of, with_polynomial_pointing
 from photogram.io.pvl import parsed
 from photogram.network import Table, Trajectory
-from refusals import refused
 
 MOVING = SHARED / "moving"
 OURS = np.diag([1.0, -1.0, -1.0])

@@ -18,11 +18,11 @@ from control_networks import (
     varint,
 )
 
+from message_codes import refused
 from photogram import InputError
 from photogram.formats.isis import binary_network, network_text
 from photogram.formats.isis.network import ControlMeasures, ControlPoints
 from photogram.io.pvl import Group
-from refusals import refused
 
 
 @pytest.mark.parametrize(

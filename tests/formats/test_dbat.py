@@ -8,10 +8,10 @@ import pytest
 from block import sample, truth
 from damaged import check_damaged
 
+from message_codes import fields_of, refused
 from photogram import Attitudes, formats
 from photogram.formats import Wishes
 from photogram.formats.self_check import agreement
-from refusals import fields_of, refused
 from test_roma import read as read_roma
 
 

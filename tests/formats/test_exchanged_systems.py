@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from message_codes import refused
 from photogram import InputError, Position, formats
 from photogram.formats import Frame
 from photogram.formats.columns import columns_given
 from photogram.formats.supplements import with_control
-from refusals import refused
 
 LISTS = Path(__file__).parents[1] / "data" / "control_lists"
 ORIGIN = (48.8666, 8.4711, 430.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from formats.photographs import EXAMPLE, block_with_pictures, picture
+from message_codes import refused
 from photogram import InputError, LeverArm, Message, Position, Spheroid, adjust, formats
 from photogram.formats import GnssFile, PhotoFiles, Wishes, read_metadata
 from photogram.network import geographic_to_geocentric, local_frames
-from refusals import refused
 
 SD = (0.012, 0.011, 0.025)
 ANTENNA = (0.05, 0.08, 0.12)

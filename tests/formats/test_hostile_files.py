@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import photogram
+from message_codes import refused
 from photogram import InputError, formats
 from photogram.cli.options import default_out
 from photogram.formats import crs
@@ -17,7 +18,6 @@ from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
 from photogram.network.similarity import similarity
-from refusals import refused
 
 EXAMPLE = Path(formats.__path__[0]).with_name("examples") / "project"
 

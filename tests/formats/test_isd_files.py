@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from support_data import RADIUS, START, along_minus_z, document, unmirrored, written
 
-from message_codes import coded, has_code
+from message_codes import coded, has_code, rejected
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.network import Polynomial, projected
-from rejections import rejected
 
 PLACES = np.array([[10.0, 20.0], [150.0, 200.5], [290.0, 399.0], [0.5, 0.5]])
 """Samples and lines."""

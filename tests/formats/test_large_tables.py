@@ -7,10 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from message_codes import rejected
 from photogram import _photocore, formats
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
-from rejections import rejected
 
 ROWS = 60_000
 

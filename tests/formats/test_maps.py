@@ -13,12 +13,12 @@ import pytest
 from test_plain_project import EXAMPLE, change
 from test_results_in_a_system import FRAME, UTM
 
+from message_codes import refused
 from photogram import InputError, Spheroid, adjust, formats, read_result, simulate
 from photogram.formats import placed
 from photogram.formats.maps import map_layers, point_cloud
 from photogram.formats.maps.files import LAYERS, style
 from photogram.formats.maps.layers import chosen_crs
-from refusals import refused
 
 geopandas = pytest.importorskip("geopandas", reason="geopandas is not installed")
 pyogrio = pytest.importorskip("pyogrio", reason="pyogrio is not installed")

@@ -9,6 +9,7 @@ import pytest
 
 from formats.photographs import DJI, dji, packet, picture, tags
 from golden_data import DATA
+from message_codes import refused
 from photogram import InputError
 from photogram.comparator import Place
 from photogram.formats import read_metadata
@@ -22,7 +23,6 @@ from photogram.formats.metadata.record import (
     read_exposures,
 )
 from photogram.formats.metadata.reference import is_reference, read_geo_txt, read_reference
-from refusals import refused
 
 SAMPLES = DATA / "statement" / "metadata"
 PIX4D = "http://pix4d.com/camera/1.0"

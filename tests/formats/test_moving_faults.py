@@ -5,8 +5,8 @@ from damaged import check_damaged
 from moving import edited
 from test_plain_project import change
 
+from message_codes import check_words, rejected
 from photogram import InputError, formats
-from rejections import check_words, rejected
 
 FAULTS = [
     ("drone", "cameras.csv", "inf,down", "inf,sideways", ["record 2", "readout_direction", "sideways"]),

@@ -13,13 +13,13 @@ from moving import edited, project_of, rolling, same, two_lines
 from test_plain_project import change, written
 
 import test_moving
+from message_codes import rejected
 from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.block_contents import motions
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
 from photogram.network.motion import about
-from rejections import rejected
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 

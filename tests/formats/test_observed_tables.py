@@ -6,9 +6,9 @@ from damaged import check_damaged
 from test_plain_project import EXAMPLE, change, written
 
 from fuzz.networks import KINDS, random_network
+from message_codes import check_words, rejected
 from photogram import InputError, adjust, formats
 from photogram.network import Level, OnLevel, OnPlane, Plane, Relative
-from rejections import check_words, rejected
 
 NETWORKS = (0, 1, 2, 4, 5, 8, 9, 11, 14, 17, 29, 32, 33, 40, 7, 18, 22)
 """With every kind of observation; the last three lie in geographic space."""

@@ -19,12 +19,11 @@ from block import (
 from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
-from nested_codes import raises
+from message_codes import fields_of, raises, refused
 from photogram import InputError, Position, adjust, formats
 from photogram.formats import supplements
 from photogram.formats.names import with_names
 from photogram.formats.self_check import agreement
-from refusals import fields_of, refused
 
 
 def only(place, tracks="tracks.csv"):

@@ -11,6 +11,7 @@ import pytest
 from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
 from damaged import check_damaged
 
+from message_codes import rejected, traced
 from photogram import (
     Attitudes,
     Camera,
@@ -31,7 +32,6 @@ from photogram.io.delimited import read_columns
 from photogram.io.units import scaled
 from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
 from photogram.words import option_sd
-from rejections import rejected, traced
 
 ANGLES = ("omega", "phi", "kappa")
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"

@@ -8,10 +8,10 @@ from block import sample, truth
 from damaged import check_damaged
 from test_plain_project import written
 
+from message_codes import refused
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import Wishes, supplements
 from photogram.network.directions import image_directions
-from refusals import refused
 
 FOCAL = {"A": 8.67, "B": 9.315}
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from test_plain_project import EXAMPLE, change
 
+from message_codes import refused
 from photogram import Attitudes, Spheroid, adjust, formats, simulate
 from photogram.formats import Frame
 from photogram.formats.planes import bend, plane_remarks
 from photogram.giant import Project, write_project
-from refusals import refused
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")

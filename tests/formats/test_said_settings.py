@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from message_codes import rejected
 from photogram import InputError
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.plain.settings import read_settings
-from rejections import rejected
 
 TABLES = {
     "project.toml": '[project]\nformat = 1\n[adjust]\nloss = "cauchy"\n',

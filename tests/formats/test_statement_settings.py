@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from golden_data import DATA, golden
+from message_codes import check_message, rejected
 from photogram import InputError, adjust, formats
 from photogram.formats.names import with_names
 from photogram.formats.plain.statement_settings import read_sentences
 from photogram.formats.supplements import with_control
 from photogram.results.statement.request import Asked
-from rejections import check_message, rejected
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"

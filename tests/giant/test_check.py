@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from nested_codes import codes
+from message_codes import nested_codes
 from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
 from photogram.diagnosis.orientation import MIRRORS
@@ -115,7 +115,7 @@ def test_section_13_the_sign_of_the_principal_distance(space):
     outcome = checked(block.replace(principal_distances=-block.principal_distances))
     (sign,) = found(outcome, "sign-of-principal-distance")
     assert sign.level == "grave"
-    assert "group.all-photos" in codes(sign)
+    assert "group.all-photos" in nested_codes(sign)
     assert sign.photos == block.photo_ids
     above = found(outcome, "control-above-camera")
     control = np.isfinite(block.point_sd).any(axis=1)
@@ -162,7 +162,7 @@ def test_section_13_the_kappa_of_all_photos(block):
     outcome = checked(changed(block, "photo_attitudes", slice(None), 2, np.pi / 2))
     (kappa,) = found(outcome, "kappa")
     assert kappa.photos == block.photo_ids
-    assert codes(kappa) == ["check.kappa.group", "group.all-photos"]
+    assert nested_codes(kappa) == ["check.kappa.group", "group.all-photos"]
     assert kappa.phrase.fields["turn"] == -90
 
 
@@ -234,7 +234,7 @@ def test_a_mirrored_photo_is_named_once(mirror, seed):
     outcome = checked(block.replace(image_xy=xy))
     (mirrored,) = outcome.grave
     assert (mirrored.kind, mirrored.photos) == ("mirrored", [block.photo_ids[photo]])
-    assert f"mirror.{mirror}" in codes(mirrored)
+    assert f"mirror.{mirror}" in nested_codes(mirrored)
     assert outcome.result.converged
 
 
@@ -248,7 +248,7 @@ def test_mirrored_plates_of_all_photos_are_named_once(axis, strips):
     outcome = checked(block.replace(image_xy=xy))
     (mirrored,) = outcome.grave
     assert (mirrored.kind, mirrored.photos) == ("mirrored", block.photo_ids)
-    assert f"mirror.{('mirrored', 'y down')[axis]}" in codes(mirrored)
+    assert f"mirror.{('mirrored', 'y down')[axis]}" in nested_codes(mirrored)
     assert outcome.result.converged
 
 
@@ -288,7 +288,7 @@ def test_section_13_with_two_rays_both_images_are_named(block):
     outcome = checked(changed(block, "image_xy", row, 1, 0.3))
     (blunder,) = outcome.grave
     assert set(blunder.photos) == {block.photo_ids[photo] for photo in others}
-    assert "check.rival.two-rays" in codes(blunder)
+    assert "check.rival.two-rays" in nested_codes(blunder)
 
 
 @pytest.mark.giant("13", "6 residual reading: 3-sigma, patterns, heights of two-ray points")
@@ -313,7 +313,7 @@ def test_section_13_a_wrong_control_coordinate(block, axes, remedy):
     outcome = checked(changed(block, "point_positions", point, axes, 20.0))
     (misfit,) = outcome.grave
     assert (misfit.kind, misfit.points) == ("control-misfit", [block.point_ids[point]])
-    assert {f"check.remedy.{remedy}", "check.remedy.type"} < {*codes(misfit)}
+    assert {f"check.remedy.{remedy}", "check.remedy.type"} < {*nested_codes(misfit)}
     assert misfit.phrase.fields["components"][0].fields["error"] == pytest.approx(20, abs=4)
 
 
@@ -341,7 +341,7 @@ def test_section_13_a_gross_error_of_control_is_given_in_full_and_spoils_nothing
     outcome = checked(changed(block, "point_positions", point, 1, 3000.0))
     (misfit,) = found(outcome, "control-misfit")
     assert misfit.points == [block.point_ids[point]]
-    assert "check.remedy.plan" in codes(misfit)
+    assert "check.remedy.plan" in nested_codes(misfit)
     assert misfit.phrase.fields["components"][0].fields["error"] == pytest.approx(3000, abs=2)
     # X and Z of the point agree with their predictions and are held again.
     row = outcome.result.block.point_ids.index(misfit.points[0])

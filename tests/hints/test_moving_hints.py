@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import test_moving
+from message_codes import nested_codes
 from moving_blocks import (
     HEIGHT,
     LINE,
@@ -18,7 +19,6 @@ from moving_blocks import (
     rolling,
     scanned,
 )
-from nested_codes import codes
 from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
@@ -115,14 +115,14 @@ def test_readouts_in_a_wrong_direction(readout, mistake):
     changes, cause = MISTAKES[mistake]
     result = adjust(shuttered(rolling(readout=READOUTS[readout]), **changes))
     hint = diagnosed(result).messages[0]
-    assert codes(hint)[:2] == ["mistake.likely", f"mistake.shutter.{cause}"]
+    assert nested_codes(hint)[:2] == ["mistake.likely", f"mistake.shutter.{cause}"]
 
 
 @pytest.mark.parametrize("readout", [30.0, Readout("drone", 30.0, sd=3.0), Readout("drone", 30.0)])
 def test_readout_times_in_milliseconds(readout):
     result = adjust(rolling(readout=readout))
     hint = diagnosed(result).messages[0]
-    assert "mistake.shutter.milliseconds" in codes(hint)
+    assert "mistake.shutter.milliseconds" in nested_codes(hint)
 
 
 def test_a_readout_time_that_comes_out_negative():
@@ -171,7 +171,7 @@ TABLES = {
 @pytest.mark.parametrize("cause", TABLES)
 def test_tables_of_trajectories(cause, photos):
     (hint,) = flown_hints(on_tables(scanned(photos=photos), TABLES[cause]))
-    assert f"mistake.table.{cause}" in codes(hint)
+    assert f"mistake.table.{cause}" in nested_codes(hint)
 
 
 def at_other_times(block, seconds):
@@ -257,9 +257,9 @@ COUNTED = {
 def test_scans_that_are_turned(cause):
     (hint,) = flown_hints(scanned_lines(scanned(), COUNTED[cause]))
     # Of sensors along x the sign of the principal distance does the same.
-    assert f"mistake.scanner.{cause}" in codes(hint)
+    assert f"mistake.scanner.{cause}" in nested_codes(hint)
     assert (
-        ("mistake.sign of c" in codes(hint))
+        ("mistake.sign of c" in nested_codes(hint))
         == (hint.code == "convention.one-of")
         == (cause == "mirrored samples")
     )
@@ -309,7 +309,7 @@ def test_the_check_names_what_is_wrong_with_a_scan():
     turned = scanned_lines(scanned(), COUNTED["reversed"])
     found = diagnose(turned)
     assert found.grave[0].kind in ("convention", "not-converged")
-    assert any("mistake.scanner.reversed" in codes(each) for each in found.grave)
+    assert any("mistake.scanner.reversed" in nested_codes(each) for each in found.grave)
 
 
 # Good blocks

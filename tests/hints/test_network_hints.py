@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from message_codes import as_check
-from nested_codes import codes
+from message_codes import as_check, nested_codes
 from photogram import Camera, Distance, InputError, RankError, Spheroid, adjust, diagnose, simulate
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints, verdicts
@@ -100,7 +99,7 @@ def test_mistakes_are_named(network, mistake):
 def test_readings_of_angles_in_convergent_photos(mistake, cause):
     block = mistakes.mistakes(mistakes.golden_block("selfcal"), mistakes.HALF["selfcal"])[mistake]
     (hint,) = hints(block)
-    assert f"mistake.{cause}" in codes(hint)
+    assert f"mistake.{cause}" in nested_codes(hint)
 
 
 def test_small_angles_hide_what_they_mean():
@@ -181,7 +180,7 @@ def test_a_single_photo():
     xy = block.image_xy.copy()
     xy[block.image_photos == 4] *= [-1, 1]
     (hint,) = hints(block.replace(image_xy=xy))
-    assert "mistake.mirrored" in codes(hint)
+    assert "mistake.mirrored" in nested_codes(hint)
     assert hint.phrase.fields["photos"].fields["photos"] == [block.photo_ids[4]]
 
 
@@ -229,7 +228,7 @@ def test_standard_deviations_that_are_wrong():
     assert good.findings == []
     assert good.verdict.code == "accepted"
     (small,) = weights_of(right.replace(image_sd=right.image_sd / 3))
-    assert codes(small) == ["weighting.small", "weighting.images"]
+    assert nested_codes(small) == ["weighting.small", "weighting.images"]
     assert small.fields["factor"] == pytest.approx(3, rel=0.1)
     (large,) = weights_of(right.replace(image_sd=right.image_sd * 4))
     assert large.code == "weighting.large"
@@ -239,14 +238,14 @@ def test_standard_deviations_that_are_wrong():
     wrong = explained(right.replace(image_xy=xy))
     assert [finding.kind for finding in wrong.grave] == [wrong.verdict.code] == ["gross-errors"]
     told = explained(right.replace(image_sd=right.image_sd / 8)).result.messages
-    assert codes(told[0]) == ["weighting.small", "weighting.images"]
+    assert nested_codes(told[0]) == ["weighting.small", "weighting.images"]
 
 
 def test_longitude_and_latitude():
     block = simulate(strips=2, photos_per_strip=4, spheroid=Spheroid.wgs84(), seed=1).block
     free = {"photo_position_sd": np.inf, "photo_positions_observed": None}
     exchanged = block.replace(photo_positions=block.photo_positions[:, [1, 0, 2]], **free)
-    assert any("mistake.exchanged-axes" in codes(hint) for hint in hints(exchanged))
+    assert any("mistake.exchanged-axes" in nested_codes(hint) for hint in hints(exchanged))
 
 
 def test_scale_bars_in_millimetres():
@@ -270,8 +269,8 @@ def test_adjustments_that_fail_are_explained_when_asked():
     down = block.replace(image_xy=block.image_xy * [1, -1])
     found = explained(down)
     assert not found.result.converged
-    assert "mistake.y down" in codes(found.result.messages[0])
-    assert "mistake.y down" in codes(found.grave[0])
+    assert "mistake.y down" in nested_codes(found.result.messages[0])
+    assert "mistake.y down" in nested_codes(found.grave[0])
     sign = block.replace(principal_distances=-block.principal_distances)
     with pytest.raises(RankError) as raised:
         adjust(sign)
@@ -314,7 +313,7 @@ def test_the_check_of_a_project_tells_them():
     block = aerial(10)
     feet = block.replace(photo_positions=block.photo_positions / 0.3048)
     (found,) = [each for each in diagnose(Project.from_block(feet)).findings if each.kind == "convention"]
-    assert "mistake.feet.photos" in codes(found)
+    assert "mistake.feet.photos" in nested_codes(found)
 
 
 def test_the_example(capsys):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fuzz.networks import random_network
+from message_codes import refused
 from photogram import (
     Camera,
     Distance,
@@ -29,7 +30,6 @@ from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
 from photogram.results.cameras import AdjustedCamera
-from refusals import refused
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 

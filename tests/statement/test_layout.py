@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from nested_codes import codes as nested_codes
+from message_codes import nested_codes
 from photogram import InputError
 from photogram.network.hull import area, hull, outside
 from photogram.results.statement.layout import area_in_plan, layout

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import photogram
-from nested_codes import codes as nested_codes
+from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import asprs, standards
 from photogram.results.statement.asprs import accuracy, three_d, verdict

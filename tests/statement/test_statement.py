@@ -10,7 +10,7 @@ import pytest
 from golden_statement import BLOCK, compare, golden
 
 import photogram
-from nested_codes import codes as nested_codes
+from message_codes import nested_codes
 from photogram.formats import read
 from photogram.results.statement.comparison import compared
 from photogram.results.statement.honest import bias, prediction

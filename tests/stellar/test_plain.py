@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from message_codes import as_check, coded
+from message_codes import as_check, coded, rejected
 from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import ARCSEC, INDEX, Options, read_plain
 from photogram.stellar.plain import inputs
-from rejections import rejected
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))

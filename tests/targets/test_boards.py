@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from described import refusal
+from message_codes import refusal
 from photogram.targets import Board
 from photogram.targets.board_files import is_board, read_board
 

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from given_targets import left_table, rig_small
 
-from described import described, refusal
 from golden_data import shared
+from message_codes import described, refusal, refused
 from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.targets import read
-from refusals import refused
 
 
 def again(project, folder):

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from golden_boards import left, rig
 
-from described import refusal
+from message_codes import refusal
 from photogram import InputError
 from photogram.targets import Calibration, camera_files, first_values, projection_uncertainty, uncertainty_map
 from photogram.targets.mrcal_model import read_model

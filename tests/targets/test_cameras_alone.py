@@ -8,13 +8,13 @@ import pytest
 from given_targets import rig_small
 from typer.testing import CliRunner
 
+from message_codes import refused
 from photogram import Camera, InputError, formats
 from photogram.cli import app
 from photogram.formats.registry import FORMATS_OF_CAMERAS
 from photogram.formats.targets.calibrations import adjusted_project, rig_of_project
 from photogram.targets import camera_files
 from photogram.targets.output.formats import CAMERA_FORMATS
-from refusals import refused
 
 PROJECT = Path(str(files("photogram.examples") / "project"))
 

@@ -9,7 +9,7 @@ import pytest
 from given_targets import rig_small
 from typer.testing import CliRunner
 
-from described import refusal
+from message_codes import refusal
 from photogram import Camera, RankError, adjust, formats
 from photogram.cli import app
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from described import refusal
 from golden_data import shared
+from message_codes import refusal
 from photogram import Camera
 from photogram.targets import convert_lens
 from photogram.targets.mrcal_model import read_model

@@ -7,8 +7,8 @@ import pytest
 from given_targets import rig_small
 from typer.testing import CliRunner
 
-from described import refusal
 from golden_data import shared
+from message_codes import refusal
 from photogram import InputError
 from photogram.cli import app
 from photogram.targets import corner_components, read, simulate_corners

@@ -7,8 +7,8 @@ import pytest
 from given_targets import rig_small
 from seen_boards import seen
 
-from described import described, refusal
 from golden_data import shared
+from message_codes import described, refusal
 from photogram import Camera, InputError
 from photogram.targets import Board, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files

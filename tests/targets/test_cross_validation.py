@@ -5,7 +5,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
-from described import refusal
+from message_codes import refusal
 from photogram.targets import cross_validate
 from photogram.targets.cross_validation import changes_between, cross_map, parts_agree, splits
 

@@ -16,7 +16,7 @@ from photographed_boards import (
 )
 from typer.testing import CliRunner
 
-from described import described, refusal
+from message_codes import described, refusal
 from photogram import Camera
 from photogram.cli.commands import application
 from photogram.targets import Board, read

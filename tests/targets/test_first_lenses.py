@@ -5,7 +5,7 @@ import pytest
 from relisted import relisted
 from seen_boards import seen
 
-from described import described, refusal
+from message_codes import described, refusal
 from photogram import Camera
 from photogram.targets import Board, Calibration, first_values
 from photogram.targets import first_calibration as first_module

@@ -5,7 +5,7 @@ import pytest
 from golden_boards import packaged, rig
 from relisted import relisted
 
-from described import described, refusal
+from message_codes import described, refusal
 from photogram.targets import Board, first_values
 from photogram.targets.sightings import CORNER_ORDERS, Listings
 

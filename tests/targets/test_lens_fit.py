@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from described import refusal
+from message_codes import refusal
 from photogram import Camera
 from photogram.targets.lens_fit import fitted, grid_of_pixels, is_perspective
 

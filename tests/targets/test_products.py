@@ -9,8 +9,8 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
-from described import refusal
 from golden_data import shared
+from message_codes import refusal
 from photogram import Camera, variance_components
 from photogram.targets import (
     difference,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from golden_data import golden as golden_file
-from nested_codes import raises
+from message_codes import raises
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.network import Bend, Figure, rotation_angles, rotation_matrix

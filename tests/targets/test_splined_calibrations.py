@@ -8,8 +8,8 @@ import pytest
 from given_targets import golden
 from test_splined_adjustment import lens
 
-from described import refusal
 from golden_data import shared
+from message_codes import refusal
 from photogram import formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from described import refusal
+from message_codes import refusal
 from photogram.cli import app
 from photogram.targets import (
     Board,

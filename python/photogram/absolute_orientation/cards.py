@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
@@ -135,7 +135,7 @@ def _stations(
         if words[6] in ids:
             raise record.error(phrase("orientation.repeated", station=words[6]))
         ids[words[6]] = None
-    try:
+    with at_place(Place(path)):
         return Stations(
             ids,
             np.array(control).reshape(-1, 3),
@@ -143,8 +143,6 @@ def _stations(
             ground_unit=ground_unit,
             model_unit=model_unit,
         )
-    except InputError as error:
-        raise InputError(error.phrase or error.message, file=path) from None
 
 
 def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Similarity | None:
@@ -212,7 +210,5 @@ def read_transformation(path: Path) -> Similarity:
         *(records[0].number_of(word, "direction cosine") for word in first[:6]),
         *(records[1].number_of(word, "parameter") for word in second[:7]),
     ]
-    try:
+    with at_place(Place(path)):
         return Similarity.from_parameters(values[9], np.reshape(values[:9], (3, 3)), values[10:])
-    except InputError as error:
-        raise InputError(error.phrase or error.message, file=path) from None

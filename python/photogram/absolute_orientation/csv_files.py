@@ -14,7 +14,7 @@ from photogram.absolute_orientation.stations import (
 )
 from photogram.errors import InputError
 from photogram.io.files import read_lines
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.io.rows import Row, Table, cells
 from photogram.words import phrase
 
@@ -79,7 +79,7 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
     control, model = numbers(CONTROL_COLUMNS, math.nan), numbers(MODEL_COLUMNS, None)
     control_sd = numbers(CONTROL_SD_COLUMNS, 0.0)
     model_sd = numbers(MODEL_SD_COLUMNS, None) if weighted else None
-    try:
+    with at_place(Place(path)):
         return Stations(
             [row.cells["id"] for row in rows],
             control,
@@ -89,8 +89,6 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
             ground_unit=ground_unit,
             model_unit=model_unit,
         )
-    except InputError as error:
-        raise InputError(error.phrase or error.message, file=path) from None
 
 
 def _check_header(table: Table) -> None:

@@ -16,7 +16,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Floats
-from photogram.errors import InputError, RankError
+from photogram.errors import InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, refuse_trajectories
 from photogram.network.datum import MinimumConstraints
@@ -167,7 +167,7 @@ def strip_of(block: Block, photos: Sequence[str]) -> Strip:
             found = orient(Stations(common, ground, model.positions[rows].reshape(-1, 3)))
         except RankError as error:
             raise RankError(
-                phrase("orientation.join", photo=name, error=error.phrase or str(error)), [name], common
+                phrase("orientation.join", photo=name, error=message_of(error)), [name], common
             ) from None
         carried = found.similarity.transform(model.positions)[0]
         rms.append(found.rms / found.similarity.scale)

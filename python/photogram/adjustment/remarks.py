@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.undetermined import named_unknowns, weak_in_words, weak_parameters
-from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.errors import AdjustmentError, InputError, RankError, message_of
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import Block, position_columns
 from photogram.network.motion import on_shared
@@ -33,9 +33,7 @@ def undetermined(
     messages: list[Message] = []
     if error is not None:
         what = error.what if isinstance(error, RankError) else str(error)
-        messages.append(
-            Undetermined(phrase("adjust.no-covariances", reason=error.phrase or str(error)), what=what)
-        )
+        messages.append(Undetermined(phrase("adjust.no-covariances", reason=message_of(error)), what=what))
     weak = _weak_unknowns(block, solution)
     if weak:
         causes = [weak_in_words(block, solution), *_weak_figures(block, solution)]

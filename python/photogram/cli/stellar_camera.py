@@ -103,7 +103,7 @@ def exposures(
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
-    from photogram.errors import InputError
+    from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import inputs, read_night
 
@@ -112,10 +112,8 @@ def exposures(
     job.reads(*inputs(night))
     pictures = documents.plot_format if documents.plots else ""
     said = _said(lens, common_scale, without or [], any_roll, blind)
-    try:
+    with at_place(Place(night)):
         result = calibrate_night(read_night(night, said), threads)
-    except InputError as error:
-        raise error if error.file else InputError(error.phrase or error.message, file=night) from None
     target = out or Path(f"{night.stem}-calibrated")
     written = _night_files(result, target, pictures)
     written |= documents.page(job, "stellar-camera exposures", target, result.document)

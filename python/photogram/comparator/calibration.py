@@ -49,7 +49,7 @@ from photogram.comparator.variance import (
     compare_case_variances,
     polynomial_tests,
 )
-from photogram.errors import AdjustmentError
+from photogram.errors import AdjustmentError, message_of
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
@@ -419,7 +419,7 @@ def _joint(
     try:
         joint = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
     except AdjustmentError as error:
-        messages.append(Message(error.phrase or str(error)))
+        messages.append(Message(message_of(error)))
         return None
     identity = Identity.of(session, [case.means_um for case in placed])
     return replace(joint, correction=replace(joint.correction, identity=identity))

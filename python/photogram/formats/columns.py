@@ -29,8 +29,8 @@ from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number
 from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, quoted
-from photogram.words import Phrase, phrase
+from photogram.messages import Message
+from photogram.words import Phrase, phrase, quoted
 
 ROLES = ("control", "check", "off")
 OURS = (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Frame, Options, Project
 from photogram.giant import read_project
@@ -64,7 +64,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
     try:
         GiantProject.from_block(project.block)
     except InputError as error:
-        return [phrase("lost.project", reason=error.phrase or error.message)]
+        return [phrase("lost.project", reason=message_of(error))]
     return [phrase("lost.giant-digits")]
 
 

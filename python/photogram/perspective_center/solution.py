@@ -19,7 +19,7 @@ from photogram.adjustment.remarks import hidden
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.arrays import one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.errors import AdjustmentError, InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.geometry import rotation_matrix
@@ -225,9 +225,7 @@ def determine(
             return _result(grid, weight, *_calibrated(grid, weight, unknown), unknown)
         course, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
     except RankError as error:
-        raise RankError(
-            phrase("projector.singular", error=error.phrase or str(error)), [], error.points
-        ) from None
+        raise RankError(phrase("projector.singular", error=message_of(error)), [], error.points) from None
     joint = course.partials, course.solution.cofactors
     return _result(grid, weight, grid, course, messages, *joint, as_published=as_published)
 

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.annotations import check_arguments
-from photogram.errors import InputError, RankError
+from photogram.errors import InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
@@ -112,7 +112,7 @@ def plan(
             made.append(Pattern(name, result, known))
         except RankError as error:
             raise RankError(
-                phrase("error.at", what=name, message=error.phrase or str(error)), error.photos, error.points
+                phrase("error.at", what=name, message=message_of(error)), error.photos, error.points
             ) from None
     return Plan(tuple(made))
 

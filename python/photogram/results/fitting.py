@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import value_field
-from photogram.errors import AdjustmentError, InputError
+from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.messages import Message, unknown_name
 from photogram.results.covariance import Covariances
 from photogram.results.features import (
@@ -72,21 +72,21 @@ def with_features(result: Result, definitions: Mapping[str, Definition]) -> Resu
     except (InputError, AdjustmentError) as error:
         return replace(
             result,
-            messages=[*result.messages, Message(phrase("fit.none", reason=error.phrase or str(error)))],
+            messages=[*result.messages, Message(phrase("fit.none", reason=message_of(error)))],
         )
     found, messages = [], []
     for name, each in definitions.items():
         try:
             found.append(fitted(name, each))
         except InputError as error:
-            messages.append(Message(error.phrase or error.message))
+            messages.append(Message(message_of(error)))
         except AdjustmentError as error:
             messages.append(
                 Message(
                     phrase(
                         "error.at",
                         what=phrase("fit.named", name=name),
-                        message=error.phrase or str(error),
+                        message=message_of(error),
                     )
                 )
             )
@@ -147,7 +147,7 @@ def _fitted(
             phrase(
                 "error.at",
                 what=phrase("fit.named", name=name),
-                message=error.phrase or error.message or str(error),
+                message=message_of(error),
             )
         ) from None
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.errors import AdjustmentError, InputError, PhotogramError
+from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
 from photogram.messages import Message
 from photogram.show.angles import ARCSEC
 from photogram.statistics.verdict import LARGEST_FACTOR
@@ -249,7 +249,7 @@ def _compared_lenses(
 
 
 def _failed_fit(lens: str, error: PhotogramError) -> LensFit:
-    return LensFit(lens, 0, 0, math.nan, math.inf, error.phrase or str(error))
+    return LensFit(lens, 0, 0, math.nan, math.inf, message_of(error))
 
 
 def _reasons(failed: Sequence[LensFit]) -> list[Phrase]:

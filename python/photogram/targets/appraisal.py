@@ -15,7 +15,7 @@ from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import argument_error
 from photogram.arguments.types import Bools
-from photogram.errors import InputError, RankError
+from photogram.errors import InputError, RankError, message_of
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
 from photogram.targets.housing import camera_number, housed_with, housing_of
@@ -162,7 +162,7 @@ def appraise(
         try:
             cross.append(cross_validate(calibrated, asked.cross_validate, number, progress=report))
         except (InputError, RankError) as error:
-            reason = error.phrase or str(error)
+            reason = message_of(error)
             remarks.append(phrase("targets.no-cross-validation", camera=camera.name, reason=reason))
     maps: list[UncertaintyMap] = []
     for number, camera in enumerate(calibrated.cameras):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from message_codes import fields_of, refused
 from photogram import adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.isis import POINT_TYPES
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.network import geographic_to_geocentric
-from refusals import fields_of, refused
 
 
 def xyz(project, result):

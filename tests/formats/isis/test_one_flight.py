@@ -7,6 +7,7 @@ import pytest
 import support_data
 from test_frames import moved, network
 
+from message_codes import refused
 from photogram import adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.adjusted import adjusted
@@ -14,7 +15,6 @@ from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import FORMAT
 from photogram.formats.isis.outcome import Outcome, contents_of
 from photogram.formats.isis.solving import observation_number, one_flight
-from refusals import refused
 
 SERIALS = ("MRO/HIRISE/903418200:19968/RED4/0", "MRO/HIRISE/903418200:19968/RED5/0")
 

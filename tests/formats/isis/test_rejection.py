@@ -8,13 +8,13 @@ import support_data
 from test_frames import moved, network
 from typer.testing import CliRunner
 
+from message_codes import fields_of
 from photogram import adjust, formats
 from photogram.cli import app
 from photogram.formats import Wishes
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import network_text, read_network
 from photogram.formats.isis.outcome import flagged, rejection_limit
-from refusals import fields_of
 
 WORDS = "CAMSOLVE=angles OVEREXISTING=yes CAMERA_ANGLES_SIGMA=1 OUTLIER_REJECTION=yes"
 BAD = (4, 31)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from message_codes import refused
 from photogram.formats.isis.settings import OTHERWISE, PARAMETERS, REFUSED, Settings, read_settings
 from photogram.formats.isis.solving import deviations
-from refusals import refused
 
 
 def test_defaults_are_those_of_jigsaw():
@@ -73,7 +73,7 @@ def test_a_file_of_settings(tmp_path):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ("CAMSOLV=all", "isis.setting hint=; did you mean CAMSOLVE?"),
+        ("CAMSOLV=all", "error.unknown.close kind=setting of jigsaw name=CAMSOLV close=CAMSOLVE"),
         ("CKDEGREE=9", "isis.degree most=8"),
         ("CKDEGREE=2.5", "isis.degree most=8"),
         ("TWIST=perhaps", "format.unknown what=value value=perhaps names=['yes', 'no']"),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.formats.cards import filled_lines
 from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
 from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
@@ -340,7 +340,7 @@ def read_list(path: Path) -> dict[str, Path]:
         try:
             serial, file = _of_line((place.text or "").strip(), path.parent)
         except InputError as error:
-            message = error.phrase or error.message
+            message = message_of(error)
             if error.file is not None:
                 message = phrase("error.at", what=str(error.file), message=message)
             raise place.error(message) from None

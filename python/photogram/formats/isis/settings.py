@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from photogram.errors import InputError
+from photogram.errors import InputError, message_of
 from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 Solved = Literal["none", "first", "second", "third", "all"]
@@ -183,7 +183,7 @@ def read_settings(text: str) -> Settings:
                 remarks |= _elsewhere(name, value)
         except InputError as error:
             raise InputError(
-                phrase("error.at", what=f"{name}={value}", message=error.phrase or error.message), **where
+                phrase("error.at", what=f"{name}={value}", message=message_of(error)), **where
             ) from None
     return Settings(**given, remarks=tuple(remarks.values()))
 
@@ -223,7 +223,7 @@ def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
         return {name: phrase("error.at", what=name, message=phrase(f"isis.{OTHERWISE[name]}"))}
     if name not in REFUSED:
         known = [*PARAMETERS, *OTHERWISE, *REFUSED]
-        raise InputError(phrase("isis.setting", hint=nearest(name, known)))
+        raise InputError(unknown_name("setting of jigsaw", name, known))
     if _yes(value):
         raise InputError(phrase("isis.refused"))
     return {}

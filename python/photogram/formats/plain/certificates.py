@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from photogram.film import Certificate
 
 _MODELS = ("brown_forward", "brown")
-_ITSELF = "a camera of another year is a camera by itself"
 SD_MARK = 0.002  # mm, of places in a certificate that does not say it: they are printed to 0.001
 
 

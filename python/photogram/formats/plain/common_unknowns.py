@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from photogram.errors import InputError, message_of
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.unknowns import Unknown
 
@@ -18,10 +18,8 @@ _Kind = TypeVar("_Kind", bound=Unknown)
 
 def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
     """Make something of a row; its errors name the row."""
-    try:
+    with at_place(table.place(row)):
         return make(*values, **more)
-    except InputError as error:
-        raise (error if error.file else table.error(row, message_of(error))) from None
 
 
 def called(cell: str, title: str) -> str:

@@ -11,7 +11,8 @@ from typing import Any
 
 from photogram.arguments.arrays import value_field
 from photogram.errors import InputError, message_of
-from photogram.io.toml import Document, Table, TomlFile, quoted_text
+from photogram.io.places import at_place
+from photogram.io.toml import Document, KeyPlace, Table, TomlFile, quoted_text
 from photogram.results.statement.request import Asked, length_of
 from photogram.results.statement.texts import Texts
 from photogram.words import phrase
@@ -40,7 +41,7 @@ def read_asked(file: Document, unit: str) -> dict[str, Any]:
         for key in keys:
             if key not in table:
                 continue
-            try:
+            with at_place(KeyPlace(table, key)):
                 name, value = _NAMES.get(key, key), _value(table, key, unit)
                 if key.startswith(CLASS):
                     name, value = "classes", {key.removeprefix(CLASS): value}
@@ -48,8 +49,6 @@ def read_asked(file: Document, unit: str) -> dict[str, Any]:
                     Texts(value)
                 # Whether there are lengths is not known before the tables are read.
                 value = getattr(Asked.checked(lengths=(SOME_LENGTH,), **{name: value}), name)
-            except InputError as error:
-                raise (error if error.file else table.error(key, message_of(error))) from None
             found[name] = {**found.get(name, {}), **value} if name == "classes" else value
     return found
 

@@ -15,8 +15,6 @@ from photogram.io.column_table import ColumnTable
 from photogram.messages import Message
 from photogram.words import phrase
 
-_HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone before the eastings?"
-
 
 class Transform:
     """What carries coordinates of tables into the frame, in units of the house."""
