@@ -33,11 +33,24 @@ RARE = 0.05  # Plausible errors of a set that may remain undetected
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
 
-DATUM = frozenset({"control-heights", "control-shift", "control-scale", "control-rotation", "gnss-heights", "gnss-shift", "scale"})
+DATUM = frozenset(
+    {
+        "control-heights",
+        "control-shift",
+        "control-scale",
+        "control-rotation",
+        "control-set",
+        "gnss-heights",
+        "gnss-shift",
+        "gnss-set",
+        "scale",
+    }
+)
 """Errors that change the datum only: assumptions, unless an independent source tests them."""
 
-GRADED = frozenset({"image", "attitude", "camera", "unknown"})
-"""Groups whose undetected errors are no reason for a reservation: they change single photos or points."""
+UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
+"""Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending, whose
+causes (terms of distortion) are hypotheses of their own."""
 
 MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
@@ -88,7 +101,7 @@ class Hypothesis:
 
     def is_harmful(self, points: int) -> bool:
         """Whether an undetected error moves too many of a number of points."""
-        if self.effect is None or self.group is not None and self.code in GRADED:
+        if self.effect is None or self.code in UNGRADED:
             return False
         if self.undetected < RARE or (self.mdb is None and self.code in DATUM):
             return False

@@ -187,7 +187,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, centre, estimated, detection, limit))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, centre, estimated, detection, limit, effects))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -202,6 +202,7 @@ impl NetworkTrial {
         estimated: Option<(f64, f64)>,
         detection: (f64, f64),
         limit: f64,
+        effects: usize,
     ) -> PyResult<(Vec<Bound<'py, PyDict>>, Matrix<'py>)> {
         let velocities = rows("velocities", &velocities)?;
         let facts = Facts {
@@ -215,6 +216,7 @@ impl NetworkTrial {
             estimated,
             detection,
             limit,
+            effects,
         };
         let found = watched(py, self.workers(), None, |pool, _| self.trial.hypotheses(&facts, pool))?;
         let Hypotheses { all, sets, correlations } = found.map_err(|error| (self.refused)(&error))?;

@@ -7,6 +7,9 @@ const BORESIGHT: f64 = 0.0873;
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>) {
     let bundle = catalogue.bundle;
+    if !catalogue.has_attitudes() {
+        return;
+    }
     let columns = catalogue.add(("boresight", None), &["x", "y", "z"], &[BORESIGHT; 3]);
     for photo in (0..bundle.cameras.len()).filter(|&photo| bundle.turning[photo]) {
         let first = bundle.of_block(photo).start + 3;

@@ -31,8 +31,8 @@ pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
         }
         let camera = &catalogue.stations.photos[photo].camera;
         let (name, parameters) = (camera.name(), camera.parameters());
-        match groups.iter_mut().find(|own| own.0 == name && own.1 == parameters) {
-            Some(own) => own.2.push(photo),
+        match groups.iter().position(|own| own.0 == name && own.1 == parameters) {
+            Some(place) => groups[place].2.push(photo),
             None if groups.len() < MOST_GROUPS => groups.push((name.to_owned(), parameters, vec![photo])),
             None => return,
         }
@@ -54,7 +54,8 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
     };
     let (distances, points) = (of(&DISTANCES), of(&POINTS));
     let others = fixed.iter().filter(|own| !DISTANCES.contains(&own.1) && !POINTS.contains(&own.1));
-    let mut hypotheses = vec![("camera-f", distances, DISTANCE * own.scale()), ("camera-point", points, POINT * width)];
+    let mut hypotheses =
+        vec![("camera-f", distances, DISTANCE * own.scale()), ("camera-point", points, POINT * width)];
     hypotheses.extend(others.take(MOST_TERMS).map(|&own| ("camera-term", vec![own], f64::NAN)));
     for (code, parameters, size) in hypotheses.into_iter().filter(|own| !own.1.is_empty()) {
         let names: Vec<&'static str> = parameters.iter().map(|own| own.1).collect();

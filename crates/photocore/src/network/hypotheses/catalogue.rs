@@ -149,6 +149,16 @@ impl<'a> Catalogue<'a> {
         observed.into_iter().enumerate().filter_map(of).collect()
     }
 
+    /// Whether attitudes of photos were observed.
+    pub fn has_attitudes(&self) -> bool {
+        let weighted = |photo: usize| {
+            let first = self.bundle.of_block(photo).start + 3;
+            self.sd[first..first + 3].iter().any(|sd| sd.is_finite() && *sd > 0.0)
+        };
+        self.bundle.observations.iter().any(|tied| tied.observation.kind() == "attitude")
+            || (0..self.bundle.cameras.len()).any(weighted)
+    }
+
     pub fn camera_of(&self, photo: usize) -> usize {
         self.camera_of_photo[photo]
     }
@@ -181,10 +191,17 @@ impl AdditionalParameters for Catalogue<'_> {
         self.count
     }
 
-    fn concern_groups(&self) -> bool {
-        !self.fixed.is_empty()
-            || self.cameras.iter().any(|own| !own.is_empty())
-            || self.shutters.iter().any(Option::is_some)
+    fn locals(&self) -> Option<Vec<usize>> {
+        let cameras = self.cameras.iter().any(|own| !own.is_empty());
+        if cameras || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
+            return None;
+        }
+        let end = 3 * self.bundle.locals;
+        let unknowns = self.displaced.keys().map(|own| own.1).filter(|&unknown| unknown < end);
+        let mut locals: Vec<usize> = unknowns.map(|unknown| unknown / 3).collect();
+        locals.sort_unstable();
+        locals.dedup();
+        Some(locals)
     }
 
     fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>) {

@@ -9,8 +9,8 @@ use crate::geometry::ObjectSpace;
 const SHIFT: f64 = 100.0;
 /// Plausible shift of one set of control.
 const SET_SHIFT: f64 = 1.0;
-/// Plausible error of scale.
-const SCALE: f64 = 1e-3;
+/// Plausible error of scale: another unit, or none of the scale of a map projection.
+const SCALE: f64 = 1e-2;
 /// Plausible rotation in radians.
 const ROTATION: f64 = 1e-2;
 /// Sets that are tested.

@@ -2,24 +2,19 @@
 //! position of a photo.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::super::suspects::{Home, Row, Subject, Suspect};
 use super::super::trial::Trial;
-use super::effect::{Effect, PointPrecision};
+use super::effect::Sample;
 use super::judged::Judged;
 use super::{About, Facts, Hypothesis};
 use crate::Threads;
-use crate::adjustment::{
-    AdditionalParameters, AdjustError, Equation, EquationOf, Leverages, Linearized,
-};
+use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized};
 
-/// Effects that are solved for together.
-const TOGETHER: usize = 16;
-/// Effects that are solved for at all: those of the largest bias-to-noise ratios.
-const MOST: usize = 512;
+/// Size of an error that is reported if no error of any size is detected, in standard deviations of its observation.
+const LARGE: f64 = 1000.0;
 
 /// An error of unit weight: equations with their shares of it.
 type Error = Vec<(EquationOf, f64)>;
@@ -29,11 +24,11 @@ pub(super) fn single_errors(
     trial: &Trial,
     found: &Leverages,
     linearized: &Linearized,
-    precision: &PointPrecision,
+    sample: &Sample<'_>,
     facts: &Facts,
     threads: &Threads,
-) -> Result<Vec<Hypothesis>, AdjustError> {
-    let Some(groups) = found.cofactors.groups.as_ref() else { return Ok(vec![]) };
+) -> Vec<Hypothesis> {
+    let Some(groups) = found.cofactors.groups.as_ref() else { return vec![] };
     let terms = trial.terms(&trial.assembled.problem.sd, &found.values);
     let (mut all, mut errors) = (vec![], vec![]);
     let suspects = trial.suspects.all.iter();
@@ -51,7 +46,9 @@ pub(super) fn single_errors(
             let score = residual.select_rows(&rows);
             let block = redundancy.select_rows(&rows).select_columns(&rows);
             // In unit weight C selects rows.
-            let judged = Judged::new(&score, &DMatrix::identity(rows.len(), rows.len()), &block, &[], facts);
+            let count = rows.len();
+            let judged =
+                Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], facts);
             let unit = judged.error.clone().unwrap_or_default();
             let shares = rows.iter().zip(&unit).map(|(&k, &value)| (trial.equation(suspect, k), value));
             errors.push((trial.points_of(suspect), shares.collect::<Error>()));
@@ -67,21 +64,26 @@ pub(super) fn single_errors(
             });
         }
     }
-    let mut solved: Vec<usize> = (0..all.len())
-        .filter(|&k| all[k].judged.bias_to_noise > facts.limit && all[k].judged.mdb.is_some())
-        .collect();
+    let mut solved: Vec<usize> =
+        (0..all.len()).filter(|&k| is_whole(&all[k]) && all[k].judged.bias_to_noise > facts.limit).collect();
     solved.sort_by(|&i, &j| all[j].judged.bias_to_noise.total_cmp(&all[i].judged.bias_to_noise));
-    solved.truncate(MOST);
-    for some in solved.chunks(TOGETHER) {
-        let columns = UnitErrors::new(some.iter().map(|&k| &errors[k].1));
-        let go_on = &mut |_| ControlFlow::Continue(());
-        let sums = linearized.additional(&trial.assembled.problem, &columns, threads, go_on)?;
-        for (column, &k) in some.iter().enumerate() {
-            let change = sums.effects.column(column);
-            all[k].effect = Some(Effect::new(precision, change.as_slice(), &errors[k].0, facts.limit));
-        }
+    solved.truncate(facts.effects);
+    let columns = UnitErrors::new(solved.iter().map(|&k| &errors[k].1), trial.assembled.problem.model.locals);
+    let problem = &trial.assembled.problem;
+    let sums = linearized.additional(problem, &columns, threads);
+    let count = solved.len();
+    let units: Vec<DVector<f64>> =
+        (0..count).map(|k| DVector::from_fn(count, |i, _| f64::from(u8::from(i == k)))).collect();
+    let changes = sample.changes(&columns, &sums.effects, &units, threads);
+    for (column, &k) in solved.iter().enumerate() {
+        all[k].effect = Some(sample.effect(&changes, column, &errors[k].0, facts.limit));
     }
-    Ok(all)
+    all
+}
+
+/// Whether a hypothesis is on all components of its group: an error of one of them moves no more than the worst of these.
+fn is_whole(own: &Hypothesis) -> bool {
+    matches!(own.about, About::Group(_, None))
 }
 
 fn code(subject: Subject) -> &'static str {
@@ -99,11 +101,12 @@ fn code(subject: Subject) -> &'static str {
 /// Errors of some equations, a column each.
 struct UnitErrors {
     count: usize,
+    locals: Vec<usize>,
     columns: HashMap<EquationOf, Vec<(usize, f64)>>,
 }
 
 impl UnitErrors {
-    fn new<'e>(errors: impl Iterator<Item = &'e Error>) -> Self {
+    fn new<'e>(errors: impl Iterator<Item = &'e Error>, locals: usize) -> Self {
         let (mut count, mut columns): (usize, HashMap<EquationOf, Vec<(usize, f64)>>) = (0, HashMap::new());
         for error in errors {
             for &(of, value) in error {
@@ -111,7 +114,15 @@ impl UnitErrors {
             }
             count += 1;
         }
-        Self { count, columns }
+        let of = |of: &EquationOf| match *of {
+            EquationOf::Unknown(unknown) if unknown < 3 * locals => Some(unknown / 3),
+            EquationOf::Group { local, .. } => Some(local),
+            _ => None,
+        };
+        let mut locals: Vec<usize> = columns.keys().filter_map(of).collect();
+        locals.sort_unstable();
+        locals.dedup();
+        Self { count, locals, columns }
     }
 }
 
@@ -120,8 +131,8 @@ impl AdditionalParameters for UnitErrors {
         self.count
     }
 
-    fn concern_groups(&self) -> bool {
-        false
+    fn locals(&self) -> Option<Vec<usize>> {
+        Some(self.locals.clone())
     }
 
     fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>) {

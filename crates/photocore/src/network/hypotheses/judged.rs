@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Facts;
-use crate::adjustment::{VISIBLE, chi_square, Tail, detectable_noncentrality, fisher};
+use crate::adjustment::{Tail, VISIBLE, chi_square, detectable_noncentrality, fisher};
 
 /// Degrees of freedom from which on an estimated unit weight counts as known for the MDB.
 const LARGE_FREEDOM: f64 = 50.0;
@@ -48,7 +48,8 @@ impl Judged {
         // Parameters in units in which each has unit weight: S = D s D. Its factor exists unless two parameters are the same one.
         let scale = squares.diagonal().map(|value| value.sqrt().recip());
         let unit = DMatrix::from_diagonal(&scale);
-        let root = (&unit * squares * &unit).cholesky().map_or(DMatrix::identity(count, count), |own| own.l());
+        let root =
+            (&unit * squares * &unit).cholesky().map_or(DMatrix::identity(count, count), |own| own.l());
         let back = root.solve_lower_triangular(&unit).unwrap_or(unit);
         let eigen = (&back * redundancy * back.transpose()).symmetric_eigen();
         let along = eigen.eigenvectors.tr_mul(&(&back * score));

@@ -23,7 +23,7 @@ pub use effect::Effect;
 pub use judged::Judged;
 
 use self::catalogue::Catalogue;
-use self::effect::PointPrecision;
+use self::effect::Sample;
 use self::groups::single_errors;
 use super::trial::Trial;
 use super::{NetworkError, Subject};
@@ -53,6 +53,8 @@ pub struct Facts {
     pub detection: (f64, f64),
     /// Effects are counted from this number of standard deviations on.
     pub limit: f64,
+    /// Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
+    pub effects: usize,
 }
 
 /// What a hypothesis is about.
@@ -109,11 +111,11 @@ impl Trial {
         let failed = |error| NetworkError::new(error, &self.assembled);
         let (values, held) = (found.values.clone(), found.held.clone());
         let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
-        let precision = PointPrecision::new(self, found);
+        let sample = Sample::new(self, found, &linearized);
 
         let catalogue = Catalogue::new(self, found, facts);
-        let sums = linearized.additional(problem, &catalogue, threads, go_on).map_err(failed)?;
-        let (mut all, mut columns) = (vec![], vec![]);
+        let sums = linearized.additional(problem, &catalogue, threads);
+        let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
             let seen: Vec<usize> = (0..cause.columns.len())
                 .filter(|&k| sums.squares[(cause.columns[k], cause.columns[k])] > 0.0)
@@ -130,10 +132,9 @@ impl Trial {
                 &plausible,
                 facts,
             );
-            let effect = judged.error.as_ref().map(|error| {
-                let change = sums.effects.select_columns(&own) * DVector::from_column_slice(error);
-                Effect::new(&precision, change.as_slice(), &[], facts.limit)
-            });
+            let mut error = DVector::zeros(sums.score.len());
+            own.iter().zip(judged.error.iter().flatten()).for_each(|(&k, &value)| error[k] = value);
+            errors.push(error);
             all.push(Hypothesis {
                 code: cause.code,
                 about: About::Set(cause.set),
@@ -141,13 +142,20 @@ impl Trial {
                 observations: own.iter().map(|&k| sums.observations[k]).max().unwrap_or(0),
                 plausible,
                 judged,
-                effect,
+                effect: None,
             });
             columns.push(own);
         }
+        let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
+        for (k, own) in all.iter_mut().enumerate().filter(|(_, own)| own.judged.error.is_some()) {
+            own.effect = Some(sample.effect(&changes, k, &[], facts.limit));
+        }
         let sets = all.len();
         let block = |i: &[usize], j: &[usize]| -> Vec<f64> {
-            i.iter().flat_map(|&i| j.iter().map(move |&j| (i, j))).map(|place| sums.redundancy[place]).collect()
+            i.iter()
+                .flat_map(|&i| j.iter().map(move |&j| (i, j)))
+                .map(|place| sums.redundancy[place])
+                .collect()
         };
         let correlation = |(i, j): (usize, usize)| {
             let (i, j): (&[usize], &[usize]) = (&columns[i], &columns[j]);
@@ -155,7 +163,7 @@ impl Trial {
         };
         let pairs = (0..sets).flat_map(|i| (0..sets).map(move |j| (i, j)));
         let correlations = pairs.map(correlation).collect();
-        all.extend(single_errors(self, found, &linearized, &precision, facts, threads).map_err(failed)?);
+        all.extend(single_errors(self, found, &linearized, &sample, facts, threads));
         Ok(Hypotheses { all, sets, correlations })
     }
 }
