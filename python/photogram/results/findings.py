@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
+from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import CameraImages, patterns
@@ -75,6 +76,7 @@ def block_findings(result: Result) -> Findings:
         intersected=intersected,
         scaled=result.unit_variance != "unity",
         remarks=[*found.remarks, *_left_out(result), *_on_checks(result)],
+        duplicates=duplicates(result.block),
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),

@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
+    from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
-    from photogram.results.hypotheses import Hypotheses
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
 
@@ -304,8 +304,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def hypotheses(self) -> pd.DataFrame:
         """Return errors of sets and of single observations as a data frame, with their tests (docs/tests.md).
 
-        A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no error,
-        and the estimated error in the units of the observations.
+        A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no
+        error, and the estimated error in the units of the observations.
 
         Raises
         ------

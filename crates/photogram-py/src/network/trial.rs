@@ -65,7 +65,7 @@ fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>
     row.set_item("mdb", judged.mdb)?;
     row.set_item("error", judged.error)?;
     row.set_item("bias_to_noise", judged.bias_to_noise)?;
-    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change));
+    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change, own.checks));
     row.set_item("effect", effect)?;
     Ok(row)
 }
@@ -187,7 +187,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, centre, estimated, detection, limit, effects))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -198,6 +198,7 @@ impl NetworkTrial {
         control_sets: Vec<Option<usize>>,
         readouts: Vec<Option<[f64; 3]>>,
         widths: Vec<f64>,
+        checks: Vec<usize>,
         centre: Option<[f64; 3]>,
         estimated: Option<(f64, f64)>,
         detection: (f64, f64),
@@ -212,6 +213,7 @@ impl NetworkTrial {
             control_sets,
             readouts,
             widths,
+            checks,
             centre,
             estimated,
             detection,
