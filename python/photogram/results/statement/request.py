@@ -200,6 +200,9 @@ def _length(name: str, value: Any) -> dict[str, Any]:
             raise invalid(name, "error.missing", name=key)
     line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
     figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
+    for key, value in figures.items():
+        if not 0 <= value < math.inf:
+            raise invalid(f"{name} {key}", "error.not-negative", value)
     if row.get("temperature") is not None:
         figures["temperature"] = number(f"{name} temperature", row["temperature"])
     return {"line": line, "from": first, "to": last, **figures}

@@ -13,9 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -35,7 +33,7 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.quantities import unknown
-from photogram.results.statement.request import Asked, invalid, lengths_in
+from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
 from photogram.words import phrase
@@ -253,23 +251,18 @@ def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
     return {"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)}
 
 
-def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
+def nssda(moments: Floats | None, rmse_z: float | None, count: int) -> Nssda:
     """Return the accuracy of `count` check points at 95 %.
 
     `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
     on its diagonal; None where there are none in plan. `rmse_z` is that of the heights, in the linear unit;
     None where there are none.
     """
-    if rmse_z is not None and not rmse_z >= 0:
-        raise invalid("rmse_z", "error.not-negative", rmse_z)
     vertical = None if rmse_z is None else VERTICAL * rmse_z
     if moments is None:
         return Nssda(count, None, None, None, None, vertical)
-    matrix = numbers("moments", moments)
-    if matrix.shape != (2, 2):
-        raise invalid("moments", "error.shape", shape="(2, 2)", actual=str(matrix.shape))
-    ce95 = float(circular_error(matrix[np.newaxis], 0.95)[0])
-    small, large = sorted(math.sqrt(each) for each in np.diag(matrix).tolist())
+    ce95 = float(circular_error(moments[np.newaxis], 0.95)[0])
+    small, large = sorted(math.sqrt(each) for each in np.diag(moments).tolist())
     ratio = small / large if large > 0 else 1.0
     mean = EITHER * (small + large) / 2
     equal = RADIAL * math.hypot(small, large)

@@ -283,10 +283,7 @@ def _layout(result: Result, found: Compared) -> Layout | None:
     if not whole.any():
         return None
     checks, control = found.given_places[whole], control_places(result.block)
-    every = np.concatenate([checks, control]) if len(control) else checks
-    if not np.ptp(every[:, :2], axis=0).any():
-        return None
-    return layout(checks, every, control)
+    return layout(checks, np.concatenate([checks, control]), control)
 
 
 check_arguments(globals(), ["statement"])
