@@ -19,7 +19,6 @@ from photogram.results.network_sections import (
     points_section,
     weakest_photos,
     weakest_points,
-    weakest_tables,
 )
 from photogram.results.network_tables import (
     control,
@@ -75,12 +74,13 @@ def network_document(
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
-    weak = weakest_points(result), weakest_photos(result)
+    weakest = weakest_points(result), weakest_photos(result)
     images_of_worst = worst[worst[:, 0] == 0, 1]
     worst_photos = result.given.image_photos[images_of_worst].tolist()
     worst_points = result.image_points[images_of_worst].tolist()
-    worst_photos += [each.row for each in weak[1]]
-    worst_points += [each.row for each in weak[0]]
+    for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
+        link = table.columns[0].link
+        rows += [] if link is None else link.rows.tolist()
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
         " residual; the rest"
@@ -92,7 +92,6 @@ def network_document(
     )
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
-    tables = [table for table in weakest_tables(result, *weak) if len(table.columns[0].values)]
     return Document(
         what=what,
         title=title,
@@ -112,7 +111,7 @@ def network_document(
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
-            Section("weakest", "Weakest points and photos", tables),
+            Section("weakest", "Weakest points and photos", [table for table in weakest if table.visible]),
             _iterations_section(result),
         ],
         details=[
@@ -147,7 +146,6 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
     weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
     of_photos = Quantity(result.photo_covariances, member="covariance")
     of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
-    weak_points, weak_photos = weakest_tables(result, weakest_points(result), weakest_photos(result))
     return {
         "program": f"photogram {_photocore.__version__}",
         **members(result, "status", "degrees_of_freedom", "variance_of_unit_weight", "covariance_scale"),
@@ -162,7 +160,7 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
         "observations": records([*images(result), *([weights] if result.loss else [])]),
         "control": records(control(result)),
         "stations": records(stations(result)),
-        "weakest": {"points": records(weak_points.columns), "photos": records(weak_photos.columns)},
+        "weakest": {"points": weakest_points(result).record(), "photos": weakest_photos(result).record()},
     }
 
 
