@@ -16,7 +16,7 @@ from photogram.results.axes import point_axes
 from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
 from photogram.results.features_report import features_document, features_section
-from photogram.results.film_report import fiducial_members, film_members, films_section, scanner_members
+from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
 from photogram.results.network_document import (
     drawings,
     network_document,
@@ -271,8 +271,8 @@ def _of_some(result: Result) -> dict[str, Any]:
     if result.unknowns:
         found["unknowns"] = _unknowns(result)
     if result.films:
-        found |= {"films": film_members(result), "fiducials": fiducial_members(result)}
-        found["scanners"] = scanner_members(result)
+        tables = {"films": film_table, "fiducials": mark_table, "scanners": scanner_table}
+        found |= {name: records(table(result)) for name, table in tables.items()}
     if result.features is not None:
         found["features"] = features_document(result.features)
     return found
