@@ -27,8 +27,6 @@ from photogram.results.scores import quadratic
 if TYPE_CHECKING:
     from photogram import Result
 
-__all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
-
 LEVEL = 0.05  # Significance level of terms
 CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos

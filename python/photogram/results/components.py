@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.show.sketch.plot import Plot
 
-__all__ = ["VarianceComponents"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VarianceComponents(Judged, Documented, Brief):

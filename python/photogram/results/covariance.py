@@ -20,8 +20,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-__all__ = ["Covariances", "Failure", "Propagated"]
-
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
 

@@ -23,8 +23,6 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
 
-__all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
-
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
 TURNS = (*ANGLES, "rotation ")  # First words of names of rotations
 NOTABLE_LOSS = 1e-9  # Largest part of a variance by rounding without a message

@@ -15,8 +15,6 @@ from photogram.results.covariance import adjusted
 from photogram.results.result import Result
 from photogram.words import phrase
 
-__all__ = ["Differences", "Largest", "differences"]
-
 _KINDS = ("photo", "point", "camera", "unknown")
 
 

@@ -22,8 +22,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_points"]
-
 T = TypeVar("T", "Quantity", "Feature")
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
 _EXPANDED = "expanded uncertainty, k times the standard deviation"

@@ -27,8 +27,6 @@ from photogram.results.result import Result
 from photogram.statistics.distributions import critical_student, log_chi_square, log_fisher
 from photogram.words import phrase
 
-__all__ = ["features", "with_features"]
-
 
 def features(
     result: Result, definitions: Mapping[str, Definition], *, k: float = 2.0, coverage: float | None = None

@@ -39,17 +39,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "GroupSum",
-    "GroupSums",
-    "Left",
-    "Probing",
-    "block_observables",
-    "factored",
-    "group_sums",
-    "observables",
-]
-
 TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
 SMALL = 1000  # Largest number of observations with exact sums

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Iteration", "Redundancies", "SumsByKind", "SumsOfSquares"]
-
 
 @dataclass(frozen=True)
 class Iteration:

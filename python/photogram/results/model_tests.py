@@ -30,7 +30,7 @@ from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import INTERIOR, rows_of_images
+from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.scores import quadratic, score
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram import Result
-
-__all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
 
 KEPT = 0.01  # Significance level of useful terms
 EFFECT = 0.2  # Smallest effect of useful terms on an image, in standard deviations
@@ -323,28 +321,21 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
     Forward cameras compare measured with computed images, backward ones corrected with ideal images.
     """
-    block = result.block
-    own = rows_of_images(result, camera)
-    columns = np.zeros((len(rows), len(block.image_xy), 2))
+    own, names = rows_of_images(result, camera), [camera.names[row] for row in rows]
+    columns = np.zeros((len(rows), len(result.block.image_xy), 2))
     plain = camera.camera.replace(sd=0.0, covariance=None)
-    measured, residuals = focal_images(block)[own], result.residuals[own]
-    backward = plain.direction == "backward"
-    rays = None if backward else plain.rays(measured - residuals)
+    measured, residuals = focal_images(result.block)[own], result.residuals[own]
+    rays = None if plain.direction == "backward" else plain.rays(measured - residuals)
+    # Steps that move images by about a millionth of the frame.
     reach = float(np.abs(measured).max(initial=1.0))
+    steps = {name: 1e-6 * reach ** plain.powers[name] for name in names}
 
-    def compared(parameters: Mapping[str, float]) -> Floats:
-        changed = plain.replace(parameters=parameters)
+    def compared(changed: Camera) -> Floats:
         return -_corrected(changed, measured) if rays is None else changed.project(rays)
 
-    for place, row in enumerate(rows):
-        name = camera.names[row]
-        # A step that moves images by about a millionth of the frame.
-        step, value = 1e-6 * reach ** plain.powers[name], plain.parameters[name]
-        ends = (value + step, value - step)
-        after, before = (compared({**plain.parameters, name: end}) for end in ends)
-        columns[place, own] = (after - before) / (2 * step)
-        if backward and name == "c":
-            columns[place, own] += (_corrected(plain, measured) - residuals) / value
+    columns[:, own] = partials_of(compared, plain, steps)
+    if rays is None and "c" in names:
+        columns[names.index("c"), own] += (_corrected(plain, measured) - residuals) / plain.parameters["c"]
     return np.nan_to_num(columns)
 
 

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
 
-__all__ = ["AdjustedNetwork", "Observed"]
-
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Of a `repr`
 

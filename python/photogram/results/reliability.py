@@ -35,8 +35,6 @@ from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
-
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm
 

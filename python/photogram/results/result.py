@@ -54,8 +54,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
-__all__ = ["Result"]
-
 NOT_PHOTOGRAPHED = "not photographed"
 REJECTED = "all its image observations are rejected"
 """Reasons why a point without image observations is left out: it never had any, or none was used."""

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["Snooped", "log_table", "recorded"]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Snooped(Brief, Documented):

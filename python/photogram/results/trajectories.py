@@ -31,15 +31,6 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.show.quantity import Quantity
 
-__all__ = [
-    "AdjustedTrajectory",
-    "TrajectoryPoses",
-    "adjusted_trajectories",
-    "corrections",
-    "project",
-    "restarted_motion",
-]
-
 Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by name
 
 

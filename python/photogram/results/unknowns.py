@@ -15,8 +15,6 @@ from photogram.network.unknowns import Unknown
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["AdjustedUnknown", "adjusted_unknowns"]
-
 
 _PLACED = frozenset(
     (

@@ -23,8 +23,6 @@ from photogram.statistics.variance_function import FunctionEstimate
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Bin", "VarianceFunction"]
-
 OUTSIDE = 0.025  # Probability on each side of an interval
 
 

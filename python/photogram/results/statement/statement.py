@@ -42,8 +42,6 @@ from photogram.show.quantity import records
 from photogram.show.run import InputFile
 from photogram.words import Phrase, phrase
 
-__all__ = ["Statement", "statement"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Statement(Grounds, Brief):
