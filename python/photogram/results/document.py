@@ -15,7 +15,7 @@ from photogram.network.structuring import structure
 from photogram.results.axes import point_axes
 from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
-from photogram.results.features_report import features_document, features_section
+from photogram.results.features import features_document, features_section
 from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
 from photogram.results.network_document import (
     drawings,
@@ -39,7 +39,7 @@ from photogram.results.tables import (
     unheld,
     unknowns,
 )
-from photogram.results.trajectories import POSES, courses_table, notable, notable_courses
+from photogram.results.trajectories import POSES, notable, trajectories_table
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
@@ -152,18 +152,9 @@ def _unknowns_section(result: Result) -> Section:
         "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common;"
         " clocks, readout times and coefficients of trajectories."
     )
-    (shown, note), (every, said) = notable(result.unknowns), notable_courses(result)
-    columns = unknowns(shown)
-    tables = [Table("unknowns", "Common unknowns", columns, _sentence(note))] if shown else []
-    if every:
-        said = said or "The largest correction in the span of the table, and its time."
-        columns = courses_table(every, result.block.linear_unit)
-        tables.append(Table("trajectories", "Trajectories", columns, _sentence(said)))
-    return Section("unknowns", "Common unknowns", tables, intro)
-
-
-def _sentence(said: str) -> str:
-    return f"{said[:1].upper()}{said[1:].removesuffix('.')}." if said else ""
+    shown, note = notable(result.unknowns)
+    tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
+    return Section("unknowns", "Common unknowns", [table for table in tables if table.visible], intro)
 
 
 def _datum(result: Result) -> str:

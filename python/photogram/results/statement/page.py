@@ -11,8 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
-from photogram.results.features import Features, unit_deviations
-from photogram.results.features_report import through
+from photogram.results.features import Features, through, unit_deviations
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.comparison import control_places, in_order
 from photogram.results.statement.document import kinds_of
