@@ -75,7 +75,6 @@ _TABLES = {
 
 
 def block_files(result: Result) -> dict[str, Content]:
-    """Return the files of the result of a block."""
     block = result.block
     photos, points = (np.arange(len(names)) for names in (block.photo_ids, block.point_ids))
     kinds = ("control", "check", "pass")
@@ -131,7 +130,6 @@ def _parts(block: Block) -> dict[str, list[Part]]:
 def parts_of_block(
     *, geographic: bool, unit: str, image_unit: str, distances: bool, observed: list[str]
 ) -> dict[str, list[Part]]:
-    """Return what the tables of a block have."""
     places = ("longitude", "latitude", "height") if geographic else ("x", "y", "z")
     lengths = ("rad", "rad", unit) if geographic else (unit,) * 3
     turns = ("rad",) * 3
@@ -197,7 +195,6 @@ class KeptTrajectory(Stand):
 
     @classmethod
     def of(cls, given: Any) -> KeptTrajectory:
-        """Return what stands for a trajectory."""
         own = (given.name, given.table, given.position, given.rotation, given.body)
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 

@@ -37,8 +37,6 @@ FAR = 5.0  # Change of a weighted parameter that contradicts it (a priori sd)
 
 @dataclass(frozen=True)
 class ParameterTest:
-    """An estimated parameter."""
-
     # Name and unit; empty for plain numbers
     name: str
     unit: str
@@ -100,14 +98,11 @@ class GroupTest:
 
     @property
     def outcome(self) -> str:
-        """The same in words."""
         return "significant" if self.significant else "not significant"
 
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two unknowns that are correlated, by name, and their coefficient."""
-
     first: str
     second: str
     coefficient: float

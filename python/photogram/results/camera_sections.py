@@ -74,7 +74,6 @@ def values_written(camera: Camera) -> str:
 
 
 def parameters_table(found: Calibration, law: str = "") -> Table:
-    """Return the estimated parameters of a camera with their tests, which have a distribution."""
     every, camera = found.parameters, found.camera
     axes, of = tuple(Axis.of(each.name, each.unit) for each in every), np.arange(len(every))
     names = replace(component(axes, of)[0], head="Parameter")
@@ -209,7 +208,6 @@ def _field_remarks(result: Result, found: Calibration) -> list[str]:
 
 
 def calibration_members(result: Result) -> list[dict[str, Any]]:
-    """Return what the JSON document contains of each camera with unknown parameters."""
     return [_member(result, each) for each in calibrations(result)]
 
 

@@ -26,7 +26,6 @@ MARGIN = 1.1  # Limits over the extreme values
 
 
 def components_document(found: VarianceComponents) -> Document:
-    """Return the document of variance components."""
     verdict = found.verdict
     judgement, sections = judged(verdict), [components_section(found)]
     return Document("Variance components", "", [judgement], verdict.next, [], sections)
@@ -57,7 +56,6 @@ def components_section(found: VarianceComponents) -> Section:
 
 
 def components_table(found: VarianceComponents) -> Table:
-    """Return the declared table of the components, estimated and held."""
     rows, reference = found.components, found.estimate.reference
     low, high = np.array([each.interval for each in rows]).reshape(-1, 2).T
     outcomes = [
@@ -112,7 +110,6 @@ def statement(found: VarianceComponents) -> list[Phrase]:
 
 
 def components_sketch(components: Sequence[Component]) -> Plot:
-    """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
     marks: list[Mark] = []
     for place, each in enumerate(components):
         at = np.array([[each.factor_of_sd, place]])

@@ -30,8 +30,6 @@ Selection = Item | Sequence[Item]  # One or several items
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """What a selection names."""
-
     rows: list[tuple[str, int]]  # Kind and index of each part, as the core knows them
     labels: list[tuple[str, str, str]]  # What each unknown is: kind, name, component
     values: Floats  # Adjusted values and standard deviations, one after the other
@@ -50,8 +48,6 @@ class Selected:
 
 @dataclass(frozen=True, eq=False)
 class Things:
-    """Things of one kind, one after the other."""
-
     ids: Sequence[str]  # Of each its name, the names of its unknowns, their values and standard deviations
     components: Sequence[tuple[str, ...]]
     values: Sequence[Floats] | Floats
@@ -62,8 +58,6 @@ class Things:
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted values and standard deviations of a network."""
-
     network: str  # What it is called: a block, or a collection
     things: Mapping[str, Things]  # By their kinds
     numbered: bool = False  # Whether they are called by their numbers
@@ -125,12 +119,10 @@ class Adjusted:
 
 
 def photo_components(block: Block) -> tuple[str, ...]:
-    """Name the six unknowns of a photo."""
     return tuple(name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS))
 
 
 def point_components(block: Block) -> tuple[str, ...]:
-    """Name the three coordinates of a point."""
     return tuple(name.removesuffix("_deg") for name in position_columns(block))
 
 
@@ -308,7 +300,6 @@ class Covariances:
         return np.concatenate([self._own(selected.rows[k : k + TOGETHER]) for k in parts])
 
     def _own(self, rows: list[tuple[str, int]]) -> Floats:
-        """Return the standard deviations of a few things."""
         cofactors = self._asked(lambda: self._core.cofactors(rows, None, threads=0, progress=None))
         return np.asarray(np.sqrt(self._scale * np.diag(cofactors)))
 

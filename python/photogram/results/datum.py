@@ -49,7 +49,6 @@ class ResultDatum:
 
     @property
     def phrase(self) -> Phrase:
-        """The datum as a message."""
         counts = (("points", self.points), ("photos", self.photos), ("attitudes", self.attitudes))
         scaled = self.kind == "inner constraints" and self.scale
         fields = {
@@ -73,7 +72,6 @@ class ResultDatum:
         return self.scale or (self.kind == "minimum constraints" and holds_scale(self.held))
 
     def document(self) -> dict[str, Any]:
-        """Return what the JSON document says of it."""
         return {
             "kind": self.kind,
             "held": [{"photo": photo, "unknown": unknown} for photo, unknown in self.held],
@@ -174,7 +172,6 @@ def _levelled(block: Block, held: int) -> Phrase | None:
 
 
 def inner_datum(datum: object) -> InnerConstraints:
-    """Return inner constraints; refuse anything else."""
     if not isinstance(datum, InnerConstraints):
         raise argument_error("datum", "kind", kind="InnerConstraints", value=value_field(datum))
     return datum
@@ -198,7 +195,6 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
 def refused(
     block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: Failure
 ) -> AdjustmentError | InputError:
-    """Return what the core has refused, with the names concerned."""
     kind, message, _, points, *_ = error.args
     if kind == "memory":
         return OutOfMemoryError(message)

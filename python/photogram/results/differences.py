@@ -20,8 +20,6 @@ _KINDS = ("photo", "point", "camera", "unknown")
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of differences."""
-
     size: float = 0.0  # 0 if nothing differs
     # Empty if nothing differs
     kind: str = ""

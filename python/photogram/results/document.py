@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite
 def block_document(result: Result) -> Document:
-    """Return the document of an adjusted block."""
     pictures, (about, figures) = drawings(result), bandwidths(result)
     given = [
         control_section(result, unheld(result)),
@@ -164,7 +163,6 @@ def _datum(result: Result) -> str:
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
-    """Return what the block consists of: names and what there is."""
     block = result.block
     kinds = result.point_kinds[result.used_points].tolist()
     held = np.isfinite(block.point_sd)
@@ -203,7 +201,6 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
 
 
 def rms_of(values: Floats) -> float:
-    """Return the root mean square of some values; NaN of none."""
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
@@ -219,7 +216,6 @@ def _differences(result: Result, values: Iterable[float]) -> list[str]:
 
 
 def block_members(result: Result) -> dict[str, Any]:
-    """Return the members of the document of an adjusted block."""
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
     of_photos = (
         Quantity(covariances[:, place, place], member="position_covariance"),

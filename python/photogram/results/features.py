@@ -35,8 +35,6 @@ Definition = tuple[str, str | Sequence[str]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a feature."""
-
     # `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
     # `sphericity`, `cylindricity`
     name: str
@@ -242,7 +240,6 @@ def _named(all_: Sequence[T], name: str, kind: str) -> T:
 
 
 def features_section(features: Features | None, picture: Drawing | None = None) -> Section:
-    """Return features with their quantities, and whether their form is more than errors."""
     if not features:
         return Section("features", "Features", [])
     k = f"{features.k:g}"
@@ -282,7 +279,6 @@ def through(feature: Feature) -> Phrase:
 
 
 def features_document(features: Features) -> dict[str, Any]:
-    """Return what the JSON document says of features."""
     own = members(features, "k", "coverage", "remarks")
     return own | {"features": [_member(each) for each in features]}
 

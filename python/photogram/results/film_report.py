@@ -255,7 +255,6 @@ def scanner_table(result: Result) -> list[Quantity]:
 
 
 def films_section(result: Result, drawing: Drawing) -> Section:
-    """Return the section of films, with the picture of marks and patterns; empty without films."""
     if not result.films:
         return Section("films", "Film and fiducials", [])
     intro = (

@@ -227,7 +227,6 @@ def observables(network: object) -> Observables:
 
 
 def block_observables(block: Block) -> Observables:
-    """Return what a block has observations of."""
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
     # What is given of a photo with a trajectory of its own is given of common unknowns.
@@ -261,7 +260,6 @@ def _strips(block: Block) -> list[Indices]:
 
 
 def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
-    """Return the factor of the normal equations of an adjusted network."""
     return result._core_network().covariances(result.state, threads=0, progress=None)
 
 

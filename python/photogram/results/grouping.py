@@ -61,11 +61,9 @@ class Grouping:
 
     @property
     def count(self) -> int:
-        """How many groups there are."""
         return len(self.groups.names)
 
     def core(self) -> tuple[int, Indices, Indices, Indices, list[int], list[int], list[int]]:
-        """Return the groups as the core takes them."""
         photos = np.vstack([self.photos[:, :6], np.full((self.records, 6), -1)])
         none = [-1] * (self.cameras + (self.records > 0))
         return (
@@ -125,7 +123,6 @@ class _Labelled:
 
 
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
-    """Label by named bases."""
     components = "component" in bases
     of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
     head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
@@ -151,7 +148,6 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
 
 
 def _images_by(of: Observables, basis: str) -> list[str]:
-    """Label the images by one basis."""
     photos, seen = of.given.image_photos.tolist(), of.given.image_points
     if basis == "photo":
         return [f"photo {of.given.photo_ids[photo]}" for photo in photos]
@@ -169,7 +165,6 @@ def _images_by(of: Observables, basis: str) -> list[str]:
 
 
 def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
-    """Label as the user does."""
     unknown = set(given) - set(PARTS)
     if unknown:
         raise argument_error("labels", "choice", names=[*PARTS], value=min(map(str, unknown)))

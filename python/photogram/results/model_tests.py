@@ -385,7 +385,6 @@ def _probability(value: float, k: int, freedom: float) -> float:
 
 
 def _check_same(name: str, one: Result, other_name: str, other: Result) -> None:
-    """Refuse models of other observations."""
     for what in ("image_xy", "image_sd"):
         if not np.array_equal(getattr(one.block, what), getattr(other.block, what)):
             raise InputError(phrase("models.observations", one=name, other=other_name, what=what))

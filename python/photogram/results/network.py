@@ -184,8 +184,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
 
     @abstractmethod
-    def _members(self) -> dict[str, Any]:
-        """Return the members of the JSON document, without the sections that people read."""
+    def _members(self) -> dict[str, Any]: ...
 
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
@@ -220,24 +219,19 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return global_test(*self.sum_and_freedom)
 
     @abstractmethod
-    def _core_network(self) -> CoreNetwork:
-        """Return the network for the core."""
+    def _core_network(self) -> CoreNetwork: ...
 
     @abstractmethod
-    def _terms(self) -> Terms:
-        """Return names and components of photos, points and images."""
+    def _terms(self) -> Terms: ...
 
     @abstractmethod
-    def _determined(self) -> Determined:
-        """Return positions and poses with their cofactors."""
+    def _determined(self) -> Determined: ...
 
     @abstractmethod
-    def _plot_data(self) -> Pictured:
-        """Return the data of the plots."""
+    def _plot_data(self) -> Pictured: ...
 
     @abstractmethod
-    def _trial(self) -> NetworkTrial:
-        """Return the network as tests ask it, where the adjustment has ended."""
+    def _trial(self) -> NetworkTrial: ...
 
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
@@ -388,12 +382,10 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return standard_deviations(self.point_covariances)
 
     @abstractmethod
-    def _adjusted(self) -> Adjusted:
-        """Return the adjusted values by kinds and names."""
+    def _adjusted(self) -> Adjusted: ...
 
     @abstractmethod
-    def _refused(self, error: Failure) -> Exception:
-        """Put into words what the core has refused."""
+    def _refused(self, error: Failure) -> Exception: ...
 
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.

@@ -174,7 +174,6 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
 
 
 def check_section(result: Result) -> Section:
-    """Return check points with what they say as a whole."""
     columns = check_points(result)
     tables = _compared("check_points", "Check points one by one", columns)
     parts = [_check_summary(result), *tables, _check_tests(result, columns)] if tables else []
@@ -252,7 +251,6 @@ def stations_section(result: AdjustedNetwork) -> Section:
 
 
 def beside_section(result: Result) -> Section:
-    """Return observations beside images, kind by kind."""
     tables = []
     for kind, observed in result.kinds.items():
         if observed.used:

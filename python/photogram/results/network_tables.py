@@ -87,7 +87,6 @@ def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
 
 
 def iterations(result: AdjustedNetwork) -> list[Quantity]:
-    """Return the history, first the start."""
     return iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
 
 
@@ -143,13 +142,11 @@ def difference(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
 
 
 def deviation(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return standard deviations."""
     own = {"name": "sd", "member": "sd", "about": "standard deviation: {}", "head": "sd {}"}
     return Quantity(values, axes, "deviation", **(own | more))
 
 
 def redundancy(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return redundancy numbers."""
     own: dict[str, Any] = dict.fromkeys(("name", "member"), "redundancy")
     about = "redundancy number: {}"
     return Quantity(values, axes, **own, about=about, head="Redundancy", decimals=3, **more)

@@ -32,8 +32,6 @@ KURTOSIS = (-0.7, 1.0)  # Limits of excess kurtosis without a message
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    """The images of one camera."""
-
     name: str  # Of the camera
     photos: Bools  # (P,) which photos have it
     estimated: int  # How many of its parameters are estimated

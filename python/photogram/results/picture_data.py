@@ -49,7 +49,6 @@ class PicturedNetwork(Pictured):
 
     @cached_property
     def images(self) -> Images:
-        """The image observations that took part."""
         result, given, used = self.result, self.result.given, self.result.used_images
         cameras, names, down = self.cameras
         return Images(
@@ -86,7 +85,6 @@ class PicturedNetwork(Pictured):
 
     @property
     def unit_weight(self) -> float:
-        """The root of the variance of unit weight."""
         return float(np.sqrt(self.result.covariance_scale))
 
 
@@ -100,12 +98,10 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def title(self) -> str:
-        """The title of the block."""
         return self.result.block.title
 
     @cached_property
     def plan(self) -> Plan:
-        """The network."""
         result, block = self.result, self.result.block
         # Differences as lengths: those of angles are too small to be taken of positions.
         lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
@@ -129,18 +125,15 @@ class PicturedBlock(PicturedNetwork):
         return local_axes(self.result.block)
 
     def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) covariances of points along the axes of the plan."""
         return np.asarray(metric_covariances(self.result)[points])
 
     @cached_property
     def footprints(self) -> Floats:
-        """(P, v, 3) outlines of photos on level ground."""
         found = footprints(self.result).positions()
         return self._metric(found.reshape(-1, 3)).reshape(found.shape)
 
     @property
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
-        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
         block = self.result.block
         _, cameras = block.core_cameras()
         names = block.camera_names
@@ -156,12 +149,10 @@ class PicturedBlock(PicturedNetwork):
 
     @cached_property
     def scanned(self) -> Bools:
-        """(P,) which photos are strips of a scanner."""
         return scanners(self.result.block)
 
     @property
     def correlations(self) -> list[Correlated]:
-        """Cameras with two or more estimated parameters."""
         found = []
         for each in self.result.cameras:
             rows = each.estimated
@@ -172,13 +163,11 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def distortion(self) -> list[Curves]:
-        """Cameras with radial distortion."""
         curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
 
     @property
     def deviations(self) -> list[Deviations]:
-        """Features with deviations of points."""
         found = self.result.features or Features(())
         return [
             Deviations(
@@ -195,7 +184,6 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def films(self) -> list[VectorField]:
-        """Mean residuals of the marks of cameras, and patterns of films."""
         if not self.result.films:
             return []
         return [*mean_mark_residuals(self.result), *film_patterns(self.result)]

@@ -284,7 +284,6 @@ class Reliability:
         return Inseparable(str(name(first)), str(name(second)), (first, second), rho, max(factor, 1.0))
 
     def row_groups(self) -> Indices:
-        """Return (M,) the group of each row."""
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
     def observations(self) -> Table:
@@ -352,7 +351,6 @@ def reliability_of(
     power: float,
     unit_weight: str,
 ) -> Reliability:
-    """Return the reliability of a network that is adjusted, with checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     for name, value in (("level", level), ("power", power)):
         probability(name, number(name, value))

@@ -55,7 +55,6 @@ class ReliabilitySummary:
         return self.tests.testable(self.suspects.row_starts)
 
     def kinds_table(self) -> Table:
-        """Return the declared table of the kinds of observations."""
         note = (
             "No other observation checks the unchecked groups. An error of a one-sided group shows in no"
             " residual if it has some direction."
@@ -91,7 +90,6 @@ class ReliabilitySummary:
         return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences)]
 
     def document(self) -> dict[str, Any]:
-        """Return the member `reliability` of JSON documents."""
         return {
             **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",

@@ -143,8 +143,6 @@ def image_parts(given: str, unit: str) -> list[Part]:
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """A folder that was read."""
-
     folder: Path  # Where it is
     summary: Mapping[str, Any]  # The document
     decoder: Decoder  # For what it keeps

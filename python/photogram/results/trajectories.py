@@ -77,7 +77,6 @@ class AdjustedTrajectory:
 
     @property
     def name(self) -> str:
-        """Its name."""
         return self.given.name
 
     def restarted(self, observed: Collection[int] = (), turn: Floats | None = None) -> Trajectory:

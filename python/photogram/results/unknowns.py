@@ -75,12 +75,10 @@ class AdjustedUnknown:
 
     @property
     def name(self) -> str:
-        """Its own name."""
         return self.given.name
 
     @property
     def kind(self) -> str:
-        """The name of its type."""
         return self.given.KIND
 
     @property

@@ -101,7 +101,6 @@ class Compared:
         return np.asarray(matrix.reshape(n, 3, n, 3)[range(n), :, range(n), :])
 
     def some(self, keep: Bools) -> Compared:
-        """Return some of the points."""
         rows = np.repeat(keep, 3)
         grid = np.ix_(rows, rows)
         return replace(
@@ -308,8 +307,6 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Points that were given."""
-
     # n names; `control` or `check`
     names: tuple[str, ...]
     kinds: tuple[str, ...]

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 
 def statement_members(found: Statement) -> dict[str, Any]:
-    """Return the members of the document."""
     asked, result, standards = found.asked, found.result, found.standards
     unit = result.block.linear_unit
     return {
@@ -126,7 +125,6 @@ def _adjustment(result: Result) -> dict[str, Any]:
 
 
 def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
-    """Return the figures of check points; None where there are none."""
     if found is None:
         return None
     parts = [found.parts[each] for each in ("e", "n", "h")]

@@ -53,8 +53,6 @@ class Sized:
 
 @dataclass(frozen=True)
 class Radius:
-    """A radius of a probability from a sample."""
-
     # k = ceil(p n), and the k-th smallest: NaN without points
     order: int
     sample: float
@@ -66,8 +64,6 @@ class Radius:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """All figures of check points."""
-
     n: int  # Number of points
     parts: dict[str, Sized | None]  # By `e`, `n`, `h`, `plan`, `all`
     # In plan (radial) and height; 1: of differences, 2: of the survey

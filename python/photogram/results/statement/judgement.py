@@ -38,8 +38,6 @@ _CASES = {
 
 @dataclass(frozen=True)
 class Judged:
-    """What a statement says."""
-
     # Exit code, severity of the headline
     exit: int
     tone: Tone
@@ -52,8 +50,6 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """The evidence of the rules of a statement."""
-
     found: Grounds
     strict: bool
     control: Sequence[LeftOut]  # control points that disagree with the rest of the block
@@ -63,19 +59,16 @@ class _Evidence:
 
     @property
     def missed(self) -> bool:
-        """Whether the required accuracy is missed."""
         lengths = self.found.standards.lengths
         return "missed" in self.classes or (lengths is not None and lengths.test.met is False)
 
     @property
     def met(self) -> bool:
-        """Whether the required accuracy of lengths is met."""
         lengths = self.found.standards.lengths
         return lengths is not None and bool(lengths.test.met)
 
     @property
     def classes(self) -> list[str]:
-        """The verdicts on accuracy classes."""
         asprs = self.found.standards.asprs
         return [] if asprs is None else list(asprs.verdicts.values())
 
@@ -86,8 +79,6 @@ class _Evidence:
 
 
 def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
-    """Return a rule of a statement with the headline of a name."""
-
     def message(e: _Evidence) -> Phrase | None:
         if not holds(e):
             return None

@@ -58,12 +58,10 @@ class LengthTest:
 
     @property
     def largest(self) -> float:
-        """Size of the largest error."""
         return float(np.abs(self.errors).max())
 
     @property
     def rms(self) -> float:
-        """Root mean square of the errors."""
         return math.sqrt(float(np.mean(self.errors**2)))
 
     @property

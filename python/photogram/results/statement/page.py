@@ -296,7 +296,6 @@ _CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with 
 
 @np.errstate(over="ignore", invalid="ignore")
 def statement_document(statement: Statement) -> Document:
-    """Return the page of a statement, for the browser and for paper."""
     texts, asked, judged = statement.texts, statement.asked, statement.judged
     names = ("project", "client", "firm", "surveyor")
     head = [Fact(texts(f"page.{name}"), own) for name in names if (own := getattr(asked, name))]

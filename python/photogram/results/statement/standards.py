@@ -81,7 +81,6 @@ class Asprs:
     left_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
-        """Return what the JSON document has; `metre` is the linear unit in metres."""
         found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
         found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
         for name, each in self.figures.items():
@@ -113,7 +112,6 @@ class Nssda:
 
     @property
     def enough(self) -> bool:
-        """Whether there are as many check points as are asked for."""
         return self.count >= ENOUGH
 
     @property
@@ -124,8 +122,6 @@ class Nssda:
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """Calibrated lengths: which they are, and their test."""
-
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
@@ -145,7 +141,6 @@ class Standards:
 
     @property
     def nssda_member(self) -> dict[str, Any] | None:
-        """What the JSON document has of the NSSDA."""
         if self.nssda is None:
             return None
         more = {"accuracy_r_unequal": "accuracy_r", "ce95": "ce95", "accuracy_z": "accuracy_z"}

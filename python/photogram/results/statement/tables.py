@@ -39,7 +39,6 @@ class Columns:
         return self.texts(f"column.{key}") if self.texts.has(f"column.{key}") else key
 
     def text(self, key: str, values: Sequence[str], **more: Any) -> Quantity:
-        """Return a column of texts."""
         return Quantity([*values], kind="name", head=self.head(key), **more)
 
     def number(
@@ -136,7 +135,6 @@ def check_points(statement: Statement) -> Table:
 
 
 def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
-    """Return control points predicted by the others."""
     columns, unit = Columns(texts), texts.unit
     sd, difference = (np.array([getattr(each, name) for each in own]) for name in ("sd", "difference"))
     p, decimals = np.array([each.p for each in own]), decimals_for(sd)
@@ -175,7 +173,6 @@ def removed_observations(statement: Statement) -> Table:
 
 
 def test_lengths(texts: Texts, own: Lengths) -> Table:
-    """Return calibrated lengths with their errors."""
     columns, test, decimals = Columns(texts), own.test, decimals_for(own.test.sd)
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
     limits = np.full(len(own.lines), math.nan) if test.limits is None else test.limits
