@@ -183,7 +183,7 @@ def test_means_and_differences_beyond_the_class_are_remarks():
 def test_nssda_has_the_golden_figures():
     for row in golden("circles.json")["nssda"]:
         x, y = row["rmse_x"], row["rmse_y"]
-        found = nssda(np.diag([x**2, y**2]), None, 20)
+        found = nssda(np.diag([x**2, y**2]), math.nan, 20)
         if row["accuracy_r"] is None:
             assert found.accuracy_r is None
         else:
@@ -206,11 +206,14 @@ def test_nssda_of_the_golden_block_is_that_of_the_golden_statement(which):
     assert found.accuracy_z == pytest.approx(expected["accuracy_z"], rel=1e-6)
 
 
+NOTHING = np.full((2, 2), math.nan)
+
+
 def test_nssda_asks_for_twenty_points_and_compiles_without():
-    assert nssda(None, 0.1, 19).enough is False
-    assert nssda(None, 0.1, 20).enough is True
-    assert nssda(None, 0.1, 20).wording == "tested"
-    assert nssda(None, None, 0).wording == "compiled"
+    assert nssda(NOTHING, 0.1, 19).enough is False
+    assert nssda(NOTHING, 0.1, 20).enough is True
+    assert nssda(NOTHING, 0.1, 20).wording == "tested"
+    assert nssda(NOTHING, math.nan, 0).wording == "compiled"
     assert nssda(np.zeros((2, 2)), 0.0, 3).accuracy_r == 0.0
 
 

@@ -80,7 +80,7 @@ def block_files(result: Result) -> dict[str, Content]:
     kinds = ("control", "check", "pass")
     of_points = np.argmax(result.point_kinds[np.newaxis] == np.array(kinds)[:, np.newaxis], axis=0)
     leading = {
-        "photos": [_named("photo", block.photo_ids, photos), *_camera_column(block)],
+        "photos": [_named("photo", block.photo_ids, photos)],
         "points": [
             _named("point", block.point_ids, points),
             Column("kind", Repeated(kinds, of_points), "", "control (held), check (known) or pass"),
@@ -90,6 +90,8 @@ def block_files(result: Result) -> dict[str, Content]:
             _named("point", block.point_ids, block.image_points),
         ],
     }
+    if block.photo_cameras is not None:
+        leading["photos"].append(_named("camera", block.camera_names, block.photo_cameras))
     tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
     summary = {
         "title": block.title,
@@ -168,13 +170,6 @@ def parts_of_block(
 
 def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
     return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
-
-
-def _camera_column(block: Block) -> list[Column]:
-    if block.photo_cameras is None:
-        return []
-    names = block.camera_names
-    return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -195,19 +195,21 @@ def calibrations(result: Result) -> list[Calibration]:
     """
     cameras = [each for each in result.cameras if each.estimated and np.isfinite(each.cofactors).all()]
     covariances = result.covariances() if cameras and result.WHOLE else None
-    return [
-        _calibration(result, each, covariances if number < ASKED else None)
-        for number, each in enumerate(cameras)
-    ]
-
-
-def _calibration(result: Result, camera: AdjustedCamera, covariances: Covariances | None) -> Calibration:
-    parameters = tuple(_parameter(result, camera, k) for k in camera.estimated)
-    groups = tuple(_group(result, camera, names) for names in _families(camera))
-    poses = () if covariances is None else _poses(result, camera, covariances)
-    terms = tuple(terms_test(result, names, camera=camera.name) for names in groups_of_terms(camera))
-    correlations = _correlations(camera)
-    return Calibration(camera, parameters, groups, correlations, poses, terms, _removable(parameters))
+    found = []
+    for number, each in enumerate(cameras):
+        parameters = tuple(_parameter(result, each, k) for k in each.estimated)
+        found.append(
+            Calibration(
+                camera=each,
+                parameters=parameters,
+                groups=tuple(_group(result, each, names) for names in _families(each)),
+                correlations=_correlations(each),
+                poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
+                terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
+                removable=_removable(parameters),
+            )
+        )
+    return found
 
 
 def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:

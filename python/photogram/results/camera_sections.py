@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
 from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, layered_tables
@@ -47,7 +46,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     facts = [
         Fact(
             f"{each.name}: {each.camera.model}",
-            values_written(each.camera),
+            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
             each.camera.unit or "",
             f"{each.photos} photos, {each.images} images",
         )
@@ -66,11 +65,6 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
 def law_of(result: Result) -> str:
     """Return the distribution of the tests of parameters."""
     return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
-
-
-def values_written(camera: Camera) -> str:
-    """Return the parameters of a camera that are not zero."""
-    return ", ".join(f"{name} {value:.8g}" for name, value in camera.parameters.items() if value != 0)
 
 
 def parameters_table(found: Calibration, law: str = "") -> Table:

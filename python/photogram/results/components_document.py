@@ -11,7 +11,7 @@ import numpy as np
 from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import judged
 from photogram.show.page import Document, Drawing, Part, Remarks, Section
-from photogram.show.quantity import Quantity, Table, of_each
+from photogram.show.quantity import Quantity, Table, column, of_each
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
@@ -70,16 +70,10 @@ def components_table(found: VarianceComponents) -> Table:
         of_each(rows, "factor", name="factor", head="Component", decimals=3),
         of_each(rows, "sd", name="sd_factor", head="sd", decimals=3),
         of_each(rows, "least_sd", name="least_sd_factor"),
-        Quantity(low, name="low", member="low", head="From", decimals=3),
-        Quantity(high, name="high", member="high", head="To", decimals=3),
+        column("low", low, "From", decimals=3),
+        column("high", high, "To", decimals=3),
         of_each(rows, "factor_of_sd", name="factor_of_sd", head="Factor of sd", decimals=3),
-        Quantity(
-            [each.factor / reference for each in rows],
-            name="factor_to_images",
-            member="factor_to_images",
-            head="To images",
-            decimals=3,
-        ),
+        column("factor_to_images", [each.factor / reference for each in rows], "To images", decimals=3),
         of_each(rows, "test_value", name="test_value"),
         of_each(rows, "probability", name="probability", head="p", figures=2, seen=~held),
         of_each(rows, "significant", name="significant"),

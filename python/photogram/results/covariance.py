@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -122,15 +123,12 @@ def photo_components(block: Block) -> tuple[str, ...]:
     return tuple(name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS))
 
 
-def point_components(block: Block) -> tuple[str, ...]:
-    return tuple(name.removesuffix("_deg") for name in position_columns(block))
-
-
 def adjusted(result: Result) -> Adjusted:
     """Return the adjusted values of a result by kinds and names."""
     block = result.block
     photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
-    places, count = point_components(block), len(photos)
+    unknowns_of_photo, count = photo_components(block), len(photos)
+    places = unknowns_of_photo[:3]
     steps = (*places, "rho x", "rho y", "rho z")
     points = [places] * len(block.point_ids)
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
@@ -138,7 +136,7 @@ def adjusted(result: Result) -> Adjusted:
     return Adjusted(
         network="block",
         things={
-            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
+            "photo": Things(block.photo_ids, [unknowns_of_photo] * count, photos, sd),
             "step": Things(block.photo_ids, [steps] * count, photos, sd),
             "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
             "camera": Things(
@@ -296,12 +294,12 @@ class Covariances:
         selected = self._adjusted.selected(selection)
         if all(kind != "step" for kind, _ in selected.rows):
             return selected.sd
-        parts = range(0, len(selected.rows), TOGETHER)
-        return np.concatenate([self._own(selected.rows[k : k + TOGETHER]) for k in parts])
-
-    def _own(self, rows: list[tuple[str, int]]) -> Floats:
-        cofactors = self._asked(lambda: self._core.cofactors(rows, None, threads=0, progress=None))
-        return np.asarray(np.sqrt(self._scale * np.diag(cofactors)))
+        found = []
+        for k in range(0, len(selected.rows), TOGETHER):
+            rows = selected.rows[k : k + TOGETHER]
+            cofactors = self._asked(partial(self._core.cofactors, rows, None, threads=0, progress=None))
+            found.append(np.sqrt(self._scale * np.diag(cofactors)))
+        return np.concatenate(found)
 
     def propagate(
         self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False

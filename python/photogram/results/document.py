@@ -60,6 +60,13 @@ def block_document(result: Result) -> Document:
         films_section(result, pictures["films"]),
         _unknowns_section(result),
     ]
+    note = (
+        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
+        " multiplied by to agree, if the others are right."
+    )
+    title, columns = "Redundancy by kind of observation", redundancy_by_kind(result)
+    redundancy, datum = Table("redundancy-by-kind", title, columns, note), result.datum
+    refer = "Datum:" if datum.is_chosen else "Coordinates and standard deviations refer to the datum that is"
     return network_document(
         result,
         "Adjustment of a block of photos",
@@ -68,9 +75,9 @@ def block_document(result: Result) -> Document:
         photos=len(result.block.photo_ids),
         title=result.block.title,
         more=_accuracy(result),
-        redundancy=_redundancy_tables(result),
+        redundancy=[redundancy] if redundancy.visible else [],
         beside=[features_section(result.features, pictures["features"])],
-        datum=_datum(result),
+        datum=f"{refer} {datum}.",
         poses=POSES if result.block.timed else "",
         details=[gains_section(result)],
         work=[Fact(f"Bandwidth {name}", value, note=about) for name, value in figures],
@@ -100,10 +107,16 @@ def _accuracy(result: Result) -> list[Fact]:
 def _size_section(result: Result) -> Section:
     variance, more = result.variance_of_unit_weight, list[Fact]()
     if result.dropped:
-        more.append(Fact("Points left out", f"{len(result.dropped)}", note=_reasons(result)))
+        reasons = Counter(result.dropped.values()).items()
+        note = ", ".join(f"{count}: {reason}" for reason, count in reasons)
+        more.append(Fact("Points left out", f"{len(result.dropped)}", note=note))
     value = f"{variance:.6f}" if variance is not None else "undefined"
     good = [Fact("Variance of unit weight", value, note=_BASIS[result.unit_variance])]
-    good += _sums(result)
+    sums = result.sums_of_squares
+    groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
+    groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
+    groups["total"] = sums.total
+    good += [Fact(f"Weighted sum of squares, {name}", f"{square:.6f}") for name, square in groups.items()]
     tables = {"control points": control, "unheld components": unheld, "check points": check_points}
     for what, table in tables.items():
         differences = named(table(result), "d").values
@@ -113,35 +126,12 @@ def _size_section(result: Result) -> Section:
     return size_section(result, size_of(result), more, good)
 
 
-def _sums(result: Result) -> list[Fact]:
-    sums = result.sums_of_squares
-    groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
-    groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
-    groups["total"] = sums.total
-    return [Fact(f"Weighted sum of squares, {name}", f"{value:.6f}") for name, value in groups.items()]
-
-
 _BASIS = {
     "free": "rule of 1987: the weights of photos and cameras do not count",
     "constrained": "of all weighted values, those of photos and cameras among them",
     "unity": "set to 1",
     "redundancy": "based on redundancy numbers",
 }
-
-
-def _reasons(result: Result) -> str:
-    counts = Counter(result.dropped.values())
-    return ", ".join(f"{count}: {reason}" for reason, count in counts.items())
-
-
-def _redundancy_tables(result: Result) -> list[Table]:
-    note = (
-        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
-        " multiplied by to agree, if the others are right."
-    )
-    columns = redundancy_by_kind(result)
-    table = Table("redundancy-by-kind", "Redundancy by kind of observation", columns, note)
-    return [table] if len(columns[0].values) else []
 
 
 def _unknowns_section(result: Result) -> Section:
@@ -154,12 +144,6 @@ def _unknowns_section(result: Result) -> Section:
     shown, note = notable(result.unknowns)
     tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
     return Section("unknowns", "Common unknowns", [table for table in tables if table.visible], intro)
-
-
-def _datum(result: Result) -> str:
-    if result.datum.is_chosen:
-        return f"Datum: {result.datum}."
-    return f"Coordinates and standard deviations refer to the datum that is {result.datum}."
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
@@ -254,9 +238,22 @@ def _of_some(result: Result) -> dict[str, Any]:
     """Return the members on what only some blocks have."""
     found: dict[str, Any] = {}
     if result.cameras:
-        found |= {"cameras": _cameras(result), "calibrations": calibration_members(result)}
+        found["cameras"] = [
+            members(each, "name", model="camera.model", image_unit="camera.unit")
+            | members(each, "photos", "images")
+            | {"parameters": records(camera_parameters([each])), "covariance": each.covariance}
+            for each in result.cameras
+        ]
+        found["calibrations"] = calibration_members(result)
     if result.unknowns:
-        found["unknowns"] = _unknowns(result)
+        found["unknowns"] = [
+            members(each, "kind", "name", "position", matrix="attitude")
+            | members(
+                each, "observations", "components", "units", sd_given="given.deviations", value="values"
+            )
+            | members(each, "change", "sd", "redundancy", "standardized", "covariance")
+            for each in result.unknowns
+        ]
     if result.films:
         tables = {"films": film_table, "fiducials": mark_table, "scanners": scanner_table}
         found |= {name: records(table(result)) for name, table in tables.items()}
@@ -288,27 +285,6 @@ def _units(result: Result) -> dict[str, str]:
         "operations": "multiply-adds, each time the phase is carried out",
         "seconds": "s",
     }
-
-
-def _cameras(result: Result) -> list[dict[str, Any]]:
-    return [
-        {
-            **members(each, "name", model="camera.model", image_unit="camera.unit"),
-            **members(each, "photos", "images"),
-            "parameters": records(camera_parameters([each])),
-            "covariance": each.covariance,
-        }
-        for each in result.cameras
-    ]
-
-
-def _unknowns(result: Result) -> list[dict[str, Any]]:
-    return [
-        members(each, "kind", "name", "position", matrix="attitude")
-        | members(each, "observations", "components", "units", sd_given="given.deviations", value="values")
-        | members(each, "change", "sd", "redundancy", "standardized", "covariance")
-        for each in result.unknowns
-    ]
 
 
 def _beside_images(result: Result) -> list[dict[str, Any]]:

@@ -51,7 +51,7 @@ def network_findings(
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
-        computed=has_redundancy(result),
+        computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
         snooped=result.snooped,
         remarks=unseen(result),
@@ -163,11 +163,6 @@ def _patterns(result: Result) -> list[Systematic]:
         ]
     axes = [axis.name for axis in point_axes(block)]
     return patterns(result, cameras, axes, lambda own: fall_by_lens(result, own))
-
-
-def has_redundancy(result: AdjustedNetwork) -> bool:
-    """Return whether redundancy numbers were computed, without which no observation is tested."""
-    return bool(finite_rows(result.redundancy)[chosen(result.used_images)].all())
 
 
 def unseen(result: AdjustedNetwork) -> list[Phrase]:

@@ -272,7 +272,11 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
     names, all_results = list(results), list(results.values())
     first = all_results[0]
     for name, other in zip(names[1:], all_results[1:], strict=True):
-        _check_same(names[0], first, name, other)
+        for what in ("image_xy", "image_sd"):
+            if not np.array_equal(getattr(first.block, what), getattr(other.block, what)):
+                raise InputError(phrase("models.observations", one=names[0], other=name, what=what))
+        if count := int((first.used_images != other.used_images).sum()):
+            raise InputError(phrase("models.images", n=count, one=names[0], other=name))
     taken = all(math.isinf(each.freedom_of_scale) for each in all_results) if known is None else known
     models = [_model(name, result, taken) for name, result in results.items()]
     nested = []
@@ -382,14 +386,6 @@ def _probability(value: float, k: int, freedom: float) -> float:
     if math.isinf(freedom):
         return _photocore.chi_square(value, k)
     return _photocore.fisher(value / k, k, freedom) if freedom > 0 else math.nan
-
-
-def _check_same(name: str, one: Result, other_name: str, other: Result) -> None:
-    for what in ("image_xy", "image_sd"):
-        if not np.array_equal(getattr(one.block, what), getattr(other.block, what)):
-            raise InputError(phrase("models.observations", one=name, other=other_name, what=what))
-    if count := int((one.used_images != other.used_images).sum()):
-        raise InputError(phrase("models.images", n=count, one=name, other=other_name))
 
 
 def _count(result: Result) -> int:

@@ -254,11 +254,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        from photogram.results.reliability import reliability_of
+        from photogram.results.reliability import Reliability
 
-        return reliability_of(
-            self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight
-        )
+        return Reliability(self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:

@@ -90,6 +90,14 @@ def network_document(
         "A residual alone says little: an error shows in it only by the share of its redundancy number. The"
         " test value considers both. Names of photos and points lead to their rows below."
     )
+    intro_of_tests = (
+        "How the residuals agree with the standard deviations that were given, as a whole and one by one."
+    )
+    note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
+    iteration_table = quantity.Table("iterations", "Iterations", iterations(result), note)
+    course = [Fact("Status", result.status)]
+    if result.loss is not None:
+        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
     return Document(
@@ -106,13 +114,13 @@ def network_document(
             Section("residuals", "Image residuals", [pictures["residuals"]]),
             Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
             Section("reliability", "Reliability", reliability),
-            _tests_section(result, pictures["tests"]),
+            Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], intro_of_tests),
             Section("worst", "Worst observations", _worst_table(tests, worst), intro_of_worst),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
             Section("weakest", "Weakest points and photos", [table for table in weakest if table.visible]),
-            _iterations_section(result),
+            Section("iterations", "Iterations", [iteration_table, Facts("Course", course)]),
         ],
         details=[
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
@@ -181,8 +189,18 @@ def size_section(
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
+    variance, sigma, note = (
+        result.variance_of_unit_weight,
+        "–",
+        "no degrees of freedom: covariances are scaled by 1",
+    )
+    if variance is not None:
+        sigma, note = f"{math.sqrt(variance):.3f}", ""
+        for test in result.verdict.tests:
+            if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
+                note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
     found = [
-        _unit_weight(result),
+        Fact("Standard deviation of unit weight", sigma, note=note),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
         Fact("Iterations", f"{len(result.iterations)}", note=result.status),
@@ -191,17 +209,6 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
         rms = math.sqrt(float(((result.residuals[used] * axis.factor) ** 2).mean()))
         found.append(Fact("rms of image residuals", significant(rms, 3), unit_written(axis.small)))
     return found
-
-
-def _unit_weight(result: AdjustedNetwork) -> Fact:
-    variance, name = result.variance_of_unit_weight, "Standard deviation of unit weight"
-    if variance is None:
-        return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
-    note = ""
-    for test in result.verdict.tests:
-        if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
-            note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
-    return Fact(name, f"{math.sqrt(variance):.3f}", note=note)
 
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
@@ -266,21 +273,6 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
     ]
     note = "A posteriori: scaled by the unit variance where that is estimated."
     return [quantity.Table("precision", "Precision", columns, note)]
-
-
-def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
-    parts: list[Part] = [drawing, verdict_table(result.verdict)]
-    intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
-    return Section("tests", "Tests", parts, intro)
-
-
-def _iterations_section(result: AdjustedNetwork) -> Section:
-    note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
-    table = quantity.Table("iterations", "Iterations", iterations(result), note)
-    course = [Fact("Status", result.status)]
-    if result.loss is not None:
-        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
-    return Section("iterations", "Iterations", [table, Facts("Course", course)])
 
 
 def _work(result: AdjustedNetwork) -> list[Fact]:

@@ -12,7 +12,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.results.axes import Terms
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.show.quantity import Axis, Link, Quantity
+from photogram.show.quantity import Axis, Link, Quantity, column
 
 _FREE = {np.inf: "free", 0.0: "fixed"}
 
@@ -57,7 +57,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
     return [
         names(terms, "point", used, terms.identity, here=True),
         *terms.of_points,
-        Quantity(rays, name="rays", member="rays", head="Rays", decimals=0),
+        column("rays", rays, "Rays", decimals=0),
         Quantity(places, terms.point_axes, "value", name="", member="position", head="{}", figures=7),
         deviation(sd, terms.point_axes, member=""),
     ]

@@ -305,6 +305,8 @@ def statement_document(statement: Statement) -> Document:
     mark = texts(f"mark.{tone or 'good'}")
     assumed = Remarks([text for _, text in judged.assumptions], 40)
     remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
+    sketch = partial(differences, statement.compared, control_places(statement.result.block), texts)
+    drawing = Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)
     return Document(
         what=texts("page.what"),
         title=asked.title or statement.result.block.title,
@@ -313,7 +315,7 @@ def statement_document(statement: Statement) -> Document:
             Section(
                 "figures", texts("page.figures"), [*localized(texts, _figures(statement)), *_notes(statement)]
             ),
-            Section("assumptions", texts("page.assumptions"), [assumed, _map(statement)]),
+            Section("assumptions", texts("page.assumptions"), [assumed, drawing]),
             Section("remarks", texts("page.remarks"), remarks),
             Section("signature", "", [Text(texts("page.signature"))]),
             *annexes(statement),
@@ -392,9 +394,3 @@ def _notes(statement: Statement) -> list[Text]:
         own = math.nan if predicted is None else predicted.predicted_rmse_of_product
         fields[f"predicted_{name}"] = texts.length(own)
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
-
-
-def _map(statement: Statement) -> Drawing:
-    texts, control = statement.texts, control_places(statement.result.block)
-    sketch = partial(differences, statement.compared, control, texts)
-    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)

@@ -161,7 +161,7 @@ def standards(
         asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
         if "asprs-2023" in asked.standards
         else None,
-        nssda=_nssda(of_all),
+        nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
         lengths=lengths,
         iso_19157=_iso(result, asked, of_all, lengths) if "iso-19157" in asked.standards else [],
     )
@@ -185,6 +185,7 @@ def _asprs(
     verdicts = {name: asprs.verdict(figures[name], size) for name, size in classes.items()}
     counts = [0 if own is None else own.count for own in (figures["h"], figures["v"])]
     plan, height = _control_rmse(result)
+    d = np.array([each.difference for each in left_out]).reshape(-1, 3)
     control: dict[str, bool] = {}
     if "h" in classes:
         good = asprs.control_good_enough(plan, height, classes["h"], classes.get("v"))
@@ -207,7 +208,7 @@ def _asprs(
         else asprs.remarks(
             np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")
         ),
-        left_out=_left_out(left_out),
+        left_out={"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)},
     )
 
 
@@ -239,22 +240,14 @@ def _control_rmse(result: Result) -> tuple[float, float]:
     return root_mean(squares[:, :2].sum(axis=1)), root_mean(squares[:, 2])
 
 
-def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
-    if not found:
-        return {"h": math.nan, "v": math.nan}
-    d = np.array([each.difference for each in found])
-    return {"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)}
-
-
-def nssda(moments: Floats | None, rmse_z: float | None, count: int) -> Nssda:
+def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     """Return the accuracy of `count` check points at 95 %.
 
     `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
-    on its diagonal; None where there are none in plan. `rmse_z` is that of the heights, in the linear unit;
-    None where there are none.
+    on its diagonal. `rmse_z` is that of the heights, in the linear unit. Both are NaN if there are none.
     """
-    vertical = None if rmse_z is None else VERTICAL * rmse_z
-    if moments is None:
+    vertical = VERTICAL * rmse_z if math.isfinite(rmse_z) else None
+    if not np.isfinite(moments).all():
         return Nssda(count, None, None, None, None, vertical)
     ce95 = float(circular_error(moments[np.newaxis], 0.95)[0])
     small, large = sorted(math.sqrt(each) for each in np.diag(moments).tolist())
@@ -262,13 +255,6 @@ def nssda(moments: Floats | None, rmse_z: float | None, count: int) -> Nssda:
     mean = EITHER * (small + large) / 2
     equal = RADIAL * math.hypot(small, large)
     return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
-
-
-def _nssda(of_all: Figures | None) -> Nssda | None:
-    if of_all is None:
-        return None
-    moments = of_all.moments if np.isfinite(of_all.moments).all() else None
-    return nssda(moments, of_all.rmse_v1 if math.isfinite(of_all.rmse_v1) else None, of_all.n)
 
 
 def _lengths(result: Result, asked: Asked) -> Lengths:
