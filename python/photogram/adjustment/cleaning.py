@@ -80,7 +80,7 @@ class Cleaned(Brief, Documented):
 
     def section(self) -> Section:
         """Return the section on weights: what was done to them, and the components that are left."""
-        from photogram.results.components_document import components_section
+        from photogram.results.components import components_section
 
         parts: list[Part] = [Remarks(self.changes)]
         if self.components is not None:
