@@ -23,6 +23,7 @@ from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.scores import quadratic
+from photogram.show.page import about
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -154,37 +155,18 @@ class Calibration:
         """Say what needs attention, in sentences."""
         said = []
         for each in self.parameters:
-            if not each.separable:
-                said.append(
-                    f"{each.name} cannot be told from the other unknowns: its multiple correlation is"
-                    f" {each.multiple_correlation:.6f}"
-                )
-            if each.from_prior:
-                said.append(
-                    f"{each.name} is from its prior: the redundancy number of its weight is"
-                    f" {each.redundancy:.3f}, the images say little of it"
-                )
-            if each.contradicts:
-                said.append(
-                    f"{each.name} has moved by {abs(each.change) / each.given_sd:.1f} standard deviations of"
-                    " its prior: value or weight is wrong"
-                )
-        said += self._worth()
-        if self.removable is not None:
-            said.append(
-                f"{self.removable} may be left out: the least significant term; adjust again before the next"
-            )
-        return said
-
-    def _worth(self) -> list[str]:
-        kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
-        others = [
-            f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"
-            for each in self.terms
-            if not each.worth_keeping
-        ]
-        parts = (("worth keeping by their tests at 1 percent", kept), ("not worth keeping", others))
-        return [f"terms of the lens {what}: {'; '.join(names)}" for what, names in parts if names]
+            own = {"name": each.name, "r": each.multiple_correlation, "redundancy": each.redundancy}
+            own["size"] = abs(each.change) / each.given_sd if each.contradicts else 0.0
+            holds = {"inseparable": not each.separable, "prior": each.from_prior, "moved": each.contradicts}
+            said += [about(f"parameter.{code}", **own) for code in holds if holds[code]]
+        for code, kept in (("kept", True), ("others", False)):
+            names = [
+                about(f"term.{code}", names=each.names, p=each.probability, effect=each.effect)
+                for each in self.terms
+                if each.worth_keeping == kept
+            ]
+            said += [about(f"terms.{code}", names=names)] if names else []
+        return [*said, about("terms.removable", term=self.removable)] if self.removable else said
 
 
 def calibrations(result: Result) -> list[Calibration]:

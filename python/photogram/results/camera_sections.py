@@ -11,14 +11,13 @@ import numpy as np
 
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
-from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, layered_tables
+from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
     from photogram import Result
 
 LISTED = 12  # Cameras with a table of their own
-NAMED = 3  # Photos of a correlation
 RADII = 9  # Rows of a distortion curve
 
 
@@ -58,8 +57,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
         parts.append(Facts("Cameras that are held", facts))
     if len(found) > LISTED:
         parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
-    intro = "The interior orientation: what was given, what was found, and what the images say about it."
-    return Section("cameras", "Cameras", parts, intro if found else "")
+    return Section("cameras", "Cameras", parts, about("cameras") if found else "")
 
 
 def law_of(result: Result) -> str:
@@ -95,11 +93,8 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
             marked=np.array([not each.separable or each.contradicts for each in every], dtype=bool),
         ),
     ]
-    note = (
-        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
-        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
-        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
-    )
+    lens = {"model": camera.camera.model, "direction": camera.camera.direction}
+    note = about("camera", **lens, photos=camera.photos, images=camera.images)
     deviations = np.array([each.sd for each in every])
     return Table(f"parameters-{camera.name}", camera.name, columns, note, "", deviations)
 
@@ -116,8 +111,7 @@ def gains_section(result: Result) -> Section:
             of_each(every, "gain", head="Gain"),
         ]
         tables.append(Table(f"gains-{name}", name, columns))
-    intro = "Without a parameter, the weighted sum of squares would rise by its gain."
-    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, intro)
+    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, about("gains"))
 
 
 def outcome(each: ParameterTest) -> str:
@@ -146,17 +140,10 @@ def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
 
 def _pairs(found: Calibration) -> list[str]:
     """Name what is correlated by more than 0.95."""
-
-    def some(photos: Sequence[str]) -> str:
-        more = f" and {len(photos) - NAMED} others" if len(photos) > NAMED else ""
-        return f"photo {', '.join(photos[:NAMED])}{more}"
-
-    alike = [(f"{each.first} and {each.second}", each.coefficient) for each in found.correlations]
-    alike += [
-        (f"{each.parameter} and {each.component} of {some(each.photos)}", each.coefficient)
-        for each in found.poses
+    return [
+        *(about("correlated", **vars(each)) for each in found.correlations),
+        *(about("correlated.pose", **vars(each)) for each in found.poses),
     ]
-    return [f"{both} are correlated by {coefficient:.4f}" for both, coefficient in alike]
 
 
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
@@ -178,12 +165,8 @@ def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
             for name, head in heads.items()
         ),
     ]
-    note = (
-        f"Radial distortion, added to {added} coordinates, over the {added} radius up to"
-        f" {curve.observed:.4g} {unit}. The mapping is curve and principal distance together. The balanced"
-        f" curve is zero at {curve.balanced_at:.4g} {unit}, with a principal distance of"
-        f" {curve.balanced_distance:.7g} {unit}."
-    )
+    sizes = {"observed": curve.observed, "zero": curve.balanced_at, "distance": curve.balanced_distance}
+    note = about("curve", added=added, unit=unit, **sizes)
     return Table(f"distortion-{camera}", f"Radial distortion of {camera}", columns, note, shown=rows)
 
 

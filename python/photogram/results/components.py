@@ -13,7 +13,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import judged
 from photogram.show.methods import Brief, Documented, Judged
-from photogram.show.page import Document, Drawing, Part, Remarks, Section
+from photogram.show.page import Document, Drawing, Part, Remarks, Section, about
 from photogram.show.quantity import Quantity, Table, column, members, of_each, records
 from photogram.show.sketch.marks import Line, Mark, Markers, Panel
 from photogram.show.sketch.plot import Plot
@@ -149,19 +149,14 @@ def weighed_document(found: VarianceComponents, network: Document) -> Document:
 
 def components_section(found: VarianceComponents) -> Section:
     """Return the section: which standard deviations are wrong, factors with their intervals."""
-    caption = "Factors of the given standard deviations with their intervals (95 percent)."
     parts: list[Part] = [
         Remarks([*map(str, statement(found))]),
-        Drawing("picture-components", "Variance components", caption, found.plot),
+        Drawing("picture-components", "Variance components", about("components.caption"), found.plot),
         components_table(found),
     ]
     if found.estimate.messages:
         parts.append(Remarks([*map(str, found.estimate.messages)]))
-    intro = (
-        "Factors of the standard deviations of groups of observations, estimated from the residuals. The"
-        " adjustment has the given weights."
-    )
-    return Section("components", "Variance components", parts, intro)
+    return Section("components", "Variance components", parts, about("components"))
 
 
 def components_table(found: VarianceComponents) -> Table:
@@ -189,8 +184,7 @@ def components_table(found: VarianceComponents) -> Table:
         of_each(rows, "held", kind="name", name="held"),
         Quantity(outcomes, kind="name", head="Outcome"),
     ]
-    note = "The interval holds the true component with 95 percent: the factor of the variance."
-    return Table("components", "Components", columns, note)
+    return Table("components", "Components", columns, about("components.interval"))
 
 
 def statement(found: VarianceComponents) -> list[Phrase]:

@@ -39,9 +39,9 @@ from photogram.results.tables import (
     unheld,
     unknowns,
 )
-from photogram.results.trajectories import POSES, notable, trajectories_table
+from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.page import Document, Fact, Section, about, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite
 def block_document(result: Result) -> Document:
-    pictures, (about, figures) = drawings(result), bandwidths(result)
+    pictures, (head, figures) = drawings(result), bandwidths(result)
     given = [
         control_section(result, unheld(result)),
         check_section(result),
@@ -60,13 +60,8 @@ def block_document(result: Result) -> Document:
         films_section(result, pictures["films"]),
         _unknowns_section(result),
     ]
-    note = (
-        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
-        " multiplied by to agree, if the others are right."
-    )
     title, columns = "Redundancy by kind of observation", redundancy_by_kind(result)
-    redundancy, datum = Table("redundancy-by-kind", title, columns, note), result.datum
-    refer = "Datum:" if datum.is_chosen else "Coordinates and standard deviations refer to the datum that is"
+    redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
     return network_document(
         result,
         "Adjustment of a block of photos",
@@ -77,10 +72,10 @@ def block_document(result: Result) -> Document:
         more=_accuracy(result),
         redundancy=[redundancy] if redundancy.visible else [],
         beside=[features_section(result.features, pictures["features"])],
-        datum=f"{refer} {datum}.",
-        poses=POSES if result.block.timed else "",
+        datum=about(f"datum.{'chosen' if datum.is_chosen else 'given'}", datum=datum.phrase),
+        poses=about("poses") if result.block.timed else "",
         details=[gains_section(result)],
-        work=[Fact(f"Bandwidth {name}", value, note=about) for name, value in figures],
+        work=[Fact(f"Bandwidth {name}", value, note=head) for name, value in figures],
     )
 
 
@@ -111,7 +106,7 @@ def _size_section(result: Result) -> Section:
         note = ", ".join(f"{count}: {reason}" for reason, count in reasons)
         more.append(Fact("Points left out", f"{len(result.dropped)}", note=note))
     value = f"{variance:.6f}" if variance is not None else "undefined"
-    good = [Fact("Variance of unit weight", value, note=_BASIS[result.unit_variance])]
+    good = [Fact("Variance of unit weight", value, note=about(f"unit-variance.{result.unit_variance}"))]
     sums = result.sums_of_squares
     groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
     groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
@@ -126,24 +121,14 @@ def _size_section(result: Result) -> Section:
     return size_section(result, size_of(result), more, good)
 
 
-_BASIS = {
-    "free": "rule of 1987: the weights of photos and cameras do not count",
-    "constrained": "of all weighted values, those of photos and cameras among them",
-    "unity": "set to 1",
-    "redundancy": "based on redundancy numbers",
-}
-
-
 def _unknowns_section(result: Result) -> Section:
     if not result.unknowns:
         return Section("unknowns", "Common unknowns", [])
-    intro = (
-        "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common;"
-        " clocks, readout times and coefficients of trajectories."
-    )
     shown, note = notable(result.unknowns)
     tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
-    return Section("unknowns", "Common unknowns", [table for table in tables if table.visible], intro)
+    return Section(
+        "unknowns", "Common unknowns", [table for table in tables if table.visible], about("unknowns")
+    )
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:

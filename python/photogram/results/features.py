@@ -15,7 +15,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.show import quantity
-from photogram.show.page import Drawing, Part, Section, Text
+from photogram.show.page import Drawing, Part, Section, Text, about
 from photogram.show.quantity import Axis, Table, members, of_each
 from photogram.statistics.distributions import LEVEL
 from photogram.words import Phrase, phrase
@@ -262,11 +262,7 @@ def features_section(features: Features | None, picture: Drawing | None = None) 
         parts.append(Table("forms", "Whether form is more than errors of points", forms))
         parts += [] if picture is None else [picture]
     parts += [Text(each) for each in features.remarks]
-    intro = (
-        "Least-squares features through adjusted points, with what follows from the joint covariance of the"
-        " points. T compares the deviations of the points from the feature with their standard deviations."
-    )
-    return Section("features", "Features", parts, intro)
+    return Section("features", "Features", parts, about("features"))
 
 
 def through(feature: Feature) -> Phrase:

@@ -14,7 +14,7 @@ from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION, observations_of_core
-from photogram.show.page import Drawing, Part, Section
+from photogram.show.page import Drawing, Part, Section, about
 from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each, of_each
 
 if TYPE_CHECKING:
@@ -257,28 +257,16 @@ def scanner_table(result: Result) -> list[Quantity]:
 def films_section(result: Result, drawing: Drawing) -> Section:
     if not result.films:
         return Section("films", "Film and fiducials", [])
-    intro = (
-        "Where films lay and how their size has changed, the form of six numbers that other programs have,"
-        " and marks of cameras: what a certificate was moved by, and what their readings leave."
-    )
-    form = (
-        "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm); the scanner is errorless in"
-        " standard deviations."
-    )
-    scales = (
-        "Scales are mm of the film in a mm of the camera; between axes is the angle between their images less"
-        " 90 degrees."
-    )
     photos, *rest = form_table(result)
     numbers, said = rest[:2], rest[2:]
-    lost = "Lost are marks that were read on other photos. T is that of both coordinates of a reading."
-    marks = "Mean residuals are in the frame of the camera, of all photos."
     parts: list[Part] = [
-        Table("films", "Films", film_table(result), lost),
-        Table("film-forms", "The same as six numbers", [photos, *numbers], form),
-        Table("film-scales", "Scales, angle between the axes, rotation", [photos, *said], scales),
+        Table("films", "Films", film_table(result), about("films")),
+        Table("film-forms", "The same as six numbers", [photos, *numbers], about("film-forms")),
+        Table(
+            "film-scales", "Scales, angle between the axes, rotation", [photos, *said], about("film-scales")
+        ),
         drawing,
-        Table("fiducials", "Fiducial marks", mark_table(result), marks),
+        Table("fiducials", "Fiducial marks", mark_table(result), about("fiducials")),
         Table("scanners", "Scanners", scanner_table(result)),
     ]
-    return Section("films", "Film and fiducials", parts, intro)
+    return Section("films", "Film and fiducials", parts, about("film-and-fiducials"))

@@ -32,19 +32,11 @@ from photogram.results.tests import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
-from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, about, significant
 from photogram.show.quantity import Quantities, Quantity, members, records
 from photogram.statistics.evidence import GLOBAL
 from photogram.words import phrase
 
-ORDERINGS = {
-    "input": "in input order",
-    "rcm": "by reverse Cuthill-McKee",
-    "amd": "by minimum degree",
-    "dissection": "by nested dissection",
-    "graph-dissection": "by dissection of the graph",
-    "parts": "in parts, and the separators between them",
-}
 NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
 WORST = 25  # Observations in the table of the worst
@@ -81,20 +73,7 @@ def network_document(
     for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
         link = table.columns[0].link
         rows += [] if link is None else link.rows.tolist()
-    intro = (
-        "The redundancy number of an observation is the share of its error that shows in its own"
-        " residual; the rest"
-        " goes into the unknowns. Their sum is the number of observations beyond what is needed."
-    )
-    intro_of_worst = (
-        "A residual alone says little: an error shows in it only by the share of its redundancy number. The"
-        " test value considers both. Names of photos and points lead to their rows below."
-    )
-    intro_of_tests = (
-        "How the residuals agree with the standard deviations that were given, as a whole and one by one."
-    )
-    note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
-    iteration_table = quantity.Table("iterations", "Iterations", iterations(result), note)
+    iteration_table = quantity.Table("iterations", "Iterations", iterations(result), about("iterations"))
     course = [Fact("Status", result.status)]
     if result.loss is not None:
         course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
@@ -112,10 +91,10 @@ def network_document(
             *beside,
             size,
             Section("residuals", "Image residuals", [pictures["residuals"]]),
-            Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
+            Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], about("redundancy")),
             Section("reliability", "Reliability", reliability),
-            Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], intro_of_tests),
-            Section("worst", "Worst observations", _worst_table(tests, worst), intro_of_worst),
+            Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], about("tests")),
+            Section("worst", "Worst observations", _worst_table(tests, worst), about("worst")),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
@@ -271,19 +250,17 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
         Quantity(largest, head="Largest"),
         Quantity(units, kind="name", head="Unit"),
     ]
-    note = "A posteriori: scaled by the unit variance where that is estimated."
-    return [quantity.Table("precision", "Precision", columns, note)]
+    return [quantity.Table("precision", "Precision", columns, about("precision"))]
 
 
 def _work(result: AdjustedNetwork) -> list[Fact]:
     """Return the order of elimination, and numbers of operations, also of other orders."""
-    ordering = ORDERINGS.get(result.ordering, result.ordering)
     return [
-        Fact("Photos eliminated", ordering),
+        Fact("Photos eliminated", about(f"ordering.{result.ordering}")),
         Fact("Normal equations formed", f"{result.formations}", note="times"),
         *(
             Fact(
-                f"Multiply-adds if eliminated {ORDERINGS.get(name, name)}",
+                f"Multiply-adds if eliminated {about(f'ordering.{name}')}",
                 "too large for this ordering" if math.isnan(count) else f"{count:.3e}",
             )
             for name, count in result.predictions.items()
@@ -303,60 +280,23 @@ def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
         image = each.type == "image"
         names.append(f"image {each.axes[part].name}" if image else str(each.name((row, part))))
     count = sum(int(np.count_nonzero(np.abs(each.values) > NOTABLE)) for each in tests.components)
-    note = (
-        f"The {len(places)} of the largest test values; {count} exceed {NOTABLE:g} in size. Marked"
-        " observations are the outliers of the verdict: the section Tests has the limits."
-    )
+    note = about("worst-observations", n=len(places), count=count, limit=NOTABLE)
     columns = [Quantity(names, kind="name", head="Observation")]
     columns += [each for each in tests.columns(places) if each.name != "component"]
     return [quantity.Table("worst", "Worst observations", columns, note)]
 
 
-CAPTIONS = {
-    "network": (
-        "Plan of the network",
-        "Photos with what they show, points by their number of rays, control and check points with their"
-        " differences, and error ellipses (95 percent). What is enlarged has a scale bar.",
-    ),
-    "residuals": (
-        "Image residuals over the frame",
-        "Observed minus computed, camera by camera: one by one, or the means of cells where there are many."
-        " Arrows that point alike in one part of the frame are what the camera model does not explain.",
-    ),
-    "redundancy": (
-        "Redundancy over the frame and over the network",
-        "Where the network checks itself, and where not: dark places have errors that nobody sees.",
-    ),
-    "tests": (
-        "Test values against the normal distribution",
-        "Left the histogram, right the ordered test values over those expected: they lie on the line where"
-        " the standard deviations are right, on a steeper one where these are too small; single ones"
-        " away from it"
-        " are gross errors.",
-    ),
-    "correlations": (
-        "Correlations of the parameters of cameras",
-        "Strong colours away from the diagonal: parameters that the network can hardly tell apart.",
-    ),
-    "distortion": (
-        "Radial distortion with its standard deviations",
-        "The curve, dashed where no image lies; where it is estimated, with one standard deviation beside.",
-    ),
-    "features": (
-        "Deviations of points from their features",
-        "Outside positive, of a plane on the side of its normal; bars are U to either side.",
-    ),
-    "films": (
-        "Residuals of fiducial marks, and patterns of films",
-        "Means over all photos, in the frame of the camera: marks that stay off on all of them are those of"
-        " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
-    ),
-}
+PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
 
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
     return {
-        name: Drawing(f"picture-{name}", *words, partial(sketch_of, result, name))
-        for name, words in CAPTIONS.items()
+        name: Drawing(
+            f"picture-{name}",
+            about(f"{name}.title"),
+            about(f"{name}.caption"),
+            partial(sketch_of, result, name),
+        )
+        for name in PICTURES
     }

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.messages import counted, listed
 from photogram.results.axes import Determined, Terms, point_axes
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
@@ -24,7 +23,7 @@ from photogram.results.network_tables import (
 )
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
-from photogram.show.page import Layers, Part, Section, Text, layered_tables
+from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
 from photogram.show.quantity import Quantity, Table, named
 
 if TYPE_CHECKING:
@@ -55,18 +54,13 @@ def weakest_points(result: AdjustedNetwork) -> Table:
     worst = order[~np.isnan(ratio[order])][:WORST]
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     rows = np.array(list(dict.fromkeys(chosen))[:WORST], dtype=np.int64)
-    note = (
-        "The ratio of the standard deviations is in any directions: above 10,000 rays are nearly parallel."
-        " The distance is that from the nearest station, in the median of such distances: a point below 0.001"
-        " is at the station itself."
-    )
     columns = [
         names(result._terms(), "point", rows, "point"),
         Quantity(ratio[rows], member="ratio", head="Largest over smallest sd", figures=4),
         Quantity(distance[rows], member="distance", head="Distance", figures=4),
         Quantity(result.point_rays[rows], member="rays", head="Rays", decimals=0),
     ]
-    return Table("weakest-points", "Weakest points", columns, note)
+    return Table("weakest-points", "Weakest points", columns, about("weakest-points"))
 
 
 @np.errstate(all="ignore")
@@ -85,13 +79,12 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
     condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
     order = np.argsort(-condition, kind="stable")[:WORST]
     rows = np.flatnonzero(known)[order]
-    note = "Condition of the covariance matrix of position and attitude, scaled to a diagonal of ones."
     columns = [
         names(result._terms(), "photo", rows, "photo"),
         Quantity(condition[order], member="condition", head="Condition", figures=4),
         Quantity(images[rows], member="images", head="Images", decimals=0),
     ]
-    return Table("weakest-photos", "Weakest photos", columns, note)
+    return Table("weakest-photos", "Weakest photos", columns, about("weakest-photos"))
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
@@ -143,8 +136,7 @@ def component_table(
         return []
     sizes = np.abs(tests[there])
     rows = np.sort(np.argsort(np.where(np.isnan(sizes), 1.0, -sizes), kind="stable")[:COMPONENTS])
-    some = f"The {len(rows)} of {len(places)} components with the largest test values."
-    note = "" if len(rows) == len(places) else some
+    note = "" if len(rows) == len(places) else about("components.largest", n=len(rows), all=len(places))
     by = None if deviations is None else np.where(there, deviations, np.nan)
     return [Table(key, title, columns, note, deviations=by, shown=places[rows])]
 
@@ -160,34 +152,22 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
     tables = component_table("control", "Control points", columns, there, own.standardized, sd)
     if free:
         tables += _compared("unheld", "Components of control that are not held", free)
-    intro = (
-        "What was given for the control points, and what the adjustment made of it. A component with a"
-        " redundancy number near 0 is not checked by the rest of the network: an error of it goes into the"
-        " result unseen."
-    )
     parts: list[Part] = [*tables]
     if held.any():
         fixed = [str(name) for name in np.asarray(columns[0].values)[held]]
-        count = counted(len(fixed), "point")
-        parts.append(Text(f"{count} held where given, which nothing tests, are not listed: {listed(fixed)}."))
-    return Section("control", "Control points", parts, intro)
+        parts.append(Text(about("control.fixed", n=len(fixed), names=fixed)))
+    return Section("control", "Control points", parts, about("control"))
 
 
 def check_section(result: Result) -> Section:
     columns = check_points(result)
     tables = _compared("check_points", "Check points one by one", columns)
     parts = [_check_summary(result), *tables, _check_tests(result, columns)] if tables else []
-    intro = (
-        "Points with known coordinates that took no part in the adjustment: the independent proof of"
-        " its accuracy."
-        " The test value is the difference over its standard deviation: that of the adjusted coordinate and"
-        " that of the given one together."
-    )
+    intro = about("check-points")
     checks = result.check_points
     if checks.assumed.any():
         assumed = [result.block.point_ids[row] for row in checks.rows[checks.assumed].tolist()]
-        count = counted(len(assumed), "point")
-        intro += f" The given standard deviations of {count} are assumed: {listed(assumed)}."
+        intro += f" {about('check-points.assumed', n=len(assumed), names=assumed)}"
     return Section("check-points", "Check points", parts, intro)
 
 
@@ -216,8 +196,7 @@ def _check_summary(result: Result) -> Table:
         Quantity(np.sqrt(mean(sd**2)), head="rms of sd"),
         Quantity(np.sqrt(mean((d / sd) ** 2)), head="rms of test values", decimals=2),
     ]
-    note = "Test values have an rms of about 1 where the standard deviations are right."
-    return Table("check-summary", "Check points together", columns, note)
+    return Table("check-summary", "Check points together", columns, about("check-summary"))
 
 
 def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
@@ -257,8 +236,9 @@ def beside_section(result: Result) -> Section:
             key, title = f"observations-{kind}", kind[:1].upper() + kind[1:]
             there, columns = np.isfinite(observed.residuals), observations(observed)
             tables += component_table(key, title, columns, there, observed.standardized)
-    intro = "Observations beside images: observed minus adjusted, with their tests."
-    return Section("observations", "Other observations", layered_tables("beside", tables), intro)
+    return Section(
+        "observations", "Other observations", layered_tables("beside", tables), about("observations")
+    )
 
 
 def images_section(result: AdjustedNetwork) -> Section:
@@ -269,20 +249,18 @@ def images_section(result: AdjustedNetwork) -> Section:
     rows = np.arange(len(sizes))
     if len(sizes) > IMAGES:
         rows = np.sort(np.argpartition(-sizes, IMAGES)[:IMAGES])
-    some = f"The {len(rows)} of {len(sizes)} with the largest test values. The table of images has all."
-    note = "" if len(rows) == len(sizes) else some
+    note = "" if len(rows) == len(sizes) else about("images.largest", n=len(rows), all=len(sizes))
     columns[2:] = [
         replace(residuals, head="Residual {}", decimals=2),
         replace(redundancy, head="Redundancy {}"),
         replace(tests, head="w {}"),
     ]
     table = Table("images", "Image observations", columns, note, shown=rows)
-    about = "Observed minus computed; w is the residual over its standard deviation, a priori unit weight."
-    return Section("images", "Image observations", [table] if len(rows) else [], about)
+    return Section("images", "Image observations", [table] if len(rows) else [], about("images"))
 
 
 def _chosen_rows(
-    kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices], worst: str
+    kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices]
 ) -> tuple[Indices, str]:
     """Return which photos or points have a row, and the note on those without one.
 
@@ -294,17 +272,14 @@ def _chosen_rows(
     for order in orders:
         rows |= dict.fromkeys(order[: max(SOME // len(orders), 1)].tolist())
     shown = np.intersect1d(every, np.array(list(rows), dtype=np.int64))
-    count = f"{len(shown)} of {len(every)}"
-    some = f"those that other tables name, {worst}, and the weakest. The table of {kind} has all."
-    return shown, f"{count}: {some}"
+    return shown, about(f"{kind}.chosen", n=len(shown), all=len(every))
 
 
 def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
     """Return photos, those of `others` first: their unknowns, and how their images fit, in layers."""
     terms, fit = result._terms(), _fit_of_photos(result, result._terms())
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
-    worst = "the largest residuals and test values"
-    rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders, worst)
+    rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders)
     own, *_, values, sd = photos(result)
     tables = []
     for caption, of in terms.layers.items():
@@ -357,7 +332,7 @@ def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
-    rows, note = _chosen_rows("points", used, others, [order], "those of the largest sd")
+    rows, note = _chosen_rows("points", used, others, [order])
     by = result.point_sd[used] if terms.split else None
     columns = [*points(result), *plan_deviations(terms, result.point_sd[used])]
     table = Table("points", "Points", columns, note, "", by, np.searchsorted(used, rows))

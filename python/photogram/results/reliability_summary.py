@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.reliability import Inseparable, Reliability
-from photogram.show.page import Part, Remarks
+from photogram.show.page import Part, Remarks, about
 from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests
@@ -56,21 +56,16 @@ class ReliabilitySummary:
         return self.tests.testable(self.suspects.row_starts)
 
     def kinds_table(self) -> Table:
-        note = (
-            "No other observation checks the unchecked groups. An error of a one-sided group shows in no"
-            " residual if it has some direction."
-        )
+        note = about("reliability-kinds")
         return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of the weakest observations; `unit` is that of the object space."""
         *columns, own_point = self.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
-        about = (
-            f"Tests of the level {self.level:g} find the detectable errors in {100 * self.power:.0f} of 100"
-            f" cases, unit weight {'known' if self.known else 'estimated'}. They are the largest."
-        )
-        return Table("reliability-weakest", "Largest undetected errors", columns, about)
+        weight = "known" if self.known else "estimated"
+        note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
+        return Table("reliability-weakest", "Largest undetected errors", columns, note)
 
     def table(self) -> pd.DataFrame:
         """Return the weakest observations as a data frame."""

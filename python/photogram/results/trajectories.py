@@ -285,11 +285,6 @@ def _observed(
     return own
 
 
-POSES = (
-    "Of photos on trajectories these are the poses at their own times; of scanners without one, in the middle"
-    " of their images."
-)
-
 STEPS = 8  # Places in each interval of knots, or for each coefficient of a polynomial
 COEFFICIENTS = 24  # Number up to which all coefficients are listed
 NOTABLE = 3.0  # Test value from which coefficients of longer lists are listed
@@ -301,7 +296,8 @@ def trajectories_table(result: Result) -> Table:
 
     They are in the order of the block, of many those with the largest test values.
     """
-    from photogram.show.quantity import Axis, Quantity, Table  # an adjustment needs no tables
+    from photogram.show.page import about  # an adjustment needs no tables
+    from photogram.show.quantity import Axis, Quantity, Table
 
     # By names: those of photos of their own are made anew with their block.
     adjusted = {(each.kind, each.name): each for each in result.unknowns}
@@ -313,9 +309,9 @@ def trajectories_table(result: Result) -> Table:
         )
         if basis is not None
     ]
-    note = "The largest correction in the span of the table, and its time."
+    note = about("trajectories")
     if len(rows) > LISTED:
-        note = f"{LISTED} of {len(rows)}, with the largest test values; the table of unknowns has all."
+        note = about("trajectories.chosen", n=LISTED, all=len(rows))
         order = sorted(range(len(rows)), key=lambda row: -np.nan_to_num(rows[row][-1]))[:LISTED]
         rows = [rows[row] for row in sorted(order)]
     names, parts, bases, count, first, last, largest, at, tests = (

@@ -345,14 +345,18 @@ def _figures(statement: Statement) -> list[Part]:
         " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)
         for *_, predicted in shown
     ]
+    # Of parts that standards have: RMSE of the survey, and combined with that of the differences.
+    of_parts = {"plan": (own.rmse_h2, own.rmse_h), "h": (own.rmse_v2, own.rmse_v)}
+    of_parts["all"] = math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
+    surveys = [of_parts.get(part, (math.nan, math.nan)) for part, *_ in shown]
     quantities = [
         columns.text("component", [texts(f"component.{part}") for part, *_ in shown]),
         columns.number("n", [sized.n for _, sized, _ in shown]),
         *(number(key, [getattr(sized, key) for _, sized, _ in shown]) for key in ("mean", "sd", "rmse")),
         columns.text("interval", intervals),
         number("predicted", [predicted.predicted_rmse for *_, predicted in shown]),
-        number("survey", [_survey_rmse(own, part)[0] for part, *_ in shown]),
-        number("combined", [_survey_rmse(own, part)[1] for part, *_ in shown]),
+        number("survey", [survey for survey, _ in surveys]),
+        number("combined", [combined for _, combined in surveys]),
         number("largest", [sized.largest for _, sized, _ in shown]),
         columns.text("point", [sized.point for _, sized, _ in shown]),
     ]
@@ -368,17 +372,6 @@ def _figures(statement: Statement) -> list[Part]:
         outcomes = [texts(f"asprs.verdict.{verdicts[name]}") if name in verdicts else "" for name in names]
         quantities.append(columns.text("verdict", outcomes))
     return [Table("figures", texts("table.figures", unit=texts.unit), quantities)]
-
-
-def _survey_rmse(own: Figures, part: str) -> tuple[float, float]:
-    """Return RMSE of the survey, and combined with what was statement, of parts that standards have."""
-    if part == "plan":
-        return own.rmse_h2, own.rmse_h
-    if part == "h":
-        return own.rmse_v2, own.rmse_v
-    if part == "all":
-        return math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
-    return math.nan, math.nan
 
 
 def _notes(statement: Statement) -> list[Text]:
