@@ -38,7 +38,12 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     remarks = [
         f"{each.camera.name}: {sentence}"
         for each in shown
-        for sentence in (*_pairs(each), *_field_remarks(result, each), *each.remarks())
+        for sentence in (
+            *(about("correlated", **vars(pair)) for pair in each.correlations),
+            *(about("correlated.pose", **vars(pair)) for pair in each.poses),
+            *_field_remarks(result, each),
+            *each.remarks(),
+        )
     ]
     parts += [Remarks(remarks)] if remarks else []
     held = [each for each in result.cameras if each.given.is_held]
@@ -136,14 +141,6 @@ def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
         of_each(every, "outcome", kind="name", head="Outcome"),
     ]
     return Table("camera-groups", "Terms of the lens tested together", columns)
-
-
-def _pairs(found: Calibration) -> list[str]:
-    """Name what is correlated by more than 0.95."""
-    return [
-        *(about("correlated", **vars(each)) for each in found.correlations),
-        *(about("correlated.pose", **vars(each)) for each in found.poses),
-    ]
 
 
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:

@@ -107,7 +107,10 @@ def datum_of(
     """Return the datum of what the core found: that of inner constraints or, without, what it held."""
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
-    own += _held_coefficients(block, solution)
+    for number, component in sorted(solution.datum_unknowns):  # Of coefficients of trajectories
+        each = block.unknowns[number]
+        turn = "rotation " if isinstance(each, RotationCoefficient) else ""
+        own += ((each.name, turn + each.components[component]),)
     if row is None:
         given = "minimal control" if solution.minimal_control else "observations"
         return ResultDatum("minimum constraints" if own else given, own)
@@ -124,20 +127,6 @@ def datum_of(
         attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,
     )
-
-
-def _held_coefficients(block: Block, solution: BlockSolution) -> tuple[tuple[str, str], ...]:
-    """Return the coefficients of trajectories that are held, each with the name of one of its unknowns."""
-    if not solution.datum_unknowns:
-        return ()
-    unknowns = block.unknowns
-
-    def named(row: int, number: int) -> tuple[str, str]:
-        own = unknowns[row]
-        turn = "rotation " if isinstance(own, RotationCoefficient) else ""
-        return own.name, turn + own.components[number]
-
-    return tuple(named(row, number) for row, number in sorted(solution.datum_unknowns))
 
 
 def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:

@@ -186,6 +186,8 @@ def _differences(result: Result, values: Iterable[float]) -> list[str]:
 
 def block_members(result: Result) -> dict[str, Any]:
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
+    test = result.global_test
+    side = None if test is None else "high" if test.rejected_high else "low" if test.rejected_low else None
     of_photos = (
         Quantity(covariances[:, place, place], member="position_covariance"),
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
@@ -211,7 +213,8 @@ def block_members(result: Result) -> dict[str, Any]:
         "weighted_sum_of_squares": members(result.sums_of_squares, *_SUMS),
         "redundancy": result.redundancies and members(result.redundancies, *_SUMS),
         "unit_variance": result.unit_variance,
-        "global_test": _global_test(result),
+        "global_test": test
+        and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
         **_of_some(result),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),
@@ -284,11 +287,3 @@ def _beside_images(result: Result) -> list[dict[str, Any]]:
         ]
         found += records([*chosen(observations(each), rows), *own])
     return found
-
-
-def _global_test(result: Result) -> dict[str, Any] | None:
-    test = result.global_test
-    if test is None:
-        return None
-    rejected = "high" if test.rejected_high else "low" if test.rejected_low else None
-    return members(test, "variance", "limits", "level", "probability") | {"rejected": rejected}

@@ -49,26 +49,20 @@ def mark_residuals(result: Result) -> MarkResiduals:
         place = marks[each.mark.name].position[np.newaxis, :2]
         _, partials = _photocore.film_readings(each.film.numbers(), numbers, place)
         xy[k] = np.linalg.solve(partials[0, :, :2], kind.residuals[k])
+    tests, summary = np.full(len(read), np.nan), result.reliability_summary
+    if summary is not None and read:
+        places = {id(each): k for k, each in enumerate(read)}
+        core, testable = observations_of_core(result.block), summary.testable
+        for group in np.flatnonzero(summary.suspects.kinds == OBSERVATION).tolist():
+            own = places.get(id(core[summary.suspects.subjects[group]]))
+            if own is not None and testable[group]:
+                tests[own] = summary.tests.statistic[group]
     return MarkResiduals(
         np.array([photos[each.photo] for each in read], dtype=np.int64),
         tuple(each.mark.name for each in read),
         xy,
-        _tests(result, read),
+        tests,
     )
-
-
-def _tests(result: Result, read: list[Fiducial]) -> Floats:
-    """Return T of readings; NaN where they were not tested."""
-    summary, found = result.reliability_summary, np.full(len(read), np.nan)
-    if summary is None or not read:
-        return found
-    place = {id(each): k for k, each in enumerate(read)}
-    core, testable = observations_of_core(result.block), summary.testable
-    for group in np.flatnonzero(summary.suspects.kinds == OBSERVATION).tolist():
-        k = place.get(id(core[summary.suspects.subjects[group]]))
-        if k is not None and testable[group]:
-            found[k] = summary.tests.statistic[group]
-    return found
 
 
 def mean_mark_residuals(result: Result) -> list[VectorField]:

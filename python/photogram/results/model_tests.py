@@ -284,7 +284,12 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
         larger = [each for each in names if _is_within(results[small], results[each])]
         if larger:
             large = min(larger, key=lambda each: _count(results[each]))
-            nested.append(_nested(small, results[small], large, results[large], taken))
+            omega = [results[each].sums_of_squares.total for each in (small, large)]
+            freedom = [_all_freedom(results[each]) for each in (small, large)]
+            k, statistic = freedom[0] - freedom[1], omega[0] - omega[1]
+            scale = 1.0 if taken else omega[1] / freedom[1]
+            p = _probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
+            nested.append((small, large, statistic, k, p))
     return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
 
 
@@ -420,18 +425,6 @@ def _is_within(small: Result, large: Result) -> bool:
         a.given.model == b.given.model and set(a.estimated) <= set(b.estimated)
         for a, b in zip(small.cameras, large.cameras, strict=True)
     )
-
-
-def _nested(
-    small: str, first: Result, large: str, second: Result, known: bool
-) -> tuple[str, str, float, int, float]:
-    omega = [each.sums_of_squares.total for each in (first, second)]
-    freedom = [_all_freedom(each) for each in (first, second)]
-    k = freedom[0] - freedom[1]
-    statistic = omega[0] - omega[1]
-    scale = 1.0 if known else omega[1] / freedom[1]
-    probability = _probability(max(statistic, 0.0) / scale, k, math.inf if known else freedom[1])
-    return small, large, statistic, k, probability
 
 
 check_arguments(globals(), ["compare", "score_test", "terms_test"])

@@ -153,7 +153,12 @@ class NetworkTrial:
         for group, point in zip(groups, points, strict=True):
             own: tuple[list[int], Floats, Floats] = next(on_points) if point >= 0 else ([], None, None)  # type: ignore[assignment]
             if own[0]:
-                found.append(self._without_out(*own))
+                of_point, values, response = own
+                rows = np.concatenate([self.suspects.rows(each) for each in of_point])
+                out = np.isnan(self._tests["residual"][rows])
+                response[out] = 0.0
+                response[:, out] = 0.0
+                found.append((of_point, np.where(out, 0.0, values), response))
             else:
                 residuals = np.nan_to_num(self._tests["residual"][self.suspects.rows(group)])
                 found.append(([group], residuals, self.own_block(group)))
@@ -166,15 +171,6 @@ class NetworkTrial:
         them.
         """
         return self.core.on_points(list(points), gone=True)
-
-    def _without_out(
-        self, groups: list[int], residuals: Floats, response: Floats
-    ) -> tuple[list[int], Floats, Floats]:
-        rows = np.concatenate([self.suspects.rows(group) for group in groups])
-        out = np.isnan(self._tests["residual"][rows])
-        response[out] = 0.0
-        response[:, out] = 0.0
-        return groups, np.where(out, 0.0, residuals), response
 
     def own_block(self, group: int) -> Floats:
         """Return R of a group."""

@@ -117,6 +117,11 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     # Of the survey against the datum: what cancels in the differences counts, too.
     survey, own = found.survey_sd**2 + found.common_sd**2, d[in_plan, :2]
     moments = own.T @ own / len(own) if len(own) else np.full((2, 2), np.nan)
+    of_moments, finite = dict[str, float](), np.isfinite(moments).all()
+    for p in PROBABILITIES:
+        circular = float(circular_error(moments[np.newaxis], p)[0]) if finite else math.nan
+        linear = root_mean(heights**2) * critical_normal(1.0 - p)
+        of_moments |= {f"ce{round(100 * p)}": circular, f"le{round(100 * p)}": linear}
     blocks = found.blocks(found.product)
     ellipses, sd = blocks[in_plan, :2, :2], np.sqrt(blocks[in_height, 2, 2])
     tests = point_tests(found)
@@ -133,7 +138,7 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
         inside=_inside(tests, in_height),
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
         moments=moments,
-        of_moments=_of_moments(moments, root_mean(heights**2)),
+        of_moments=of_moments,
         mixture={
             "ce90": mixture_circular(ellipses, 0.9) if len(ellipses) else math.nan,
             "le90": mixture_linear(sd, 0.9) if len(sd) else math.nan,
@@ -181,12 +186,4 @@ def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
             largest = None if upper is None else float(np.sort(values)[upper - 1])
             own = Radius(*sample_radius(values, p), upper, largest) if len(values) else None
             found[f"{name}{round(100 * p)}"] = own
-    return found
-
-
-def _of_moments(moments: Floats, height: float) -> dict[str, float]:
-    found, known = dict[str, float](), np.isfinite(moments).all()
-    for p in PROBABILITIES:
-        circular = float(circular_error(moments[np.newaxis], p)[0]) if known else math.nan
-        found |= {f"ce{round(100 * p)}": circular, f"le{round(100 * p)}": height * critical_normal(1.0 - p)}
     return found
