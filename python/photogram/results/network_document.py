@@ -23,7 +23,7 @@ from photogram.results.network_sections import (
 from photogram.results.network_tables import (
     control,
     images,
-    iterations,
+    iteration_table,
     photos,
     points,
     stations,
@@ -73,7 +73,8 @@ def network_document(
     for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
         link = table.columns[0].link
         rows += [] if link is None else link.rows.tolist()
-    iteration_table = quantity.Table("iterations", "Iterations", iterations(result), about("iterations"))
+    history = iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
+    course_table = quantity.Table("iterations", "Iterations", history, about("iterations"))
     course = [Fact("Status", result.status)]
     if result.loss is not None:
         course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
@@ -99,7 +100,7 @@ def network_document(
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
             Section("weakest", "Weakest points and photos", [table for table in weakest if table.visible]),
-            Section("iterations", "Iterations", [iteration_table, Facts("Course", course)]),
+            Section("iterations", "Iterations", [course_table, Facts("Course", course)]),
         ],
         details=[
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
@@ -141,7 +142,7 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
-        "iterations": records(iterations(result))[1:],
+        "iterations": records(iteration_table(result.iterations)),
         "photos": records([*photos(result), *photo_members, of_photos]),
         "points": records([*points(result), of_points]),
         "observations": records([*images(result), *([weights] if result.loss else [])]),
