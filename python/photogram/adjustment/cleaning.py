@@ -27,8 +27,6 @@ from photogram.show.page import Document, Part, Remarks, Section
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
 
-__all__ = ["Cleaned", "clean"]
-
 MOST_ROUNDS = 3  # Of components and snooping
 STANDS = 0.05  # Components that change by less are the same
 
