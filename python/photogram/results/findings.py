@@ -52,7 +52,7 @@ def network_findings(
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
-        computed=has_redundancy(result),
+        computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
         snooped=result.snooped,
         remarks=[*unseen(result), *_assumptions(result)],
@@ -179,11 +179,6 @@ def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
     summary = result.reliability_summary
     names = [] if summary is None else [each.name for each in summary.hypotheses.assumptions]
     return [Phrase("line.datum-assumed", {"errors": names})] if names else []
-
-
-def has_redundancy(result: AdjustedNetwork) -> bool:
-    """Return whether redundancy numbers were computed, without which no observation is tested."""
-    return bool(finite_rows(result.redundancy)[chosen(result.used_images)].all())
 
 
 def unseen(result: AdjustedNetwork) -> list[Phrase]:

@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show import quantity
-from photogram.words import Phrase
+from photogram.words import Phrase, words_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -248,6 +248,11 @@ class Document:
     def table(self, key: str) -> quantity.Table:
         """Return the table with a key, the first of several layers."""
         return next(table for table in self.tables(layers=True) if table.key == key)
+
+
+def about(code: str, **fields: Any) -> str:
+    """Return the explanation of a section, table or fact that the words of documents have for a code."""
+    return words_of("en")(f"about.{code}", **fields)
 
 
 def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:

@@ -173,6 +173,11 @@ def attribute(
     return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
 
 
+def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
+    """Return a quantity with the same name in files and in JSON documents."""
+    return Quantity(values, **{"name": name, "member": name, "head": head, **more})
+
+
 def named(table: Quantities, name: str) -> Quantity:
     """Return the quantity with a name of its columns."""
     return next(column for column in table if column.name == name)
