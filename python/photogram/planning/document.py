@@ -15,7 +15,6 @@ from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
-from photogram.show.sketch.layout import labelled
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
@@ -317,8 +316,8 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
     shades = Shades(float(heights.min()), float(heights.max()), label)
     panels = [_panel(pattern, limits, shades) for pattern in patterns]
-    known = {mark.label for mark in labelled(panels[-1])}
-    every = {mark.label: mark for panel in panels for mark in labelled(panel) if isinstance(mark, Markers)}
+    known = {mark.label for mark in panels[-1].labelled}
+    every = {mark.label: mark for panel in panels for mark in panel.labelled if isinstance(mark, Markers)}
     more = [replace(mark, places=NOWHERE) for label, mark in every.items() if label not in known]
     panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
     width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
