@@ -136,7 +136,7 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
         }
         (section,) = [each for each in found.document().sections if each.key == "figures"]
         rows = section.parts[0].rows if count else []
-        shown = {row[0].value: row[-1].value for row in rows if row[-1].value}
+        shown = {row[0].text: row[-1].text for row in rows if row[-1].text}
         of_page = {"plan": "h", "h": "v", "all": "3d"}
         assert shown == {
             found.texts(f"component.{part}"): found.texts(f"asprs.verdict.{verdicts[name]}")

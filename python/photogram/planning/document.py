@@ -15,7 +15,8 @@ from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
 from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
-from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
+from photogram.show.sketch.letters import NOWHERE
+from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality

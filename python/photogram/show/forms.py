@@ -134,10 +134,10 @@ def summary(document: Document, *keys: str) -> list[str]:
 def table_text(table: Table) -> list[str]:
     """Return the lines of a table: names to the left, numbers to the right, `*` behind marked numbers."""
     columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
-    for row in table.cells():
-        for texts, (column, cell) in zip(columns, row, strict=True):
+    for row in table.rows:
+        for texts, column, cell in zip(columns, table.columns, row, strict=True):
             mark = "*" if cell.tone == "look" and not column.text else ""
-            texts.append(f"{column.written(cell.value)}{mark}".translate(PLAIN))
+            texts.append(f"{cell.text}{mark}".translate(PLAIN))
     longest = max(len(text) for texts in columns for text in texts)
     if longest > WIDTH // 2 and all(
         column.text for column in table.columns

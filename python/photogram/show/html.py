@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 LONG = 16  # Characters; longer words may be broken
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")  # What the script of a page reads
 
 
 def page_html(page: Document) -> bytes:
@@ -36,14 +37,14 @@ def page_html(page: Document) -> bytes:
         if isinstance(table, Table)
         for row in table.rows
         for cell in row
-        if isinstance(cell, Cell) and cell.id
+        if cell.id
     }
     text = environment.get_template("report.html").render(
         page=replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)),
         sections=sections,
         version=_photocore.__version__,
         attributes=_attributes,
-        content=lambda column, cell: _content(column, cell, known),
+        known=known,
         style=_source("style.css"),
         script=_source("script.js"),
     )
@@ -52,16 +53,10 @@ def page_html(page: Document) -> bytes:
 
 @cache
 def _environment() -> Environment:
-    from jinja2 import BaseLoader, Environment, StrictUndefined
-
-    class Packaged(BaseLoader):
-        """Templates as they lie in the package, also in one that is zipped."""
-
-        def get_source(self, environment: Environment, template: str) -> tuple[str, None, None]:
-            return _text(template), None, None
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(
-        loader=Packaged(),
+        loader=FunctionLoader(_text),  # Templates of a package, also if it is zipped
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -89,25 +84,15 @@ def _coded(text: str) -> Markup:
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
-def _attributes(column: Column, cell: Cell) -> Markup:
-    from markupsafe import Markup
-
-    long = column.text and any(len(word) > LONG for word in str(cell.value).split())
-    classes = " ".join(filter(None, ("text" if column.text else "", "long" if long else "", cell.tone)))
-    found = Markup(' class="{}"').format(classes) if classes else Markup()
-    if cell.id:
-        found += Markup(' id="{}"').format(cell.id)
-    number = cell.value if isinstance(cell.value, float) and column.decimals is None else cell.sorts
-    if number is not None and math.isfinite(number):
-        found += Markup(' data-value="{}"').format(f"{number:.9g}")
-    return found
-
-
-def _content(column: Column, cell: Cell, known: set[str]) -> Markup:
-    from markupsafe import Markup, escape
-
-    text = escape(column.written(cell.value))
-    return Markup('<a href="#{}">{}</a>').format(cell.goes_to, text) if cell.goes_to in known else text
+def _attributes(column: Column, cell: Cell) -> dict[str, str]:
+    long = column.text and any(len(word) > LONG for word in cell.text.split())
+    # Columns are sorted by these numbers if the texts of cells are not numbers.
+    sorts = cell.number is not None and math.isfinite(cell.number) and not NUMBER.fullmatch(cell.text)
+    return {
+        "class": " ".join(filter(None, ("text" if column.text else "", "long" if long else "", cell.tone))),
+        "id": cell.id,
+        "data-value": f"{cell.number:.9g}" if sorts else "",
+    }
 
 
 def _drawn(section: Section) -> Section:

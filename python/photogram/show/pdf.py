@@ -63,12 +63,10 @@ def _record(part: Any) -> Any:
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])
     elif isinstance(part, Table):
-        rows = [
-            [{"tone": cell.tone, "text": column.written(cell.value)} for column, cell in row]
-            for row in part.cells()
+        record["rows"] = [[{"tone": cell.tone, "text": cell.text} for cell in row] for row in part.rows]
+        record["columns"] = [
+            _column(column, [row[k].text for row in part.rows]) for k, column in enumerate(part.columns)
         ]
-        columns = [_column(column, [row[k]["text"] for row in rows]) for k, column in enumerate(part.columns)]
-        record |= {"rows": rows, "columns": columns}
     return record
 
 

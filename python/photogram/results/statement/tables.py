@@ -17,7 +17,7 @@ from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.cells import written
-from photogram.show.page import Cell, Column, Part, Section, decimals_of
+from photogram.show.page import Cell, Part, Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, frame
 
 if TYPE_CHECKING:
@@ -75,17 +75,13 @@ def localized(texts: Texts, parts: Sequence[Part]) -> list[Part]:
             found.append(part)
         elif part.visible:
             table = written(part)
-            rows = [[_localized(texts, *pair) for pair in row] for row in table.cells()]
+            rows = [[_localized(texts, cell) for cell in row] for row in table.rows]
             found.append(replace(table, rows=rows))
     return found
 
 
-def _localized(texts: Texts, column: Column, cell: Cell) -> Cell:
-    value = cell.sorts if isinstance(cell.value, str) else cell.value
-    if value is None:
-        return cell
-    sorts = value if math.isfinite(value) else None
-    return replace(cell, value=texts.numeral(column.written(cell.value)), sorts=sorts)
+def _localized(texts: Texts, cell: Cell) -> Cell:
+    return cell if cell.number is None else replace(cell, text=texts.numeral(cell.text))
 
 
 def check_points(statement: Statement) -> Table:

@@ -54,7 +54,7 @@ CORNERS = {
 HALO: Attributes = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
 
 
-def element(name: str, content: str = "", **attributes: str | float) -> str:
+def element(name: str, content: str = "", /, **attributes: str | float) -> str:
     """Return an element without attributes that are empty."""
     written = "".join(
         f' {key.replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
@@ -316,9 +316,9 @@ def _contours(mark: Contours, placed: Placed) -> str:
 def levels_written(placed: Placed, taken: list[Box]) -> str:
     """Return the levels of contours on their lines; the room that they take is added to what is taken."""
     found = []
-    for mark in placed.panel.marks:
-        made = _generator(mark) if isinstance(mark, Contours) else None
-        for level in mark.levels.tolist() if isinstance(mark, Contours) else ():
+    for mark in (each for each in placed.panel.marks if isinstance(each, Contours)):
+        made = _generator(mark)
+        for level in mark.levels.tolist():
             written = f"{level:g}".replace("-", "−")
             for line in made.lines(level):
                 boxes = _along(placed.at(line), width(written, NUMBER))
