@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +12,20 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.show import quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import Cell, Column, Table, decimals_of, number_text, probability_written
+from photogram.show.page import (
+    Cell,
+    Column,
+    Document,
+    Drawing,
+    Layers,
+    Part,
+    Picture,
+    Section,
+    Table,
+    decimals_of,
+    number_text,
+    probability_written,
+)
 from photogram.show.quantity import Axis, Quantity, chosen, long
 
 _SIGNS = {
@@ -33,11 +46,34 @@ def unit_written(unit: str) -> str:
     return _SIGNS.get(unit, unit)
 
 
-def written(part: Any) -> Any:
+def written_sections(
+    document: Document, draw: Callable[[Drawing], Picture | None] = lambda _: None
+) -> list[Section]:
+    """Return the sections that people see: tables of cells, drawn pictures, and no empty parts."""
+    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
+    return [section for section in whole if section.parts]
+
+
+def _written(
+    parts: Sequence[Part], numeral: Callable[[str], str], draw: Callable[[Drawing], Picture | None]
+) -> list[Any]:
+    found: list[Any] = []
+    for part in parts:
+        if isinstance(part, Layers):
+            layers = _written(part.parts, numeral, draw)
+            found += layers if len(layers) < 2 else [replace(part, parts=layers)]
+        elif isinstance(part, Drawing):
+            found += [picture] if (picture := draw(part)) else []
+        elif not isinstance(part, quantity.Table) or part.visible:
+            found.append(written(part, numeral))
+    return found
+
+
+def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     """Return a part of a document; a declared table becomes a table of cells.
 
     Columns without a head are left out. The deviations of a table give the decimals of its components: two
-    figures of the median.
+    figures of the median. `numeral` writes numbers in another language.
     """
     if not isinstance(part, quantity.Table):
         return part
@@ -45,8 +81,11 @@ def written(part: Any) -> Any:
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
     pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
-    rows = zip(*(cells for _, cells in pairs), strict=True)
-    return Table(part.title, [column for column, _ in pairs], [*rows], part.note)
+    rows = [
+        [cell if cell.number is None else replace(cell, text=numeral(cell.text)) for cell in row]
+        for row in zip(*(cells for _, cells in pairs), strict=True)
+    ]
+    return Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
 def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:

@@ -10,9 +10,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
-from photogram.show import quantity
-from photogram.show.cells import written
-from photogram.show.page import Cell, Column, Document, Drawing, Layers, Part, Picture, Section, Table
+from photogram.show.cells import written_sections
+from photogram.show.page import Cell, Column, Document, Drawing, Picture, Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -27,26 +26,16 @@ def page_html(page: Document) -> bytes:
 
     It takes jinja2 (`pip install 'photogram[report]'`).
     """
-    environment = _environment()
-    sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
-    known = {
-        cell.id
-        for section in sections
-        for part in section.parts
-        for table in (part.parts if isinstance(part, Layers) else (part,))
-        if isinstance(table, Table)
-        for row in table.rows
-        for cell in row
-        if cell.id
-    }
+    environment, sections = _environment(), written_sections(page, inlined)
+    tables = (
+        part for part in Document("", "", sections=sections).parts(layers=True) if isinstance(part, Table)
+    )
     text = environment.get_template("report.html").render(
         page=replace(page, title=re.sub(r"\s*\.{4,}\s*", " – ", page.title)),
         sections=sections,
+        known={cell.id for table in tables for row in table.rows for cell in row if cell.id},
         version=_photocore.__version__,
         attributes=_attributes,
-        known=known,
-        style=_source("style.css"),
-        script=_source("script.js"),
     )
     return text.encode("utf-8", errors="replace")
 
@@ -63,18 +52,11 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
     )
     environment.filters["coded"] = _coded
-    environment.filters["zip"] = zip
     return environment
 
 
 def _text(name: str) -> str:
     return files("photogram.show").joinpath("templates", name).read_text(encoding="utf-8")
-
-
-def _source(name: str) -> Markup:
-    from markupsafe import Markup
-
-    return Markup(_text(name))
 
 
 def _coded(text: str) -> Markup:
@@ -93,20 +75,6 @@ def _attributes(column: Column, cell: Cell) -> dict[str, str]:
         "id": cell.id,
         "data-value": f"{cell.number:.9g}" if sorts else "",
     }
-
-
-def _drawn(section: Section) -> Section:
-    parts: list[Part] = []
-    for part in section.visible:
-        if isinstance(part, Drawing):
-            parts += [found] if (found := inlined(part)) else []
-        elif isinstance(part, Layers):
-            layers = [inlined(each) if isinstance(each, Drawing) else written(each) for each in part.parts]
-            own = [each for each in layers if each is not None]
-            parts += own if len(own) < 2 else [Layers(part.name, own)]
-        elif not isinstance(part, quantity.Table) or part.visible:
-            parts.append(written(part))
-    return replace(section, parts=parts)
 
 
 def inlined(drawing: Drawing) -> Picture | None:

@@ -53,7 +53,7 @@ class Column:
 class Table:
     """A table whose cells are written; `note` says what is not in it."""
 
-    caption: str
+    title: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
     note: str = ""
@@ -115,10 +115,6 @@ class Layers:
     parts: Sequence[Drawing | Picture | Table | quantity.Table]
     kind: str = field(default="layers", init=False)
 
-    def titles(self) -> list[str]:
-        """Return what the parts are called."""
-        return [each.caption if isinstance(each, Table) else each.title for each in self.parts]
-
 
 @dataclass(frozen=True)
 class Text:
@@ -149,11 +145,6 @@ class Section:
     parts: Sequence[Part]
     intro: str = ""
     annex: bool = False
-
-    @property
-    def visible(self) -> list[Part]:
-        """Parts without the tables that only programs read."""
-        return [part for part in self.parts if not isinstance(part, quantity.Table) or part.visible]
 
     @classmethod
     def of(cls, table: quantity.Table) -> Section:
@@ -195,6 +186,7 @@ class Document:
     contents: str = "Sections"
     more: str = "{} more"
     numbers: str = "Page {number} of {total}"
+    numeral: Callable[[str], str] = str  # Writes numbers of tables as the language does
 
     def with_sections(self, *more: Section) -> Document:
         """Return the page with more sections at its end."""
@@ -202,13 +194,10 @@ class Document:
 
     def tables(self, *, layers: bool = False) -> list[quantity.Table]:
         """Return the tables of all sections and details, with those in layers on request."""
-        return [part for part in self._parts(layers) if isinstance(part, quantity.Table)]
+        return [part for part in self.parts(layers=layers) if isinstance(part, quantity.Table)]
 
-    def drawings(self) -> list[Drawing]:
-        """Return the plots of all sections and details."""
-        return [part for part in self._parts(True) if isinstance(part, Drawing)]
-
-    def _parts(self, layers: bool) -> list[Part]:
+    def parts(self, *, layers: bool = False) -> list[Part]:
+        """Return the parts of all sections and details; parts of layers instead of layers on request."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
         if layers:
             parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]

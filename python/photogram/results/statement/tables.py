@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,7 @@ from photogram.results.statement.budget import Budget
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.show.cells import written
-from photogram.show.page import Cell, Part, Section, decimals_of
+from photogram.show.page import Part, Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, frame
 
 if TYPE_CHECKING:
@@ -63,25 +61,8 @@ class Columns:
 
 
 def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> Section:
-    """Return an annex with numbers as the language writes them, without empty tables."""
-    return Section(f"annex-{letter}", texts(f"annex.{letter}"), localized(texts, parts), intro, annex=True)
-
-
-def localized(texts: Texts, parts: Sequence[Part]) -> list[Part]:
-    """Return parts of a page with numbers as the language writes them, without empty tables."""
-    found: list[Part] = []
-    for part in parts:
-        if not isinstance(part, Table):
-            found.append(part)
-        elif part.visible:
-            table = written(part)
-            rows = [[_localized(texts, cell) for cell in row] for row in table.rows]
-            found.append(replace(table, rows=rows))
-    return found
-
-
-def _localized(texts: Texts, cell: Cell) -> Cell:
-    return cell if cell.number is None else replace(cell, text=texts.numeral(cell.text))
+    """Return an annex with the title and the key of its letter."""
+    return Section(f"annex-{letter}", texts(f"annex.{letter}"), parts, intro, annex=True)
 
 
 def check_points(statement: Statement) -> Table:
