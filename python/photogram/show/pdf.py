@@ -33,15 +33,10 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
     `author` is a property of the file.
     """
     sections = written_sections(page, inlined)
-    titled = replace(page, title=page.title or page.what, sections=sections)
+    titled = replace(page, title=page.title or page.what, sections=sections, details=())
     footer = f"{page.what} – {page.title}" if page.title else page.what
-    further: dict[str, object] = {
-        "author": author or [],
-        "footer": footer,
-        "fonts": FONTS,
-        "longest": LONGEST,
-    }
-    data = json.dumps(_record(titled) | further, default=_record, ensure_ascii=False)
+    record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
+    data = json.dumps(record, default=_record, ensure_ascii=False)
     data = data.encode(errors="replace").decode()  # Names of files may contain bytes that are not UTF-8.
     template = files("photogram.show").joinpath("templates", "page.typ").read_bytes()
     content: bytes = typst.compile(template, sys_inputs={"document": data})
