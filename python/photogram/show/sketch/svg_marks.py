@@ -6,7 +6,6 @@ import base64
 import struct
 import zlib
 from collections.abc import Iterator
-from functools import singledispatch
 from html import escape
 from typing import Any, TypeAlias
 
@@ -14,25 +13,10 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
+from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NUMBER, Placed
 from photogram.show.sketch.letters import Box, first_free, free_names, width
-from photogram.show.sketch.marks import (
-    Arrows,
-    Contours,
-    Ellipses,
-    Labelled,
-    Level,
-    Line,
-    Mark,
-    Markers,
-    Mesh,
-    Names,
-    Polygons,
-    Shades,
-    Texts,
-    hexadecimal,
-    rgb,
-)
+from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, rgb
 from photogram.show.style import need
 
 Attributes: TypeAlias = dict[str, str | float]
@@ -102,14 +86,38 @@ def _each(places: Floats, sign: str) -> str:
     return "".join(f"M{x} {y}{sign}" for x, y in found)
 
 
-@singledispatch
-def svg(mark: Mark, placed: Placed) -> str:
-    """Return a mark on a panel."""
-    raise TypeError(f"there is no way to draw {type(mark).__name__}")
+def svg(mark: marks.Mark, placed: Placed) -> str:
+    """Return a mark on a panel; `Names` come last, and are not cut at the sides of the panel."""
+    match mark:
+        case marks.Markers():
+            return _markers(mark, placed)
+        case marks.Line():
+            at, look = placed.at(mark.places), {**_stroke(mark, mark.dash), "opacity": _opacity(mark)}
+            return path("".join(map(joined, at if at.ndim > 2 else [at])), **look, stroke_linejoin="round")
+        case marks.Level():
+            height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
+            data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
+            return path(data, **_stroke(mark, mark.dash))
+        case marks.Arrows():
+            return _arrows(mark, placed)
+        case marks.Polygons():
+            return _polygons(mark, placed)
+        case marks.Ellipses():
+            return _ellipses(mark, placed)
+        case marks.Mesh():
+            return _mesh(mark, placed)
+        case marks.Contours():
+            return _contours(mark, placed)
+        case marks.Texts():
+            rows = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
+            found = [text(x, y + 0.36 * mark.size, words, fill=colour) for (x, y), words, colour in rows]
+            return element("g", "".join(found), font_size=mark.size, text_anchor=mark.anchor)
+        case marks.Names():
+            return ""
+    raise TypeError(f"the renderer for SVG does not draw {type(mark).__name__}")
 
 
-@svg.register(Markers)
-def _markers(mark: Markers, placed: Placed) -> str:
+def _markers(mark: marks.Markers, placed: Placed) -> str:
     low, high = np.sort(placed.panel.limits, axis=0)
     inside = ((mark.places >= low) & (mark.places <= high)).all(axis=1)
     at = placed.at(mark.places[inside])
@@ -124,7 +132,7 @@ def _markers(mark: Markers, placed: Placed) -> str:
     return "".join(found)
 
 
-def _signs(mark: Markers, at: Floats, colour: str) -> str:
+def _signs(mark: marks.Markers, at: Floats, colour: str) -> str:
     size, half = number(mark.size), number(0.5 * mark.size)
     look: Attributes = {"stroke": colour, "stroke_width": mark.edge, "opacity": _opacity(mark)}
     if mark.shape == "." or (mark.shape == "o" and not mark.face):
@@ -143,32 +151,16 @@ def _signs(mark: Markers, at: Floats, colour: str) -> str:
     return path(_each(at + start, sign), fill=mark.face or colour, **look)
 
 
-def _opacity(mark: Markers | Line) -> str | float:
+def _opacity(mark: marks.Markers | marks.Line) -> str | float:
     return mark.opacity if mark.opacity < 1 else ""
 
 
-def _stroke(mark: Line | Level | Ellipses, dash: str = "") -> Attributes:
+def _stroke(mark: marks.Line | marks.Level | marks.Ellipses, dash: str = "") -> Attributes:
     dashes = " ".join(number(mark.width * each) for each in DASHES.get(dash, ()))
     return {"stroke": mark.colour, "stroke_width": mark.width, "stroke_dasharray": dashes}
 
 
-@svg.register(Line)
-def _line(mark: Line, placed: Placed) -> str:
-    at, look = placed.at(mark.places), {**_stroke(mark, mark.dash), "opacity": _opacity(mark)}
-    if at.ndim > 2:
-        return path("".join(map(joined, at)), **look)
-    return path(joined(at), **look, stroke_linejoin="round")
-
-
-@svg.register(Level)
-def _level(mark: Level, placed: Placed) -> str:
-    height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
-    data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
-    return path(data, **_stroke(mark, mark.dash))
-
-
-@svg.register(Arrows)
-def _arrows(mark: Arrows, placed: Placed) -> str:
+def _arrows(mark: marks.Arrows, placed: Placed) -> str:
     thick = mark.width * (placed.box[2] - placed.box[0])
     tails, ends = placed.at(mark.places), placed.at(mark.places + mark.vectors)
     lengths = np.hypot(*(ends - tails).T)
@@ -190,8 +182,7 @@ def _arrows(mark: Arrows, placed: Placed) -> str:
     return "".join(found)
 
 
-@svg.register(Polygons)
-def _polygons(mark: Polygons, placed: Placed) -> str:
+def _polygons(mark: marks.Polygons, placed: Placed) -> str:
     outlines = [joined(each, "z") for each in placed.at(mark.places)]
     if not mark.edge:
         return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
@@ -201,8 +192,7 @@ def _polygons(mark: Polygons, placed: Placed) -> str:
     return element("g", "".join(map(path, outlines)), **inside, **edge)
 
 
-@svg.register(Ellipses)
-def _ellipses(mark: Ellipses, placed: Placed) -> str:
+def _ellipses(mark: marks.Ellipses, placed: Placed) -> str:
     turn, middle = np.radians(mark.angles)[:, np.newaxis], placed.at(mark.places)
     along, across = (
         placed.at(mark.places + semi[:, np.newaxis] * np.hstack([np.cos(angle), np.sin(angle)])) - middle
@@ -218,8 +208,7 @@ def _ellipses(mark: Ellipses, placed: Placed) -> str:
     return path(data, fill=mark.colour, opacity=mark.fill) if mark.fill else path(data, **_stroke(mark))
 
 
-@svg.register(Mesh)
-def _mesh(mark: Mesh, placed: Placed) -> str:
+def _mesh(mark: marks.Mesh, placed: Placed) -> str:
     (x, y), (to_x, to_y) = placed.at(mark.corners).tolist()
     values = mark.values[:: 1 if y < to_y else -1, :: 1 if x < to_x else -1]
     there = np.isfinite(values)
@@ -247,26 +236,13 @@ def _png(pixels: Indices) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
-@svg.register(Texts)
-def _texts(mark: Texts, placed: Placed) -> str:
-    words = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
-    found = (text(x, y + 0.36 * mark.size, said, fill=colour) for (x, y), said, colour in words)
-    return element("g", "".join(found), font_size=mark.size, text_anchor=mark.anchor)
-
-
-@svg.register(Names)
-def _later(mark: Names, placed: Placed) -> str:
-    """Return nothing: names come last, and are not cut at the sides of the panel."""
-    return ""
-
-
 def names(placed: Placed, taken: list[Box]) -> str:
     """Return the names on a panel, which keep clear of each other and of boxes that are taken."""
     left, top, right, low = placed.box
     # As if upwards: names are tried above their places first.
     found, taken = [], [(box[0], -box[3], box[2], -box[1]) for box in taken]
     for mark in placed.panel.marks:
-        if isinstance(mark, Names):
+        if isinstance(mark, marks.Names):
             at, avoid = (placed.at(each) * [1.0, -1.0] for each in (mark.places, mark.avoid))
             for row, box in free_names(mark.texts, at, avoid, NAME, (left, -low, right, -top), taken):
                 found.append(text(box[0] + 0.4, -box[1] - 1.8, mark.texts[row], fill=mark.colours[row]))
@@ -276,17 +252,17 @@ def names(placed: Placed, taken: list[Box]) -> str:
 def sample(mark: Labelled) -> Labelled:
     """Return what a legend shows of a mark, on a panel of 16 by 8 points."""
     line = np.array([[0.0, 4.0], [16.0, 4.0]])
-    if isinstance(mark, Markers):
+    if isinstance(mark, marks.Markers):
         return replace(mark, places=np.array([[8.0, 4.0]]), size=max(mark.size, 4.0), values=None)
-    if isinstance(mark, Line):
+    if isinstance(mark, marks.Line):
         return replace(mark, places=line if mark.places.ndim == 2 else line[np.newaxis])
-    if isinstance(mark, Arrows):
+    if isinstance(mark, marks.Arrows):
         return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3 / 16.0)
-    assert isinstance(mark, Polygons)
+    assert isinstance(mark, marks.Polygons)
     return replace(mark, places=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
 
 
-def _generator(mark: Contours) -> Any:
+def _generator(mark: marks.Contours) -> Any:
     need("contourpy", "contours", "report")
     from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
 
@@ -294,8 +270,7 @@ def _generator(mark: Contours) -> Any:
     return contour_generator(mark.across, mark.up, np.ma.masked_invalid(mark.values), **kinds)
 
 
-@svg.register(Contours)
-def _contours(mark: Contours, placed: Placed) -> str:
+def _contours(mark: marks.Contours, placed: Placed) -> str:
     made, bounds, found = _generator(mark), mark.bounds, []
     below, beyond = np.nanmin(mark.values) - 1.0, max(np.nanmax(mark.values), bounds[-1]) + 1.0
     middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
@@ -316,7 +291,7 @@ def _contours(mark: Contours, placed: Placed) -> str:
 def levels_written(placed: Placed, taken: list[Box]) -> str:
     """Return the levels of contours on their lines; the room that they take is added to what is taken."""
     found = []
-    for mark in (each for each in placed.panel.marks if isinstance(each, Contours)):
+    for mark in (each for each in placed.panel.marks if isinstance(each, marks.Contours)):
         made = _generator(mark)
         for level in mark.levels.tolist():
             written = f"{level:g}".replace("-", "−")
