@@ -118,13 +118,13 @@ class Quantity:
     def at(self, rows: Indices, axes: Indices | None = None) -> Quantity:
         """Return the quantity of some things; with `axes`, one component of each if it has several."""
         one = axes is not None and not self.single
-        parts = {
+        parts: dict[str, Any] = {
             name: np.asarray(part)[(rows, axes) if one else rows]
             for name in ("values", "seen", "marked", "of")
             if (part := getattr(self, name)) is not None
         }
         link = self.link and replace(self.link, rows=self.link.rows[rows])
-        return replace(self, link=link, **parts, **({"of": axes} if one else {}))
+        return replace(self, **{**parts, "link": link, "of": axes if one else parts.get("of")})
 
 
 Quantities = Sequence[Quantity]  # Quantities of the same things

@@ -126,19 +126,18 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool
     if not extent > 0:
         return _written(np.array([low]), extent)
     least = extent / MAX_STEPS if across else max(extent / MAX_STEPS, 2.6 * size / max(length, 1e-9) * extent)
-    power = 10.0 ** math.floor(math.log10(least))
-    for step in (power * factor for factor in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)):
+    steps = 10.0 ** math.floor(math.log10(least)) * np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])
+    for step in steps[steps >= least * (1 - 1e-9)].tolist():
         values = step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
         if len(values) < 2:
-            # An axis that is too short for two of these has its ends, or one of them.
-            ends = _written(np.array([low, high]), step / 10.0)
-            fit = not across or widest(ends.texts, size) + size < length
-            return ends if fit else _written(ends.values[:1], step / 10.0)
-        found = _written(values, step)
-        fits = not across or widest(found.texts, size) + 1.6 * size < step / extent * length
-        if step >= least * (1 - 1e-9) and fits:
             break
-    return found
+        found = _written(values, step)
+        if not across or widest(found.texts, size) + 1.6 * size < step / extent * length:
+            return found
+    # An axis that is too short for two of these has its ends, or one of them.
+    ends = _written(np.array([low, high]), step / 10.0)
+    fit = not across or widest(ends.texts, size) + size < length
+    return ends if fit else _written(ends.values[:1], step / 10.0)
 
 
 def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:
