@@ -23,6 +23,7 @@ from photogram.results.statement.lengths import (
 )
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import nssda
+from photogram.show.cells import written
 from photogram.statistics import effective_freedom
 
 
@@ -137,8 +138,8 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
             f"{SENTENCES[verdict]}.{name}" for name, verdict in verdicts.items() if count or name != "3d"
         }
         (section,) = [each for each in found.document().sections if each.key == "figures"]
-        rows = section.parts[0].rows if count else []
-        shown = {row[0].value: row[-1].value for row in rows if row[-1].value}
+        rows = written(section.parts[0]).rows if count else []
+        shown = {row[0].text: row[-1].text for row in rows if row[-1].text}
         of_page = {"plan": "h", "h": "v", "all": "3d"}
         assert shown == {
             found.texts(f"component.{part}"): found.texts(f"asprs.verdict.{verdicts[name]}")

@@ -25,7 +25,6 @@ from photogram.results.statement.tables import (
     check_points,
     decimals_for,
     left_out_points,
-    localized,
     removed_observations,
     test_lengths,
 )
@@ -312,9 +311,7 @@ def statement_document(statement: Statement) -> Document:
         title=asked.title or statement.result.block.title,
         judgements=[Judgement(mark, statement.headline, [text for _, text in judged.sentences], tone)],
         sections=[
-            Section(
-                "figures", texts("page.figures"), [*localized(texts, _figures(statement)), *_notes(statement)]
-            ),
+            Section("figures", texts("page.figures"), [*_figures(statement), *_notes(statement)]),
             Section("assumptions", texts("page.assumptions"), [assumed, drawing]),
             Section("remarks", texts("page.remarks"), remarks),
             Section("signature", "", [Text(texts("page.signature"))]),
@@ -326,6 +323,7 @@ def statement_document(statement: Statement) -> Document:
         contents=texts("page.contents"),
         more=texts("page.more", count="{}"),
         numbers=texts("page.numbers", number="{number}", total="{total}"),
+        numeral=texts.numeral,
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,7 @@ from photogram.results.statement.budget import Budget
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.show.cells import written
-from photogram.show.page import Cell, Column, Part, Section, decimals_of
+from photogram.show.page import Part, Section, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members
 
 if TYPE_CHECKING:
@@ -59,29 +57,8 @@ class Columns:
 
 
 def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> Section:
-    """Return an annex with numbers as the language writes them, without empty tables."""
-    return Section(f"annex-{letter}", texts(f"annex.{letter}"), localized(texts, parts), intro, annex=True)
-
-
-def localized(texts: Texts, parts: Sequence[Part]) -> list[Part]:
-    """Return parts of a page with numbers as the language writes them, without empty tables."""
-    found: list[Part] = []
-    for part in parts:
-        if not isinstance(part, Table):
-            found.append(part)
-        elif part.visible:
-            table = written(part)
-            rows = [[_localized(texts, *pair) for pair in row] for row in table.cells()]
-            found.append(replace(table, rows=rows))
-    return found
-
-
-def _localized(texts: Texts, column: Column, cell: Cell) -> Cell:
-    value = cell.sorts if isinstance(cell.value, str) else cell.value
-    if value is None:
-        return cell
-    sorts = value if math.isfinite(value) else None
-    return replace(cell, value=texts.numeral(column.written(cell.value)), sorts=sorts)
+    """Return an annex with the title and the key of its letter."""
+    return Section(f"annex-{letter}", texts(f"annex.{letter}"), parts, intro, annex=True)
 
 
 def check_points(statement: Statement) -> Table:
