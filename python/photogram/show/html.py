@@ -90,17 +90,14 @@ def _coded(text: str) -> Markup:
 
 
 def _attributes(column: Column, cell: Cell) -> Markup:
-    from markupsafe import Markup
+    from markupsafe import Markup, escape
 
     long = column.text and any(len(word) > LONG for word in str(cell.value).split())
     classes = " ".join(filter(None, ("text" if column.text else "", "long" if long else "", cell.tone)))
-    found = Markup(' class="{}"').format(classes) if classes else Markup()
-    if cell.id:
-        found += Markup(' id="{}"').format(cell.id)
     number = cell.value if isinstance(cell.value, float) and column.decimals is None else cell.sorts
-    if number is not None and math.isfinite(number):
-        found += Markup(' data-value="{}"').format(f"{number:.9g}")
-    return found
+    known = number is not None and math.isfinite(number)
+    named = {"class": classes, "id": cell.id, "data-value": f"{number:.9g}" if known else ""}
+    return Markup("".join(f' {name}="{escape(text)}"' for name, text in named.items() if text))
 
 
 def _content(column: Column, cell: Cell, known: set[str]) -> Markup:
