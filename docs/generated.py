@@ -68,8 +68,11 @@ def options_of(help_text: str) -> Iterator[tuple[str, ...]]:
     for panel, lines in PANEL.findall(help_text):
         yield (panel,)
         for line in lines.splitlines():
-            *option, meaning = re.split(r"\s{2,}", line.strip("│").strip().removeprefix("*").strip())
-            yield code(" ".join(option)), cell(meaning)
+            *words, meaning = re.split(r"\s{2,}", line.strip("│").strip().removeprefix("*").strip())
+            names = [word for word in words if word.startswith("-")] or words[:1]
+            kinds = [word for word in words if word not in names and word != "<path>"]
+            option = ", ".join(code(name) for name in names)
+            yield " ".join([option, *(escape(kind).replace("|", "|<wbr>") for kind in kinds)]), cell(meaning)
 
 
 def commands(_: str) -> str:
