@@ -1,8 +1,8 @@
 """What strangers who join rely on: commands that workflows call, the list of the public API, citations."""
 
 import re
-import tomllib
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest

@@ -87,7 +87,7 @@ def _each(places: Floats, sign: str) -> str:
 @singledispatch
 def svg(mark: Mark, placed: Placed) -> str:
     """Return a mark on a panel."""
-    raise TypeError(f"there is no way to draw {type(mark).__name__}")
+    raise TypeError(f"cannot draw {type(mark).__name__}")
 
 
 @svg.register(Markers)
