@@ -15,10 +15,11 @@ TESTS = Path(__file__).parent
 PAGE = TESTS.parent / "docs" / "giant-coverage.md"
 ROWS = TESTS / "data" / "giant" / "specification_rows.json"
 
-HEAD = """# What of GIANT is tested
+HEAD = """# Tested features of GIANT
 
-Every row of the tables of the program's specification, and the tests that show it; made by
-`python tests/giant_coverage.py` from the marks of the tests. `pytest -k test_section_2_2` runs those of 2.2.
+This page lists every row of the specification of GIANT, with the tests of this row. It is for users who
+replace GIANT by photogram. `python tests/giant_coverage.py` writes it from the marks of the tests;
+`pytest -k test_section_2_2` runs the tests of section 2.2.
 """
 
 

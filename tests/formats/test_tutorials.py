@@ -1,4 +1,4 @@
-"""The tutorials of docs/formats.md do what they say."""
+"""The tutorials of docs/formats/ run."""
 
 import re
 import shlex
@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs" / "formats.md"
-TUTORIALS = dict(
-    re.findall(r"<!-- tutorial: (\w+) -->\n```console\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-)
+PAGES = sorted((Path(__file__).parents[2] / "docs" / "formats").glob("*.md"))
+TUTORIALS = {
+    name: commands
+    for page in PAGES
+    for name, commands in re.findall(
+        r"<!-- tutorial: (\w+) -->\n```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL
+    )
+}
 
 
 def test_there_is_one_for_each_origin():

@@ -135,7 +135,7 @@ def test_a_million_images_are_structured_in_two_seconds():
     assert time.process_time() - start < 2
 
 
-@pytest.mark.giant("8", "automatic order beside the bandwidth of the input order")
+@pytest.mark.giant("8", "automatic order and the bandwidth of the input order")
 def test_section_8_the_program_finds_a_better_order_by_itself():
     block = simulate(strips=1, photos_per_strip=30, points_per_photo=20, seed=2).block
     shuffled = np.random.default_rng(6).permutation(30)
@@ -154,7 +154,7 @@ def test_section_8_the_program_finds_a_better_order_by_itself():
     assert chosen.effective_bandwidth < given.effective_bandwidth / 2
 
 
-@pytest.mark.giant("8", "automatic order beside the bandwidth of the input order")
+@pytest.mark.giant("8", "automatic order and the bandwidth of the input order")
 def test_section_8_the_report_shows_both_bandwidths(small_block):
     result = adjust(small_block)
     work = result.report().split("\nWork\n")[1]

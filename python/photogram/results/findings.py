@@ -54,7 +54,8 @@ def network_findings(
         computed=has_redundancy(result),
         systematic=systematic,
         snooped=result.snooped,
-        remarks=unseen(result),
+        remarks=[*unseen(result), *_assumptions(result)],
+        unchecked=_unchecked(result),
         can_snoop=True,
     )
 
@@ -163,6 +164,19 @@ def _patterns(result: Result) -> list[Systematic]:
         ]
     axes = [axis.name for axis in point_axes(block)]
     return patterns(result, cameras, axes, lambda own: fall_by_lens(result, own))
+
+
+def _unchecked(result: AdjustedNetwork) -> list[Phrase]:
+    """Return the errors that would remain undetected and move many points."""
+    summary = result.reliability_summary
+    return [] if summary is None else summary.hypotheses.unchecked()
+
+
+def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
+    """Return which errors of the datum no independent observation checks."""
+    summary = result.reliability_summary
+    names = [] if summary is None else [each.name for each in summary.hypotheses.assumptions]
+    return [Phrase("line.datum-assumed", {"errors": names})] if names else []
 
 
 def has_redundancy(result: AdjustedNetwork) -> bool:

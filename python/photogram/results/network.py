@@ -18,6 +18,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.errors import AdjustmentError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message
@@ -28,6 +29,7 @@ from photogram.results.iteration import Iteration
 from photogram.show.methods import Brief, Documented, Judged, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from photogram.results.axes import Determined, Terms
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
+    from photogram.results.hypotheses import Hypotheses
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
 
@@ -277,6 +280,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
             return None
+        from photogram.results.hypotheses import hypotheses
         from photogram.results.reliability_summary import reliability_summary
         from photogram.statistics.snooping.suspects import LostSupportError
 
@@ -285,7 +289,44 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Everything else stands; a network that rounding makes singular here has said so before.
             return None
-        return reliability_summary(found, heights=self.geographic)
+        return reliability_summary(found, hypotheses(self, found), heights=self.geographic)
+
+    def hypothesis_facts(self) -> dict[str, Any]:
+        """Return what hypotheses need to know beside the network; nothing if they are not about it."""
+        return {}
+
+    def _hypotheses(self) -> Hypotheses:
+        summary = self.reliability_summary
+        if summary is None:
+            raise AdjustmentError(phrase("hypothesis.untested"))
+        return summary.hypotheses
+
+    def hypotheses(self) -> pd.DataFrame:
+        """Return errors of sets and of single observations as a data frame, with their tests (docs/tests.md).
+
+        A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no error,
+        and the estimated error in the units of the observations.
+
+        Raises
+        ------
+        AdjustmentError
+            The adjustment has not converged, has a robust loss or no redundancy.
+        """
+        return self._hypotheses().tests().frame()
+
+    def external_reliability(self) -> pd.DataFrame:
+        """Return what undetected errors would change, as a data frame with a row for each hypothesis.
+
+        Columns are the redundancy, the minimal detectable bias (MDB), the largest effect of an error of that
+        size on any function of the unknowns in its standard deviations, the number of points that it moves by
+        more than 4 standard deviations, and the largest change of a point.
+
+        Raises
+        ------
+        AdjustmentError
+            As of :meth:`hypotheses`.
+        """
+        return self._hypotheses().external_reliability().frame()
 
     @property
     def image_points(self) -> Indices:

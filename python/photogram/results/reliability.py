@@ -86,7 +86,7 @@ class Reliability:
         power: float,
         known: bool,  # whether the unit weight is known; otherwise lambda0 is that of the F test
     ) -> None:
-        self._trial, self._covariances = trial, covariances
+        self.trial, self._covariances = trial, covariances
         self.level, self.power, self.known = level, power, known
         self.standing: Standing = trial.stand()
         self.tests: Tests = trial.tests()
@@ -95,7 +95,7 @@ class Reliability:
     @property
     def sd(self) -> Floats:
         """(M,) standard deviations a priori."""
-        return self._trial.deviations
+        return self.trial.deviations
 
     @property
     def redundancy(self) -> Floats:
@@ -117,7 +117,7 @@ class Reliability:
 
     def block(self, group: int) -> Floats:
         """Return R of a group: (m, m), of unit weight; zero for what takes no part."""
-        return self._trial.own_block(group)
+        return self.trial.own_block(group)
 
     @property
     def detectable(self) -> Floats:
@@ -153,7 +153,7 @@ class Reliability:
     @cached_property
     def _effects(self) -> Floats:
         """(M, 9) what an error of one standard deviation does to its own point and photo."""
-        return self._trial.core.effects(list(range(len(self.suspects))))
+        return self.trial.core.effects(list(range(len(self.suspects))))
 
     @property
     def own_point_effect(self) -> Floats:
@@ -171,7 +171,7 @@ class Reliability:
         In the unit of the object space; `heights` alone, where plan coordinates are angles. NaN without a
         point.
         """
-        effects = self._trial.core.effects(groups)[:, :3]
+        effects = self.trial.core.effects(groups)[:, :3]
         starts, errors = self.suspects.row_starts, self.detectable / self.sd
         found, first = [], 0
         for group in groups:
@@ -228,7 +228,7 @@ class Reliability:
             if not norm[row] > best:
                 break
             group = int(group_of[row])
-            own = self._trial.core.most_moved([group])[row - int(self.suspects.row_starts[group])]
+            own = self.trial.core.most_moved([group])[row - int(self.suspects.row_starts[group])]
             kind, index, component, effect, in_sd = own
             size = float(self.detectable[row] / self.sd[row])
             best = max(best, size * in_sd)
@@ -246,7 +246,7 @@ class Reliability:
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
         """Return the same by the numbers of the groups, with their correlation: networks have thousands."""
-        return self._trial.core.inseparable(points, limit)
+        return self.trial.core.inseparable(points, limit)
 
     def named(self, pair: tuple[int, int, float]) -> Inseparable:
         """Return a pair of :meth:`pairs_on` with its names."""
@@ -264,13 +264,13 @@ class Reliability:
         limit
             Of the correlation.
         """
-        columns = self._trial.core.responses([group])
+        columns = self.trial.core.responses([group])
         starts = self.suspects.row_starts
         found = []
         for other in np.flatnonzero(self.tests.active & (self.tests.rank > 0)).tolist():
             rows = slice(int(starts[other]), int(starts[other + 1]))
             if other != group and (np.abs(columns[:, rows]) > 0).any():
-                rho = self._trial.correlation(group, other, columns[:, rows])
+                rho = self.trial.correlation(group, other, columns[:, rows])
                 if rho > limit:
                     found.append(self._pair(group, other, rho))
         return sorted(found, key=lambda pair: -pair.correlation)

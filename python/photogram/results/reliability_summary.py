@@ -13,6 +13,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results.hypotheses import Hypotheses
 from photogram.results.reliability import Inseparable, Reliability
 from photogram.show.page import Part, Remarks
 from photogram.show.quantity import Quantities, Quantity, Table, members, records
@@ -48,6 +49,7 @@ class ReliabilitySummary:
     points_looked_into: int
     suspects: Suspects  # all groups, and their tests
     tests: Tests
+    hypotheses: Hypotheses  # Errors of sets and single observations, and their effects if undetected
 
     @property
     def testable(self) -> Bools:
@@ -104,13 +106,17 @@ class ReliabilitySummary:
         }
 
 
-def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySummary:
+def reliability_summary(
+    found: Reliability, hypotheses: Hypotheses, *, heights: bool
+) -> ReliabilitySummary:
     """Return what a report says of the reliability of a network.
 
     Parameters
     ----------
     found
         The reliability of every observation.
+    hypotheses
+        Errors of sets and single observations.
     heights
         Whether own points are judged by their heights alone: where plan coordinates are angles.
     """
@@ -132,6 +138,7 @@ def reliability_summary(found: Reliability, *, heights: bool) -> ReliabilitySumm
         points_looked_into=len(points),
         suspects=suspects,
         tests=tests,
+        hypotheses=hypotheses,
     )
 
 

@@ -238,6 +238,12 @@ class Result(OnFilm, AdjustedNetwork):
         core = self._core_network().trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
+    def hypothesis_facts(self) -> dict[str, Any]:
+        """Return velocities of photos, sets of positions and control, and sizes of images."""
+        from photogram.results.hypotheses import block_facts
+
+        return block_facts(self)
+
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the block as it was given, but with what is free where the adjustment has ended.
 

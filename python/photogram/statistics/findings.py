@@ -201,6 +201,8 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
+    # Errors that would remain undetected and move many points, the worst first
+    unchecked: Sequence[Text] = ()
     snooped: Removed | None = None
     # What a start has taken out and does not fit the adjusted network either; None for nothing
     set_aside: Removed | None = None

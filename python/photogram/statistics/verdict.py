@@ -457,6 +457,13 @@ RULES = (
     Rule("not-accurate-enough", lambda e: e.found.shortfall, EXIT_NOT_USABLE, ("more-views",)),
     Rule("look-at", _look_at, 0, ("look-at",), warning=True, also=True),
     Rule("weights-pessimistic", _too_low, 0, ("scaled", "smaller-sd")),
+    Rule(
+        "accepted-not-checked",
+        _listing("accepted-not-checked", "errors", "unchecked"),
+        0,
+        ("check-undetected",),
+        warning=True,
+    ),
     Rule("accepted", _accepted, 0, ()),
     Rule("not-tested", _not_tested, 0, ("compare",)),
 )

@@ -58,7 +58,7 @@ def test_other_commands_know_networks(given, tmp_path):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--jigsaw", "CAMSOLV=all"), "'CAMSOLV' is unknown; the nearest name is 'CAMSOLVE'"),
+        (
             ("--jigsaw", "CAMSOLV=all"),
             "the setting of jigsaw 'CAMSOLV' is unknown; the nearest name is 'CAMSOLVE'",
         ),

@@ -89,6 +89,11 @@ impl<'a> ObservationEquations<'a> {
         Self { problem, at, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
 
+    /// With the columns of fixed and held unknowns.
+    pub fn with_fixed_columns(self) -> Self {
+        Self { fixed: None, ..self }
+    }
+
     /// The problem that they are of.
     pub fn problem(&self) -> &'a AnyProblem<'a> {
         self.problem

@@ -59,6 +59,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod additional;
 mod chords;
 mod corrected;
 mod damped;
@@ -88,6 +89,7 @@ mod transformation;
 mod trust_region;
 mod walk;
 
+pub use additional::{Additional, AdditionalParameters, Equation, EquationOf};
 pub use damped::step_rules;
 pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{

@@ -42,8 +42,17 @@ impl<'a> Terms<'a> {
     }
 
     /// The rows of weighted unknowns, one of each, ascending: the unknown, its equation's coefficients of unknowns, observed minus computed.
-    pub fn each_row(&self, mut take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64)) {
-        for term in self.within(0..self.sd.len()) {
+    pub fn each_row(&self, take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64)) {
+        self.rows_within(0..self.sd.len(), take);
+    }
+
+    /// The same of terms that begin among some unknowns.
+    pub fn rows_within(
+        &self,
+        of: Range<usize>,
+        mut take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64),
+    ) {
+        for term in self.within(of) {
             for (k, row) in term.rows().enumerate().filter(|&(k, _)| is_weighted(self.sd[term.first + k])) {
                 take(term.first + k, &mut term.unknowns().zip(row.iter().copied()), term.constant[k]);
             }

@@ -110,10 +110,10 @@ fn taken<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 /// A test of a suspect, in its units.
-struct Tested {
-    test: GroupTest,
-    residual: Few,
-    cofactors: Few,
+pub(super) struct Tested {
+    pub test: GroupTest,
+    pub residual: Few,
+    pub cofactors: Few,
     error: Few,
     error_sd: Few,
 }
@@ -141,7 +141,7 @@ impl Trial {
     }
 
     /// None where nothing of it takes part.
-    fn test(
+    pub(super) fn test(
         &self,
         suspect: &Suspect,
         found: &Leverages,

@@ -56,6 +56,7 @@ mod evaluated;
 pub mod film;
 mod group_tests;
 mod groups;
+pub mod hypotheses;
 mod in_block;
 mod in_lanes;
 mod intersection;

@@ -27,6 +27,8 @@ pub struct Trial {
     pub(super) place: Vec<Option<usize>>,
     /// The suspects at each local point, by its place.
     pub(super) on_place: Vec<Vec<usize>>,
+    /// The camera of each photo.
+    pub(super) camera_of_photo: Vec<usize>,
     /// What was held for a datum where the adjustment has ended.
     pub(super) held: Vec<usize>,
     found: Option<Leverages>,
@@ -153,6 +155,7 @@ impl Trial {
             block_starts,
             place,
             on_place,
+            camera_of_photo: network.photos.iter().map(|photo| photo.camera).collect(),
             held,
             stands: found.is_some(),
             found,

@@ -11,7 +11,8 @@ use pyo3::prelude::*;
 #[pyclass(module = "photogram._photocore", frozen)]
 pub struct NetworkSuspects(pub(super) Arc<Suspects>);
 
-fn subject(subject: Subject) -> (u8, i64) {
+/// The number of a kind, and the index.
+pub(super) fn subject(subject: Subject) -> (u8, i64) {
     let (kind, index) = match subject {
         Subject::Image(index) => (0, index),
         Subject::Control(index) => (1, index),

@@ -2,14 +2,15 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use photocore::adjustment::Loss;
+use photocore::network::hypotheses::{About, Facts, Hypotheses, Hypothesis};
 use photocore::network::{Moved, Network, Options, Out, Outcome, Trial, UnknownOf};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::covariances::Refused;
 use super::state::BlockState;
-use super::suspects::NetworkSuspects;
-use crate::arrays::{Matrix, Vector, table};
+use super::suspects::{NetworkSuspects, subject};
+use crate::arrays::{Array, Matrix, Vector, rows, table};
 use crate::options::named_loss;
 use crate::solution::status_name;
 use crate::work::{Workers, watched};
@@ -35,6 +36,39 @@ fn outcome_row(outcome: Outcome) -> OutcomeRow {
 
 /// Statistic, rows that are out, error and its standard deviation of each.
 type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
+
+/// A hypothesis as a dictionary; see the stub.
+fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>> {
+    let row = PyDict::new(py);
+    let (kind, index, component) = match own.about {
+        About::Set(set) => (None, set.map(|set| set as i64), None),
+        About::Group(group, component) => {
+            let (kind, index) = subject(group);
+            (Some(kind), Some(index), component)
+        }
+    };
+    let judged = own.judged;
+    row.set_item("code", own.code)?;
+    row.set_item("group", kind)?;
+    row.set_item("index", index)?;
+    row.set_item("component", component)?;
+    row.set_item("parameters", own.parameters)?;
+    row.set_item("observations", own.observations)?;
+    row.set_item("plausible", own.plausible)?;
+    row.set_item("rank", judged.rank)?;
+    row.set_item("statistic", judged.statistic)?;
+    row.set_item("probability", judged.probability)?;
+    row.set_item("estimate", judged.estimate)?;
+    row.set_item("cofactors", judged.cofactors)?;
+    row.set_item("redundancy", judged.redundancy)?;
+    row.set_item("noncentrality", judged.noncentrality)?;
+    row.set_item("mdb", judged.mdb)?;
+    row.set_item("error", judged.error)?;
+    row.set_item("bias_to_noise", judged.bias_to_noise)?;
+    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change));
+    row.set_item("effect", effect)?;
+    Ok(row)
+}
 
 impl NetworkTrial {
     fn workers(&self) -> Workers {
@@ -151,6 +185,43 @@ impl NetworkTrial {
             all.set_item(name, PyArray1::from_vec(py, values))?;
         }
         Ok(all)
+    }
+
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, centre, estimated, detection, limit, effects))]
+    #[allow(clippy::too_many_arguments, reason = "one for each fact")]
+    fn hypotheses<'py>(
+        &self,
+        py: Python<'py>,
+        velocities: Array<'_>,
+        times: Vec<f64>,
+        position_sets: Vec<Option<usize>>,
+        control_sets: Vec<Option<usize>>,
+        readouts: Vec<Option<[f64; 3]>>,
+        widths: Vec<f64>,
+        centre: Option<[f64; 3]>,
+        estimated: Option<(f64, f64)>,
+        detection: (f64, f64),
+        limit: f64,
+        effects: usize,
+    ) -> PyResult<(Vec<Bound<'py, PyDict>>, Matrix<'py>)> {
+        let velocities = rows("velocities", &velocities)?;
+        let facts = Facts {
+            velocities,
+            times,
+            position_sets,
+            control_sets,
+            readouts,
+            widths,
+            centre,
+            estimated,
+            detection,
+            limit,
+            effects,
+        };
+        let found = watched(py, self.workers(), None, |pool, _| self.trial.hypotheses(&facts, pool))?;
+        let Hypotheses { all, sets, correlations } = found.map_err(|error| (self.refused)(&error))?;
+        let rows = all.into_iter().map(|own| hypothesis_row(py, own)).collect::<PyResult<_>>()?;
+        Ok((rows, PyArray1::from_vec(py, correlations).reshape([sets, sets])?))
     }
 
     fn predictions(&self, py: Python<'_>, suspects: Vec<usize>) -> PyResult<Vec<Option<PredictionRow>>> {

@@ -189,7 +189,7 @@ def _sensor_pose(position: Floats, axes: Floats) -> content.Pose:
 
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
-    """Return the covariances of a result in the order of the model's files: docs/formats.md."""
+    """Return the covariances of a result in the order of the model's files: docs/formats/colmap.md."""
     model = _written(project)
     block = result.block
     rows = {name: row for row, name in enumerate(block.photo_ids)}

@@ -1,4 +1,4 @@
-"""Reading a plain project: tables with a file of settings (docs/formats.md has the schema)."""
+"""Reading a plain project: tables with a file of settings (schema: docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 

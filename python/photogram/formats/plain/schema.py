@@ -1,4 +1,4 @@
-"""The tables of the plain project, each declared once; docs/formats.md describes their columns."""
+"""The tables of the plain project, each declared once; docs/formats/plain-tables.md describes their columns."""
 
 from __future__ import annotations
 

@@ -1,0 +1,391 @@
+//! Additional parameters of the computed observations, l = A x + C d + v: how well the residuals test them, what they would be, and what
+//! they would change, from one factor and without adjusting again.
+//!
+//! With weights P and cofactors Q of the unknowns: score u = C^T P v, right-hand sides N = A^T P C, redundancy R = C^T P C - N^T Q N
+//! (Baarda 1968; Förstner 1983). If the observations have the error C d, the unknowns change by Q N d. Local blocks are eliminated as they
+//! are formed, so that only unknowns of retained blocks are solved for.
+
+use std::collections::HashMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::equations::ObservationEquations;
+use super::linearized::Linearized;
+use super::problem::AnyProblem;
+use super::terms::Terms;
+use super::walk::Buffers;
+use crate::{Threads, parallel};
+
+/// An observation equation of unit weight.
+#[derive(Debug, Clone, Copy)]
+pub struct Equation<'a> {
+    /// Its observation.
+    pub of: EquationOf,
+    /// Standard deviation of the observation; 1 if its components are weighted together.
+    pub sd: f64,
+    /// Unknowns, fixed ones among them, with their coefficients.
+    pub coefficients: &'a [(usize, f64)],
+}
+
+/// The observation of an equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EquationOf {
+    /// A row of a group, which belongs to a local block.
+    Group {
+        /// The group.
+        group: usize,
+        /// Its local block.
+        local: usize,
+        /// The row in the group.
+        row: usize,
+    },
+    /// A row of a tie.
+    Tie {
+        /// The tie.
+        tie: usize,
+        /// The row in the tie.
+        row: usize,
+    },
+    /// An unknown as an observation of itself.
+    Unknown(usize),
+}
+
+/// Additional parameters: which computed observations depend on them, and how.
+pub trait AdditionalParameters: Sync {
+    /// Number of parameters.
+    fn count(&self) -> usize;
+
+    /// The local blocks whose observations, or whose unknowns as observations, depend on any of them; None for all.
+    fn locals(&self) -> Option<Vec<usize>>;
+
+    /// Appends the parameters that an equation depends on, with its partials in unit weight.
+    fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>);
+}
+
+/// Sums over all observations that test additional parameters.
+#[derive(Debug)]
+pub struct Additional {
+    /// u = C^T P v.
+    pub score: DVector<f64>,
+    /// C^T P C.
+    pub squares: DMatrix<f64>,
+    /// R = C^T P Q_vv P C.
+    pub redundancy: DMatrix<f64>,
+    /// By how much each unknown that is not local changes with an error of each parameter, a column per parameter.
+    pub effects: DMatrix<f64>,
+    /// Number of observations that depend on each.
+    pub observations: Vec<usize>,
+}
+
+/// The equations of a local block.
+#[derive(Default)]
+struct LocalRows {
+    /// Of each equation: observed minus computed, coefficients of the unknowns of the block.
+    own: Vec<(f64, Vec<f64>)>,
+    /// Where the coefficients of other unknowns, and the partials by the parameters, of each equation end.
+    ends: Vec<(usize, usize)>,
+    others: Vec<(usize, f64)>,
+    partials: Vec<(usize, f64)>,
+    coefficients: Vec<(usize, f64)>,
+}
+
+/// A problem at given values with additional parameters.
+struct Extended<'a> {
+    equations: ObservationEquations<'a>,
+    terms: Terms<'a>,
+    fixed: Vec<bool>,
+    parameters: &'a dyn AdditionalParameters,
+}
+
+impl LocalRows {
+    fn clear(&mut self) {
+        self.own.clear();
+        self.ends.clear();
+        self.others.clear();
+        self.partials.clear();
+    }
+
+    /// Takes over the equation whose coefficients are in the buffer.
+    fn push(
+        &mut self,
+        to: &Extended<'_>,
+        (of, sd, constant): (EquationOf, f64, f64),
+        first: usize,
+        width: usize,
+    ) {
+        let from = self.partials.len();
+        let equation = Equation { of, sd, coefficients: &self.coefficients };
+        to.parameters.partials(&equation, &mut self.partials);
+        let mut kept = from;
+        for k in from..self.partials.len() {
+            if self.partials[k].1 != 0.0 {
+                self.partials[kept] = self.partials[k];
+                kept += 1;
+            }
+        }
+        self.partials.truncate(kept);
+        let mut own = vec![0.0; width];
+        for &(unknown, value) in self.coefficients.iter().filter(|own| !to.fixed[own.0]) {
+            match unknown.checked_sub(first) {
+                Some(k) if k < width => own[k] = value,
+                _ => self.others.push((unknown, value)),
+            }
+        }
+        self.own.push((constant, own));
+        self.ends.push((self.others.len(), self.partials.len()));
+    }
+
+    /// Each equation: observed minus computed, its coefficients of the block and of others, its partials.
+    #[allow(clippy::type_complexity, reason = "the parts of an equation")]
+    fn rows(&self) -> impl Iterator<Item = (f64, &[f64], &[(usize, f64)], &[(usize, f64)])> {
+        self.own.iter().enumerate().map(|(k, (constant, own))| {
+            let (others, partials) = if k == 0 { (0, 0) } else { self.ends[k - 1] };
+            let ends = self.ends[k];
+            (*constant, &own[..], &self.others[others..ends.0], &self.partials[partials..ends.1])
+        })
+    }
+}
+
+impl Extended<'_> {
+    /// Writes the equations of a local block, its unknowns as observations among them.
+    fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
+        let problem = self.equations.problem();
+        let layout = problem.layout();
+        let range = layout.local_range(local);
+        let (first, width, size) = (range.start, range.len(), layout.rows());
+        rows.clear();
+        self.equations.each_row(buffers, local, |row| {
+            rows.coefficients.clear();
+            rows.coefficients.extend(row.taken());
+            let of = EquationOf::Group { group: row.number / size, local, row: row.number % size };
+            rows.push(self, (of, self.equations.deviation(row.number), row.constant), first, width);
+        });
+        self.terms.rows_within(range, |unknown, row, constant| {
+            rows.coefficients.clear();
+            rows.coefficients.extend(row);
+            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], constant), first, width);
+        });
+    }
+
+    /// The inverse of the normal matrix of a local block.
+    fn inverse(&self, local: usize, rows: &LocalRows) -> DMatrix<f64> {
+        let range = self.equations.problem().layout().local_range(local);
+        let mut normal = DMatrix::zeros(range.len(), range.len());
+        for (_, own, ..) in rows.rows() {
+            for (i, a) in own.iter().enumerate() {
+                own.iter().enumerate().for_each(|(j, b)| normal[(i, j)] += a * b);
+            }
+        }
+        range.enumerate().filter(|(_, unknown)| self.fixed[*unknown]).for_each(|(k, _)| normal[(k, k)] = 1.0);
+        let count = normal.nrows();
+        normal.cholesky().map_or_else(|| DMatrix::zeros(count, count), |factor| factor.inverse())
+    }
+}
+
+/// The sums over some observations.
+struct Sums {
+    score: DVector<f64>,
+    squares: DMatrix<f64>,
+    /// What local blocks take up of the squares.
+    taken: DMatrix<f64>,
+    observations: Vec<usize>,
+    /// Right-hand sides of unknowns that are not local: where those of each start.
+    starts: HashMap<usize, usize>,
+    rights: Vec<f64>,
+}
+
+impl Sums {
+    fn new(count: usize) -> Self {
+        Self {
+            score: DVector::zeros(count),
+            squares: DMatrix::zeros(count, count),
+            taken: DMatrix::zeros(count, count),
+            observations: vec![0; count],
+            starts: HashMap::new(),
+            rights: vec![],
+        }
+    }
+
+    /// Adds an equation to scores and squares.
+    fn add(&mut self, constant: f64, partials: &[(usize, f64)]) {
+        for &(i, first) in partials {
+            self.observations[i] += 1;
+            self.score[i] += first * constant;
+            partials.iter().for_each(|&(j, second)| self.squares[(i, j)] += first * second);
+        }
+    }
+
+    /// Adds an equation to the right-hand sides, with these partials by all parameters.
+    fn reduce(&mut self, others: &[(usize, f64)], partials: &[f64]) {
+        let count = partials.len();
+        for &(unknown, coefficient) in others {
+            let next = self.rights.len();
+            let start = *self.starts.entry(unknown).or_insert(next);
+            if start == next {
+                self.rights.resize(next + count, 0.0);
+            }
+            let right = &mut self.rights[start..start + count];
+            right.iter_mut().zip(partials).for_each(|(sum, partial)| *sum += partial * coefficient);
+        }
+    }
+
+    /// Adds a local block.
+    fn add_local(&mut self, to: &Extended<'_>, local: usize, rows: &LocalRows) {
+        if rows.partials.is_empty() {
+            return;
+        }
+        let (count, inverse) = (self.observations.len(), to.inverse(local, rows));
+        let mut right = DMatrix::zeros(inverse.nrows(), count);
+        for (constant, own, _, partials) in rows.rows() {
+            self.add(constant, partials);
+            for &(column, partial) in partials {
+                own.iter().enumerate().for_each(|(k, value)| right[(k, column)] += value * partial);
+            }
+        }
+        let solved = inverse * &right;
+        self.taken += right.tr_mul(&solved);
+        let mut left = vec![0.0; count];
+        for (_, own, others, partials) in rows.rows() {
+            for (column, value) in left.iter_mut().enumerate() {
+                let solved = solved.column(column);
+                *value = -own.iter().zip(solved.iter()).map(|(a, x)| a * x).sum::<f64>();
+            }
+            partials.iter().for_each(|&(column, partial)| left[column] += partial);
+            self.reduce(others, &left);
+        }
+    }
+}
+
+impl Linearized {
+    fn extended<'a>(
+        &'a self,
+        problem: &'a AnyProblem<'a>,
+        parameters: &'a dyn AdditionalParameters,
+        threads: &Threads,
+    ) -> Extended<'a> {
+        let equations = self.equations(problem, threads).with_fixed_columns();
+        Extended {
+            equations,
+            terms: problem.terms(&self.values),
+            fixed: problem.fixed(&self.held),
+            parameters,
+        }
+    }
+
+    /// Tests additional parameters against the residuals at these values.
+    pub fn additional(
+        &self,
+        problem: &AnyProblem<'_>,
+        parameters: &dyn AdditionalParameters,
+        threads: &Threads,
+    ) -> Additional {
+        let (count, layout) = (parameters.count(), problem.layout());
+        let extended = self.extended(problem, parameters, threads);
+        let of_locals = |buffers: &mut Buffers, locals: &mut dyn Iterator<Item = usize>| {
+            let (mut sums, mut rows) = (Sums::new(count), LocalRows::default());
+            for local in locals {
+                extended.write(buffers, local, &mut rows);
+                sums.add_local(&extended, local, &rows);
+            }
+            sums
+        };
+        let mut parts = match parameters.locals() {
+            None => problem.for_stretches(threads, |buffers, locals| of_locals(buffers, &mut { locals })),
+            Some(some) => vec![of_locals(&mut Buffers::default(), &mut some.into_iter())],
+        };
+        parts.push(retained(&extended, count));
+
+        let (mut sums, first) = (Sums::new(count), layout.all_locals().end);
+        let mut rights = DMatrix::zeros(layout.unknowns() - first, count);
+        for part in parts {
+            sums.score += part.score;
+            sums.squares += part.squares;
+            sums.taken += part.taken;
+            sums.observations.iter_mut().zip(part.observations).for_each(|(sum, own)| *sum += own);
+            for (unknown, start) in part.starts {
+                let own = &part.rights[start..start + count];
+                own.iter().enumerate().for_each(|(k, value)| rights[(unknown - first, k)] += value);
+            }
+        }
+        let solved = threads.install(|| self.factor.solve_reduced(layout, rights.as_slice()));
+        let effects = DMatrix::from_vec(rights.nrows(), count, solved);
+        let taken = sums.taken + rights.tr_mul(&effects);
+        let redundancy = &sums.squares - (&taken + taken.transpose()) / 2.0;
+        let Sums { score, squares, observations, .. } = sums;
+        Additional { score, squares, redundancy, effects, observations }
+    }
+
+    /// By how much the unknowns of some local blocks change with errors: for each block its unknowns by errors, a column per error.
+    ///
+    /// * `effects`: changes of the unknowns that are not local, a column per error;
+    /// * `errors`: the errors of the parameters, a column per error.
+    pub fn changes_of_locals(
+        &self,
+        problem: &AnyProblem<'_>,
+        parameters: &dyn AdditionalParameters,
+        (effects, errors): (&DMatrix<f64>, &DMatrix<f64>),
+        locals: &[usize],
+        threads: &Threads,
+    ) -> Vec<DMatrix<f64>> {
+        let extended = self.extended(problem, parameters, threads);
+        let (first, count) = (problem.layout().all_locals().end, errors.ncols());
+        // An error per row: its elements follow each other.
+        let (effects, errors) = (effects.transpose(), errors.transpose());
+        let change = |local: usize| {
+            let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
+            extended.write(&mut buffers, local, &mut rows);
+            let inverse = extended.inverse(local, &rows);
+            let mut right = DMatrix::zeros(inverse.nrows(), count);
+            let mut left = DVector::zeros(count);
+            for (_, own, others, partials) in rows.rows() {
+                left.fill(0.0);
+                for &(unknown, value) in others {
+                    left.axpy(-value, &effects.column(unknown - first), 1.0);
+                }
+                for &(parameter, partial) in partials {
+                    left.axpy(partial, &errors.column(parameter), 1.0);
+                }
+                for (k, value) in own.iter().enumerate() {
+                    right.row_mut(k).iter_mut().zip(left.iter()).for_each(|(sum, left)| *sum += value * left);
+                }
+            }
+            inverse * right
+        };
+        threads.install(|| parallel::map(locals.len(), AT_LEAST, |k| change(locals[k])))
+    }
+}
+
+/// Local blocks that a thread takes at least.
+const AT_LEAST: usize = 32;
+
+/// The sums over ties and over unknowns that are not local.
+fn retained(extended: &Extended<'_>, count: usize) -> Sums {
+    let problem = extended.equations.problem();
+    let (layout, mut sums) = (problem.layout(), Sums::new(count));
+    let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
+    let (mut coefficients, mut partials, mut dense) = (vec![], vec![], vec![0.0; count]);
+    let mut add = |(of, sd, constant): (EquationOf, f64, f64), coefficients: &mut Vec<(usize, f64)>| {
+        partials.clear();
+        extended.parameters.partials(&Equation { of, sd, coefficients }, &mut partials);
+        if partials.iter().all(|own| own.1 == 0.0) {
+            return;
+        }
+        sums.add(constant, &partials);
+        dense.fill(0.0);
+        partials.iter().for_each(|&(column, partial)| dense[column] += partial);
+        coefficients.retain(|own| !extended.fixed[own.0]);
+        sums.reduce(coefficients, &dense);
+    };
+    extended.equations.each_row_of_ties(|tie, row| {
+        coefficients.clear();
+        coefficients.extend(row.taken());
+        let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
+        add((of, extended.equations.deviation(row.number), row.constant), &mut coefficients);
+    });
+    extended.terms.rows_within(first..layout.unknowns(), |unknown, row, constant| {
+        coefficients.clear();
+        coefficients.extend(row);
+        add((EquationOf::Unknown(unknown), problem.sd[unknown], constant), &mut coefficients);
+    });
+    sums
+}

@@ -1,0 +1,112 @@
+//! Fixed parameters of cameras: principal distance, principal point, each term of distortion.
+
+use super::super::trial::Trial;
+use super::catalogue::{Catalogue, put};
+use crate::adjustment::Equation;
+use crate::geometry::Camera;
+
+/// Cameras that are tested, those with the most photos.
+const MOST_CAMERAS: usize = 4;
+/// Different cameras from which on none is tested: each photo has its own.
+const MOST_GROUPS: usize = 32;
+/// Terms of distortion of each.
+const MOST_TERMS: usize = 6;
+/// Plausible error of the principal distance, relative.
+const DISTANCE: f64 = 0.05;
+/// Plausible error of the principal point, in widths of the image.
+const POINT: f64 = 0.02;
+
+const DISTANCES: [&str; 4] = ["f", "c", "fx", "fy"];
+const POINTS: [&str; 4] = ["cx", "cy", "xp", "yp"];
+
+pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
+    let bundle = catalogue.bundle;
+    let camera_of = trial.camera_of_photo();
+    // Cameras with equal parameters are one: a block may have one for each photo.
+    let mut groups: Vec<(String, Vec<f64>, Vec<usize>)> = vec![];
+    for (photo, images) in bundle.images_on.iter().enumerate() {
+        // What a scanned film sees is not the image of its camera.
+        if *images == 0 || !bundle.passages.is_empty() {
+            continue;
+        }
+        let camera = &catalogue.stations.photos[photo].camera;
+        let (name, parameters) = (camera.name(), camera.parameters());
+        match groups.iter().position(|own| own.0 == name && own.1 == parameters) {
+            Some(place) => groups[place].2.push(photo),
+            None if groups.len() < MOST_GROUPS => groups.push((name.to_owned(), parameters, vec![photo])),
+            None => return,
+        }
+    }
+    groups.sort_by_key(|own| std::cmp::Reverse(own.2.len()));
+    for (_, _, photos) in groups.into_iter().take(MOST_CAMERAS) {
+        of_camera(catalogue, trial, camera_of[photos[0]], &photos);
+    }
+}
+
+fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos: &[usize]) {
+    let own: Camera = catalogue.stations.photos[photos[0]].camera.clone();
+    let fixed = trial.fixed_parameters(photos[0], own.parameter_names().len());
+    let fixed: Vec<(usize, &'static str)> =
+        fixed.into_iter().map(|parameter| (parameter, own.parameter_names()[parameter].0)).collect();
+    let width = catalogue.facts.widths.get(camera).copied().unwrap_or(f64::NAN);
+    let of = |names: &[&str]| -> Vec<(usize, &'static str)> {
+        fixed.iter().filter(|own| names.contains(&own.1)).copied().collect()
+    };
+    let (distances, points) = (of(&DISTANCES), of(&POINTS));
+    let others = fixed.iter().filter(|own| !DISTANCES.contains(&own.1) && !POINTS.contains(&own.1));
+    let mut hypotheses =
+        vec![("camera-f", distances, DISTANCE * own.scale()), ("camera-point", points, POINT * width)];
+    hypotheses.extend(others.take(MOST_TERMS).map(|&own| ("camera-term", vec![own], f64::NAN)));
+    for (code, parameters, size) in hypotheses.into_iter().filter(|own| !own.1.is_empty()) {
+        let names: Vec<&'static str> = parameters.iter().map(|own| own.1).collect();
+        let plausible = if size.is_finite() { vec![size; names.len()] } else { vec![] };
+        let columns = catalogue.add((code, Some(camera)), &names, &plausible);
+        for &photo in photos {
+            let own = parameters.iter().zip(&columns).map(|(own, &column)| (own.0, column));
+            catalogue.cameras[photo].extend(own);
+        }
+    }
+}
+
+impl Catalogue<'_> {
+    /// Partials of an image by fixed parameters of its camera.
+    pub(super) fn camera_partials(
+        &self,
+        (image, local, row): (usize, usize, usize),
+        equation: &Equation<'_>,
+        partials: &mut Vec<(usize, f64)>,
+    ) {
+        let observed = &self.bundle.images[image];
+        let columns = &self.cameras[observed.photo];
+        if columns.is_empty() || equation.sd.is_infinite() {
+            return;
+        }
+        let station = &self.stations.photos[observed.photo];
+        let sight = match &self.stations.bent {
+            Some(bent) => self.bundle.sight_bent((&self.stations, bent), image, local),
+            None => station.orientation.sight(&self.stations.points[local]),
+        };
+        let (_, computed) = station.camera.compare(&sight, observed.xy);
+        for &(parameter, column) in columns {
+            put(partials, column, computed.by_parameters[row][parameter] / equation.sd);
+        }
+    }
+}
+
+impl Trial {
+    /// The camera of each photo.
+    pub(super) fn camera_of_photo(&self) -> &[usize] {
+        &self.camera_of_photo
+    }
+
+    /// Parameters of the camera of a photo that are fixed.
+    fn fixed_parameters(&self, photo: usize, count: usize) -> Vec<usize> {
+        let (model, problem) = (&self.assembled.problem.model, &self.assembled.problem);
+        let first = match model.blocks.of_camera[photo] {
+            Some(block) => model.of_block(block).start,
+            None if model.has_own_camera(photo) => model.of_block(photo).start + 6,
+            None => return (0..count).collect(),
+        };
+        (0..count).filter(|k| problem.sd.get(first + k).is_some_and(|&sd| sd == 0.0)).collect()
+    }
+}

@@ -1,0 +1,246 @@
+//! The catalogue of errors that sets of observations have in common, and the partials of all observations by their parameters.
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+use super::super::model::{Bundle, Owner};
+use super::super::stations::Stations;
+use super::super::trial::Trial;
+use super::Facts;
+use super::{attitudes, cameras, control, form, positions, shutter};
+use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages};
+use crate::geometry::{ObjectSpace, PoseNumbers};
+
+/// An error that a set of observations has in common.
+pub(super) struct Cause {
+    pub code: &'static str,
+    /// The set of the facts, or the camera.
+    pub set: Option<usize>,
+    pub parameters: Vec<&'static str>,
+    /// Standard deviations of the parameters before the data are used; empty if unknown.
+    pub plausible: Vec<f64>,
+    /// The columns of the catalogue that are the parameters.
+    pub columns: Vec<usize>,
+}
+
+/// Observations that see a displacement of unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Seen {
+    /// Coordinates of control points.
+    Control,
+    /// Positions of photos.
+    Positions,
+    /// Attitudes of photos.
+    Attitudes,
+}
+
+/// All common errors that are possible for a network.
+pub(super) struct Catalogue<'a> {
+    pub causes: Vec<Cause>,
+    pub bundle: &'a Bundle,
+    pub stations: Stations,
+    pub facts: &'a Facts,
+    /// Standard deviations of the unknowns.
+    sd: &'a [f64],
+    count: usize,
+    /// Displacements d(unknown) / d(parameter), by the observations that see them: columns and values.
+    displaced: HashMap<(Seen, usize), Vec<(usize, f64)>>,
+    /// The same of fixed unknowns, whose error all observations see.
+    fixed: HashMap<usize, Vec<(usize, f64)>>,
+    /// Parameters of the camera of each photo, and their columns.
+    pub(super) cameras: Vec<Vec<(usize, usize)>>,
+    /// Column of the readout time of the camera of each photo.
+    pub(super) shutters: Vec<Option<usize>>,
+    camera_of_photo: &'a [usize],
+}
+
+impl<'a> Catalogue<'a> {
+    pub fn new(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Self {
+        let problem = &trial.assembled.problem;
+        let bundle = &problem.model;
+        let photos = bundle.cameras.len();
+        let mut own = Self {
+            causes: vec![],
+            bundle,
+            stations: bundle.evaluated(&found.values),
+            facts,
+            sd: &problem.sd,
+            count: 0,
+            displaced: HashMap::new(),
+            fixed: HashMap::new(),
+            cameras: vec![vec![]; photos],
+            shutters: vec![None; photos],
+            camera_of_photo: trial.camera_of_photo(),
+        };
+        let points = own.control_points(trial);
+        control::add(&mut own, &points);
+        cameras::add(&mut own, trial);
+        // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
+        if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
+            attitudes::add(&mut own);
+            if bundle.space == ObjectSpace::Rectangular {
+                positions::add(&mut own);
+                form::add(&mut own, &points);
+                shutter::add(&mut own, trial);
+            }
+        }
+        own
+    }
+
+    /// Adds a hypothesis with its parameters; their columns.
+    pub fn add(
+        &mut self,
+        (code, set): (&'static str, Option<usize>),
+        parameters: &[&'static str],
+        plausible: &[f64],
+    ) -> Vec<usize> {
+        let columns: Vec<usize> = (self.count..self.count + parameters.len()).collect();
+        self.count += parameters.len();
+        let (parameters, plausible) = (parameters.to_vec(), plausible.to_vec());
+        self.causes.push(Cause { code, set, parameters, plausible, columns: columns.clone() });
+        columns
+    }
+
+    /// Displaces an unknown, as some observations see it, with a parameter.
+    pub fn displace(&mut self, seen: Seen, unknown: usize, column: usize, value: f64) {
+        if self.sd[unknown] == 0.0 {
+            // Observed values are the computed ones plus the error; with fixed ones it is the computed that have it.
+            self.fixed.entry(unknown).or_default().push((column, -value));
+        } else {
+            self.displaced.entry((seen, unknown)).or_default().push((column, value));
+        }
+    }
+
+    /// The same of the first three unknowns from `first` on.
+    pub fn displace_all(&mut self, seen: Seen, first: usize, column: usize, value: &Vector3<f64>) {
+        (0..3).for_each(|k| self.displace(seen, first + k, column, value[k]));
+    }
+
+    /// Points with observed or fixed coordinates: the point of the network, its place in the model.
+    fn control_points(&self, trial: &Trial) -> Vec<(usize, usize)> {
+        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "control");
+        let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.points.iter().copied()).collect();
+        let given = |place: usize| self.sd[self.bundle.of_point(place)].iter().any(|sd| sd.is_finite());
+        let points = trial.assembled.points.iter().enumerate();
+        let control = points.filter(|(place, _)| given(*place) || tied.contains(place));
+        control.map(|(place, &point)| (point, place)).collect()
+    }
+
+    /// Centre of scale, rotation and bending, counted from the origin of the model.
+    pub fn centre(&self) -> Vector3<f64> {
+        let origin = Vector3::from(self.bundle.origin);
+        self.facts.centre.map_or_else(Vector3::zeros, |centre| Vector3::from(centre) - origin)
+    }
+
+    /// Photos whose position was observed, or is fixed, with the first unknown of the position and where it is, counted from the
+    /// origin of the model.
+    pub fn positions(&self) -> Vec<(usize, usize, Vector3<f64>)> {
+        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "position");
+        let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.photos.iter().copied()).collect();
+        let mut observed = vec![false; self.bundle.cameras.len()];
+        tied.into_iter().for_each(|photo| observed[photo] = true);
+        let of = |(photo, observed): (usize, bool)| {
+            let first = self.bundle.of_block(photo).start;
+            let given = self.sd[first..first + 3].iter().any(|sd| sd.is_finite());
+            let orientation = &self.stations.photos[photo].orientation;
+            (given || observed).then(|| (photo, first, orientation.centre()))
+        };
+        observed.into_iter().enumerate().filter_map(of).collect()
+    }
+
+    /// Whether attitudes of photos were observed.
+    pub fn has_attitudes(&self) -> bool {
+        let weighted = |photo: usize| {
+            let first = self.bundle.of_block(photo).start + 3;
+            self.sd[first..first + 3].iter().any(|sd| sd.is_finite() && *sd > 0.0)
+        };
+        self.bundle.observations.iter().any(|tied| tied.observation.kind() == "attitude")
+            || (0..self.bundle.cameras.len()).any(weighted)
+    }
+
+    pub fn camera_of(&self, photo: usize) -> usize {
+        self.camera_of_photo[photo]
+    }
+
+    /// What sees an unknown as an observation of itself.
+    fn seen_by_itself(&self, unknown: usize) -> Option<Seen> {
+        match self.bundle.owner(unknown) {
+            None => Some(Seen::Control),
+            Some((Owner::Photo(_), 0..3)) => Some(Seen::Positions),
+            Some((Owner::Photo(_), 3..6)) => Some(Seen::Attitudes),
+            Some(_) => None,
+        }
+    }
+
+    /// The image of an equation; None if it is of something else.
+    fn image_of(&self, of: EquationOf) -> Option<(usize, usize, usize)> {
+        match of {
+            EquationOf::Group { group, local, row } => Some((group, local, row)),
+            EquationOf::Tie { tie, row } if tie < self.bundle.tied_images() => {
+                let image = self.bundle.point_images.start[self.bundle.locals] + tie;
+                Some((image, self.bundle.point_of(image), row))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl AdditionalParameters for Catalogue<'_> {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn locals(&self) -> Option<Vec<usize>> {
+        let cameras = self.cameras.iter().any(|own| !own.is_empty());
+        if cameras || !self.fixed.is_empty() || self.shutters.iter().any(Option::is_some) {
+            return None;
+        }
+        let end = 3 * self.bundle.locals;
+        let unknowns = self.displaced.keys().map(|own| own.1).filter(|&unknown| unknown < end);
+        let mut locals: Vec<usize> = unknowns.map(|unknown| unknown / 3).collect();
+        locals.sort_unstable();
+        locals.dedup();
+        Some(locals)
+    }
+
+    fn partials(&self, equation: &Equation<'_>, partials: &mut Vec<(usize, f64)>) {
+        let image = self.image_of(equation.of);
+        let seen = match equation.of {
+            EquationOf::Unknown(unknown) => self.seen_by_itself(unknown),
+            EquationOf::Tie { tie, .. } if image.is_none() => {
+                match self.bundle.observations[tie - self.bundle.tied_images()].observation.kind() {
+                    "control" => Some(Seen::Control),
+                    "position" => Some(Seen::Positions),
+                    "attitude" => Some(Seen::Attitudes),
+                    _ => None,
+                }
+            }
+            _ => None,
+        };
+        let mut add = |own: Option<&Vec<(usize, f64)>>, coefficient: f64| {
+            let own = own.into_iter().flatten();
+            own.for_each(|&(column, value)| put(partials, column, coefficient * value));
+        };
+        for &(unknown, coefficient) in equation.coefficients {
+            if let Some(seen) = seen {
+                add(self.displaced.get(&(seen, unknown)), coefficient);
+            }
+            if !self.fixed.is_empty() {
+                add(self.fixed.get(&unknown), coefficient);
+            }
+        }
+        if let Some(image) = image {
+            self.camera_partials(image, equation, partials);
+            self.shutter_partials(image, equation, partials);
+        }
+    }
+}
+
+/// Adds a partial to those of its column.
+pub(super) fn put(partials: &mut Vec<(usize, f64)>, column: usize, value: f64) {
+    match partials.iter_mut().find(|own| own.0 == column) {
+        Some(own) => own.1 += value,
+        None => partials.push((column, value)),
+    }
+}

@@ -1,0 +1,116 @@
+//! External reliability: what an undetected error changes of the points.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::super::suspects::Home;
+use super::super::trial::Trial;
+use crate::Threads;
+use crate::adjustment::{AdditionalParameters, Leverages, Linearized};
+use crate::geometry::ObjectSpace;
+
+/// Local points whose changes are computed; of more points, those at equal intervals.
+const SAMPLE: usize = 2000;
+
+/// What an error changes of the points, by the coordinate of each that changes by most standard deviations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Points that change by more standard deviations than the limit; of large networks estimated from 2,000 points.
+    pub points: usize,
+    /// The same without the points that the error belongs to.
+    pub others: usize,
+    /// The largest change in standard deviations.
+    pub ratio: f64,
+    /// The point and the coordinate of this change; None if nothing changes.
+    pub at: Option<(usize, usize)>,
+    /// The largest change of a coordinate, in the unit of the object space (heights only if that is geographic).
+    pub change: f64,
+}
+
+/// Points whose changes are computed.
+pub(super) struct Sample<'a> {
+    trial: &'a Trial,
+    linearized: &'a Linearized,
+    /// Local points of the model, each of which stands for `share` of them.
+    locals: Vec<usize>,
+    share: f64,
+    /// The point of the network and its standard deviations (a priori unit weight): local ones, then all others.
+    points: Vec<(usize, Vector3<f64>)>,
+}
+
+/// Changes of unknowns by errors, a column per error.
+pub(super) struct Changes {
+    locals: Vec<DMatrix<f64>>,
+    others: DMatrix<f64>,
+}
+
+impl<'a> Sample<'a> {
+    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized) -> Self {
+        let (model, points) = (&trial.assembled.problem.model, &trial.assembled.points);
+        let stride = model.locals.div_ceil(SAMPLE).max(1);
+        let locals: Vec<usize> = (0..model.locals).step_by(stride).collect();
+        let of = |place: usize| {
+            let q = trial.cofactors_at(found, Home::Point(place));
+            (points[place], Vector3::from_fn(|k, _| q[(k, k)].max(0.0).sqrt()))
+        };
+        let share = model.locals as f64 / locals.len().max(1) as f64;
+        let points = locals.iter().copied().chain(model.locals..points.len()).map(of).collect();
+        Self { trial, linearized, locals, share, points }
+    }
+
+    /// Changes by errors of parameters whose effects on unknowns that are not local are known.
+    pub fn changes(
+        &self,
+        parameters: &dyn AdditionalParameters,
+        effects: &DMatrix<f64>,
+        errors: &[DVector<f64>],
+        threads: &Threads,
+    ) -> Changes {
+        if errors.is_empty() {
+            return Changes { locals: vec![], others: DMatrix::zeros(0, 0) };
+        }
+        let errors = DMatrix::from_columns(errors);
+        let others = effects * &errors;
+        let problem = &self.trial.assembled.problem;
+        let locals =
+            self.linearized.changes_of_locals(problem, parameters, (&others, &errors), &self.locals, threads);
+        Changes { locals, others }
+    }
+
+    /// The effect of one of these errors; `own` are points that it belongs to.
+    pub fn effect(&self, changes: &Changes, error: usize, own: &[usize], limit: f64) -> Effect {
+        let model = &self.trial.assembled.problem.model;
+        let is_geographic = matches!(model.space, ObjectSpace::Geographic(_));
+        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0 };
+        let (mut points, mut others) = (0.0, 0.0);
+        let first_other = 3 * model.locals;
+        for (index, &(point, sd)) in self.points.iter().enumerate() {
+            let (is_local, place) = match index.checked_sub(self.locals.len()) {
+                None => (true, 0),
+                Some(behind) => (false, model.of_point(model.locals + behind).start - first_other),
+            };
+            let mut largest = 0.0;
+            for axis in 0..3 {
+                let change = match is_local {
+                    true => changes.locals[index][(axis, error)],
+                    false => changes.others[(place + axis, error)],
+                };
+                let size = change.abs();
+                let ratio = if sd[axis] > 0.0 { size / sd[axis] } else { 0.0 };
+                if ratio > effect.ratio {
+                    (effect.ratio, effect.at) = (ratio, Some((point, axis)));
+                }
+                largest = f64::max(largest, ratio);
+                if axis == 2 || !is_geographic {
+                    effect.change = effect.change.max(size);
+                }
+            }
+            if largest > limit {
+                let share = if is_local { self.share } else { 1.0 };
+                points += share;
+                others += if own.contains(&point) { 0.0 } else { share };
+            }
+        }
+        (effect.points, effect.others) = (points.round() as usize, others.round() as usize);
+        effect
+    }
+}

@@ -1,0 +1,46 @@
+//! A rolling shutter: the lines of an image are read one after the other while the photo moves.
+
+use super::super::trial::Trial;
+use super::catalogue::{Catalogue, put};
+use crate::adjustment::Equation;
+
+/// Plausible readout time of a whole image, in units of time of the velocities.
+const READOUT: f64 = 0.1;
+
+pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
+    let facts = catalogue.facts;
+    let moves = |photo: usize| {
+        facts.velocities.get(photo).is_some_and(|velocity| velocity.iter().all(|value| value.is_finite()))
+    };
+    for (camera, _) in facts.readouts.iter().enumerate().filter(|(_, readout)| readout.is_some()) {
+        let photos: Vec<usize> = (0..catalogue.bundle.cameras.len())
+            .filter(|&photo| trial.camera_of_photo()[photo] == camera && moves(photo))
+            .collect();
+        if photos.is_empty() {
+            continue;
+        }
+        let column = catalogue.add(("readout-time", Some(camera)), &["readout"], &[READOUT])[0];
+        photos.into_iter().for_each(|photo| catalogue.shutters[photo] = Some(column));
+    }
+}
+
+impl Catalogue<'_> {
+    /// Partial of an image by the readout time: the photo has moved by velocity times the time of the line.
+    pub(super) fn shutter_partials(
+        &self,
+        (image, ..): (usize, usize, usize),
+        equation: &Equation<'_>,
+        partials: &mut Vec<(usize, f64)>,
+    ) {
+        let observed = &self.bundle.images[image];
+        let photo = observed.photo;
+        let Some(column) = self.shutters[photo] else { return };
+        let camera = self.camera_of(photo);
+        let Some([a, b, c]) = self.facts.readouts[camera] else { return };
+        let time = a * observed.xy[0] + b * observed.xy[1] + c;
+        let (first, velocity) = (self.bundle.of_block(photo).start, self.facts.velocities[photo]);
+        let own = equation.coefficients.iter().filter(|own| (first..first + 3).contains(&own.0));
+        let change: f64 = own.map(|&(unknown, value)| value * velocity[unknown - first]).sum();
+        put(partials, column, change * time);
+    }
+}

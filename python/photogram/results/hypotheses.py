@@ -1,0 +1,335 @@
+"""Hypotheses: errors that sets of observations have in common, and errors of single ones.
+
+For each the test, the estimate, the minimal detectable bias (MDB), and what an undetected error would change:
+internal and external reliability (Baarda 1968). The core computes them (`photocore::network::hypotheses`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.network.strips import strips_of
+from photogram.show.quantity import Quantity, Table
+from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
+    from photogram.results.network import AdjustedNetwork
+    from photogram.results.network_trial import NamedSuspects
+    from photogram.results.reliability import Reliability
+
+LIMIT = 4.0  # Standard deviations from which on an undetected error of a point counts
+SHARE = 0.02  # Share of points that an undetected error may move beyond the limit
+FEWEST = 2  # Points beside the suspect that it moves at least
+UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetected
+RARE = 0.05  # Plausible errors of a set that may remain undetected
+DETECTION = 0.001, 0.80  # Significance level and power of the MDB
+SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
+
+DATUM = frozenset(
+    {
+        "control-heights",
+        "control-shift",
+        "control-scale",
+        "control-rotation",
+        "control-set",
+        "gnss-heights",
+        "gnss-shift",
+        "gnss-set",
+        "scale",
+    }
+)
+"""Errors that change the datum only: assumptions, unless an independent source tests them."""
+
+UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
+"""Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending, whose
+causes (terms of distortion) are hypotheses of their own."""
+
+MOST_SETS = 8  # Largest number of sets of positions or control that are tested
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What an undetected error changes of the points, by the coordinate of each that changes most."""
+
+    points: int  # beyond the limit
+    others: int  # the same without the points that the error belongs to
+    ratio: float  # largest change, standard deviations
+    at: tuple[int, int] | None  # point and coordinate of this change
+    change: float  # largest change in the linear unit
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """An error of observations or fixed values: its test and its external reliability."""
+
+    code: str
+    group: int | None  # Type of a group of observations; None for a set
+    index: int | None  # of the group, set or camera
+    component: int | None  # None for all components
+    parameters: Sequence[str]
+    observations: int  # that depend on the parameters
+    plausible: Sequence[float]  # Standard deviations before the data are used; empty if unknown
+    rank: int
+    statistic: float
+    probability: float
+    estimate: Sequence[float]
+    cofactors: Sequence[float]
+    redundancy: float
+    noncentrality: float
+    mdb: Sequence[float] | None
+    error: Sequence[float] | None  # whose effect is reported: MDB or plausible size
+    bias_to_noise: float
+    effect: Effect | None
+    log_odds: float = field(default=math.nan)  # against "no error"
+    name: Phrase | None = None
+
+    @property
+    def undetected(self) -> float:
+        """Share of plausible errors that remain undetected; 1 without a plausible size."""
+        if self.mdb is None or not self.plausible:
+            return 1.0
+        size = max(abs(d) / p for d, p in zip(self.mdb, self.plausible, strict=True))
+        return math.erf(size / math.sqrt(2))
+
+    def is_harmful(self, points: int) -> bool:
+        """Whether an undetected error moves too many of a number of points."""
+        if self.effect is None or self.code in UNGRADED:
+            return False
+        if self.undetected < RARE or (self.mdb is None and self.code in DATUM):
+            return False
+        return self.effect.others >= max(FEWEST, math.ceil(SHARE * points))
+
+
+@dataclass(frozen=True, eq=False)
+class Hypotheses:
+    """All hypotheses of an adjusted network: errors of sets first."""
+
+    every: Sequence[Hypothesis]
+    correlations: Floats  # (s, s) of the scores of the s hypotheses on sets
+    points: int  # number of adjusted points
+    point_ids: Sequence[str]
+    axes: Sequence[str]
+
+    @property
+    def harmful(self) -> list[Hypothesis]:
+        """Hypotheses whose undetected errors move too many points, the worst first."""
+        found = [each for each in self.every if each.is_harmful(self.points)]
+        wholes = {(each.group, each.index) for each in found if each.component is None}
+        # A group stands for its components.
+        alone = [
+            each
+            for each in found
+            if each.component is None or (each.group, each.index) not in wholes
+        ]
+        return sorted(alone, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0))
+
+    def unchecked(self) -> list[Phrase]:
+        """Return messages on these errors, the worst first."""
+        messages = []
+        for each in self.harmful:
+            effect = each.effect or Effect(0, 0, 0.0, None, 0.0)
+            if each.mdb is None:
+                messages.append(phrase("unchecked.any", named=each.name))
+            else:
+                messages.append(
+                    phrase(
+                        "unchecked.mdb",
+                        size=_written(each.parameters, each.mdb),
+                        named=each.name,
+                        percent=100 * effect.points / self.points,
+                        ratio=effect.ratio,
+                    )
+                )
+        return messages
+
+    @property
+    def assumptions(self) -> list[Hypothesis]:
+        """Errors of the datum that no independent source tests."""
+        return [each for each in self.every if each.code in DATUM and each.redundancy < UNTESTED]
+
+    def candidates(self, level: float) -> list[Hypothesis]:
+        """Return the hypotheses that the tests do not exclude at a level, the most likely first."""
+        found = [each for each in self.every if each.probability < level / max(len(self.every), 1)]
+        return sorted(found, key=lambda each: -each.log_odds)
+
+    def tests(self) -> Table:
+        """Return the declared table of all tests."""
+        columns = [
+            *self._names(),
+            _column("dimension", [each.rank for each in self.every], "Parameters", decimals=0),
+            _column("statistic", [each.statistic for each in self.every], "T", decimals=2),
+            _column("p", [each.probability for each in self.every], "p", figures=2),
+            _column("log_odds", [each.log_odds for each in self.every], "Log odds", decimals=1),
+            _column("estimate", [_written(each.parameters, each.estimate) for each in self.every], "Estimate", kind="name"),
+        ]  # fmt: skip
+        shown = np.array(sorted(range(len(self.every)), key=lambda k: -self.every[k].log_odds)[:10], dtype=np.int64)
+        note = "Log odds are those of the error against no error; errors of all sizes that are plausible are compared."
+        return Table("hypotheses", "Tested hypotheses", columns, note, shown=shown)
+
+    def external_reliability(self) -> Table:
+        """Return the declared table of undetected errors and their effects on points."""
+        effects = [each.effect or Effect(0, 0, math.nan, None, math.nan) for each in self.every]
+        worst = [
+            "" if each.at is None else f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}"
+            for each in effects
+        ]
+        columns = [
+            *self._names(),
+            _column("redundancy", [each.redundancy for each in self.every], "Redundancy", decimals=4),
+            _column("mdb", [_written(each.parameters, each.mdb or ()) for each in self.every], "MDB", kind="name"),
+            _column("bias_to_noise", [each.bias_to_noise for each in self.every], "Moves up to, sd", decimals=1),
+            _column("points", [each.points for each in effects], "Points moved", decimals=0),
+            _column("ratio", [each.ratio for each in effects], "Largest effect, sd", decimals=1),
+            _column("change", [each.change for each in effects], "Largest effect", decimals=3),
+            _column("at", worst, "At", kind="name"),
+        ]  # fmt: skip
+        order = sorted(range(len(self.every)), key=lambda k: -np.nan_to_num(effects[k].ratio))
+        note = (
+            f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of 100"
+            f" cases. Points moved change by more than {LIMIT:g} standard deviations if it is not detected."
+        )
+        return Table(
+            "external-reliability", "Undetected errors", columns, note, shown=np.array(order[:10], dtype=np.int64)
+        )
+
+    def _names(self) -> list[Quantity]:
+        return [
+            _column("code", [each.code for each in self.every], "", kind="name"),
+            _column("hypothesis", [str(each.name) for each in self.every], "Error", kind="name"),
+        ]
+
+
+def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
+    return Quantity(np.array(values, dtype=object if more.get("kind") == "name" else float), name=name, member=name, head=head, **more)
+
+
+def _written(names: Sequence[str], values: Sequence[float]) -> str:
+    if not names:
+        return ", ".join(f"{value:.4g}" for value in values)
+    return ", ".join(f"{name} {value:.4g}" for name, value in zip(names, values, strict=False))
+
+
+def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
+    """Return the hypotheses of an adjusted network that is tested."""
+    trial = found.trial
+    estimated = None if found.known else result.sum_and_freedom
+    rows, correlations = trial.core.hypotheses(
+        **{**NO_FACTS, **result.hypothesis_facts()}, estimated=estimated, detection=DETECTION, limit=LIMIT
+    )
+    name = group_names(trial.suspects, getattr(result.given, "camera_names", ()))
+    numbers = Counter((row["code"], row["component"] is None) for row in rows)
+    every = []
+    for row in rows:
+        effect = None if row["effect"] is None else Effect(*row["effect"])
+        own = Hypothesis(**{**row, "effect": effect}, name=name(row))
+        odds = _log_odds(own, numbers[own.code, own.component is None], estimated)
+        every.append(replace(own, log_odds=odds))
+    return Hypotheses(
+        every,
+        correlations,
+        points=int(np.count_nonzero(result.used_points)),
+        point_ids=result.given.point_ids,
+        axes=[axis.name for axis in result._terms().point_axes],
+    )
+
+
+def _log_odds(own: Hypothesis, count: int, estimated: tuple[float, float] | None) -> float:
+    """Return T/2 - k/2 ln n_h - ln N_h - sum (d / plausible size)^2 / 2."""
+    k = max(len(own.estimate), 1)
+    statistic = own.statistic
+    if estimated is not None:
+        omega, freedom = estimated
+        statistic = -freedom * math.log(max(1 - statistic / omega, 1e-300))
+    absurd = sum((d / p) ** 2 for d, p in zip(own.estimate, own.plausible, strict=False))
+    return statistic / 2 - k / 2 * math.log(max(own.observations, k + 1)) - math.log(count) - absurd / 2
+
+
+NO_FACTS: dict[str, Any] = {
+    "velocities": np.empty((0, 3)),
+    "times": [],
+    "position_sets": [],
+    "control_sets": [],
+    "readouts": [],
+    "widths": [],
+    "centre": None,
+}
+
+
+def block_facts(result: Result) -> dict[str, Any]:
+    """Return what hypotheses on a block need to know beside its network: velocities, sets, sizes of images."""
+    block = result.block
+    count = len(block.photo_ids)
+    cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
+    facts: dict[str, Any] = {"widths": [], "readouts": []}
+    of_images = cameras[block.image_photos]
+    for camera in range(max(len(block.cameras), 1)):
+        xy = block.image_xy[of_images == camera]
+        low, high = (xy.min(axis=0), xy.max(axis=0)) if len(xy) else (np.zeros(2), np.zeros(2))
+        width, height = (high - low).tolist()
+        facts["widths"].append(width or math.nan)
+        digital = bool(block.cameras) and block.cameras[camera].unit == "px" and height > 0
+        middle = float(low[1] + high[1]) / 2
+        facts["readouts"].append([0.0, 1 / height, -middle / height] if digital else None)
+    if block.geographic:
+        return facts
+    seconds = np.full(count, math.nan)
+    row = {name: k for k, name in enumerate(block.photo_ids)}
+    for each in block.observations:
+        if each.KIND == "position" and each.photos and each.photos[0] in row:
+            seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
+    timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
+    times = seconds if timed else np.arange(count, dtype=np.float64)
+    places = result.photo_positions
+    velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
+    strips = strips_of(places) if count > 1 else []
+    for number, strip in enumerate(strips):
+        sets[strip] = number
+        if len(strip) > 1 and (np.diff(times[strip]) > 0).all():
+            velocities[strip] = np.gradient(places[strip], times[strip], axis=0)
+    facts["velocities"] = velocities
+    if timed:
+        facts["times"] = seconds.tolist()
+    if 1 < len(strips) <= MOST_SETS:
+        facts["position_sets"] = sets.tolist()
+    control = np.isfinite(block.point_sd).any(axis=1)
+    _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
+    own = np.unique(kinds[control])
+    if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
+        number = {kind: k for k, kind in enumerate(own.tolist())}
+        facts["control_sets"] = [
+            number[kind] if is_control else None
+            for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
+        ]
+    return facts
+
+
+def group_names(suspects: NamedSuspects, cameras: Sequence[str]) -> Callable[[dict[str, Any]], Phrase]:
+    """Return a function that names the hypothesis of a row of the core."""
+    groups = {
+        (int(suspects.kinds[group]), int(suspects.subjects[group])): int(group)
+        for group in np.flatnonzero(suspects.kinds != 0)
+    }
+
+    def name(row: dict[str, Any]) -> Phrase:
+        if row["group"] is None:
+            fields: dict[str, Any] = {"set": (row["index"] or 0) + 1, "parameters": list(row["parameters"])}
+            if row["code"] in ("camera-f", "camera-point", "camera-term", "readout-time"):
+                fields["camera"] = cameras[row["index"]] if row["index"] < len(cameras) else "1"
+            return Phrase(f"hypothesis.{row['code']}", fields)
+        group = groups[row["group"], row["index"]]
+        named = suspects.name(group)
+        if row["component"] is None:
+            return named
+        rows = suspects.rows(group)
+        axes = [suspects.row_name(k) for k in rows.tolist() if suspects.components[k] == row["component"]]
+        return phrase("named.parts", axes=axes, named=named)
+
+    return name

@@ -1,0 +1,125 @@
+"""Hypotheses against a dense program: scores, redundancy, estimates, minimal detectable biases, effects on points."""
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from photogram import Block, Camera, adjust
+from photogram.network.observations import Distance, Position
+
+GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
+SETS = {
+    "control-heights": "control heights",
+    "control-shift": "control shift",
+    "gnss-shift": "gnss shift",
+    "lever-arm": "lever arm",
+    "camera-f": "f",
+    "camera-point": "cx cy",
+    "camera-term": "k1",
+    "scale": "scale",
+    "time-offset": "time offset",
+    "readout-time": "readout time",
+}
+
+
+def block_of(case):
+    """Return the block of a golden case, at the adjusted values."""
+    golden, observed = GOLDEN, GOLDEN["cases"][case]["observations"]
+    camera, sd = golden["camera"], golden["standard_deviations"]
+    poses = np.array(golden["start"]["poses"])
+    points = np.array(golden["start"]["points"])
+    names = [str(row) for row in range(len(points))]
+    control, point_sd = golden["control_points"], np.full(points.shape, np.inf)
+    point_sd[control] = sd["control"]
+    points[control] = observed["control"]
+    values = {"f": camera["f"], "cx": camera["cx"], "cy": camera["cy"], "k": camera["k1"]}
+    return Block(
+        photo_positions=poses[:, :3],
+        photo_attitudes=poses[:, 3:],
+        point_positions=points,
+        point_ids=names,
+        point_sd=point_sd,
+        image_photos=golden["image_photo"],
+        image_points=golden["image_point"],
+        image_xy=np.array(observed["image"]).reshape(-1, 2),
+        image_sd=sd["image"],
+        cameras=[Camera("simple_radial", values)],
+        observations=[
+            *(Position(str(row), each, sd["gnss"]) for row, each in enumerate(observed["gnss"])),
+            Distance(*(str(row) for row in golden["distance_points"]), np.ravel(observed["distance"])[0], sd["distance"]),
+        ],
+    )
+
+
+@pytest.fixture(scope="module", params=list(GOLDEN["cases"]))
+def case(request):
+    """Return a golden case, and what the core finds of its hypotheses."""
+    camera = GOLDEN["camera"]
+    result = adjust(block_of(request.param))
+    trial = result._trial()
+    trial.stand()
+    rows, correlations = trial.core.hypotheses(
+        velocities=np.array(GOLDEN["velocity"]),
+        times=[],
+        position_sets=[],
+        control_sets=[],
+        readouts=[[0.0, 1 / camera["height"], -0.5]],
+        widths=[float(camera["width"])],
+        centre=[0.0, 0.0, 0.0],
+        estimated=None,
+        detection=(GOLDEN["alpha0"], GOLDEN["power"]),
+        limit=GOLDEN["K"],
+    )
+    return GOLDEN["cases"][request.param], rows, correlations
+
+
+def golden_of(row, hypotheses):
+    """Return the golden hypothesis of a row; None if there is none."""
+    if row["group"] is None:
+        return hypotheses.get(SETS.get(row["code"]))
+    if row["code"] == "control-point":
+        number = GOLDEN["control_points"].index(row["index"])
+        part = "" if row["component"] is None else " " + "XYZ"[row["component"]]
+        return hypotheses[f"control {number}{part}"]
+    if row["code"] == "observation" and row["component"] is None:
+        positions = len(GOLDEN["velocity"])
+        return hypotheses["distance" if row["index"] == positions else f"gnss {row['index']}"]
+    return None
+
+
+def test_every_hypothesis_agrees_with_a_dense_program(case):
+    golden, rows, _ = case
+    compared = 0
+    for row in rows:
+        if (expected := golden_of(row, golden["hypotheses"])) is None:
+            continue
+        compared += 1
+        k = expected["k"]
+        name = (row["code"], row["index"], row["component"])
+        assert row["statistic"] == pytest.approx(expected["T"], rel=1e-7, abs=1e-7), name
+        assert row["redundancy"] == pytest.approx(expected["r"], rel=1e-7), name
+        sd = np.sqrt(np.diag(np.reshape(expected["estimate_cofactors"], (k, k))))
+        assert np.abs((np.array(row["estimate"]) - expected["estimate"]) / sd).max() < 1e-7, name
+        assert row["mdb"] == pytest.approx(expected["mdb"], rel=1e-6), name
+        assert row["bias_to_noise"] == pytest.approx(expected["bias_to_noise"], rel=1e-7), name
+        assert row["noncentrality"] == pytest.approx(expected["lambda0"], rel=1e-9)
+        if row["effect"] is None:
+            assert row["bias_to_noise"] <= GOLDEN["K"]
+            continue
+        points, others, ratio, at, change = row["effect"]
+        assert points == expected["points_beyond_4"], name
+        assert others == expected["points_beyond_4_besides_own"], name
+        assert ratio == pytest.approx(expected["largest_sd"], rel=1e-6), name
+        assert change == pytest.approx(expected["largest_m"], rel=1e-6), name
+    assert compared == 6 * 4 + 1 + len(GOLDEN["velocity"]) + len(SETS)
+
+
+def test_scores_are_correlated_as_a_dense_program_has_it(case):
+    golden, rows, correlations = case
+    sets = {SETS[row["code"]]: k for k, row in enumerate(rows[: len(correlations)]) if row["code"] in SETS}
+    for first, others in golden["score_correlation"].items():
+        for second, value in others.items():
+            if first in sets and second in sets:
+                assert correlations[sets[first], sets[second]] == pytest.approx(value, abs=1e-7)
