@@ -128,10 +128,10 @@ def page(photos: int) -> list[str]:
         tree, counts = counted_work(own, images, lambda edges=edges: [edges], PARTS * workers)
         weak.append((workers, len(own), tree, counts, rates.times(tree, counts, workers)))
     return [
-        f"Workers of one thread each, at the rates measured beside on this machine: {rates};"
-        f" {BANDWIDTH / 1e6:.0f} MB/s between two workers; {ITERATIONS} iterations and the inversion with"
-        f" all covariances; {IMAGES:.0f} image points a photograph, {PARTS} parts a worker. At work: what one"
-        " worker would take without waiting, over the time of all workers.",
+        f"Workers have one thread. The rates were measured on this machine: {rates}.",
+        f"Two workers transfer {BANDWIDTH / 1e6:.0f} MB/s. The times include {ITERATIONS} iterations and the"
+        f" inversion with all covariances. There are {IMAGES:.0f} image points in a photograph, and {PARTS}"
+        " parts for each worker. At work: time of one worker without waiting, over the time of all workers.",
         "",
         *table(f"Strong scaling: {len(places):,} photographs", strong),
         *table(f"Weak scaling: about {WEAK:,} photographs a worker", weak),

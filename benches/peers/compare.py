@@ -45,7 +45,7 @@ def main() -> int:
     small = subprocess.run([sys.executable, HERE / "machine.py", "small"], check=True, capture_output=True)
     results = [Runs(plan, size).measured() for size in arguments.sizes]
 
-    about = (HERE / "performance.md").read_text() + "".join(f"{line}\n" for line in absent.values())
+    about = (HERE / "performance.md").read_text() + "".join(f"\n{line}\n" for line in absent.values())
     text = page.page(results, json.loads(small.stdout), _command(), about, REASONS)
     print(text)
     if arguments.write:

@@ -146,8 +146,15 @@ def page(
     reasons: Mapping[str, str],
 ) -> str:
     """Return the whole page; `about` says what is compared, `reasons` why targets are missed."""
-    parts = ["# Performance\n", f"Printed by `{command}` on {machine.processor()}; {_versions(results)}.\n"]
-    parts += [about, "## Solutions and covariances\n", comparison(results), "## Phases\n"]
+    ran = f"The tables were printed by `{command}` on {machine.processor()}; {_versions(results)}.\n"
+    parts = [
+        "# Performance\n",
+        about,
+        ran,
+        "## Solutions and covariances\n",
+        comparison(results),
+        "## Phases\n",
+    ]
     for measured in results:
         if ours := measured.ours:
             parts.append(
@@ -155,7 +162,7 @@ def page(
                 f"`{ours['ordering']}`; matrix product {measured.product / 1e9:.3g} × 10⁹ a second.\n"
             )
             parts.append(phase_table(measured, ours))
-    parts.append("## Growth\n\nExponent of the time of everything against the number of photos:\n")
+    parts.append("## Growth\n\nExponent of the total time as a function of the number of photos:\n")
     grown = [
         f"* {each.kind} from {each.smallest} to {each.largest}: {each.exponent:.3f}"
         for each in growth(results)
@@ -168,8 +175,9 @@ def page(
         if not target.met and target.name in reasons:
             missed.setdefault(reasons[target.name], []).append(target.name)
     if missed:
-        lines = [f"* {'; '.join(names)}: {reason}" for reason, names in missed.items()]
-        parts += ["Why, and what was tried:\n", "\n".join(lines) + "\n"]
+        parts.append("Each list of missed targets is followed by the reason and by attempts to reach them.\n")
+        for reason, names in missed.items():
+            parts += ["\n".join(f"* {name}" for name in names) + "\n", f"{reason}\n"]
     return "\n".join(parts)
 
 

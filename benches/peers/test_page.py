@@ -100,7 +100,7 @@ def test_the_page_names_what_failed_and_why_a_target_is_missed() -> None:
     text = page.page(results, SMALL, "the command", "about", {name: "for a reason", "met": "nothing"})
     assert "| gtsam | solution: more than 600 s |" in text
     assert "| photogram | everything: exit status -9 |" in text
-    assert f"* {name}: for a reason" in text
+    assert f"* {name}\n\nfor a reason\n" in text
     assert ", photogram 1.2.3, numpy " in text
     assert "nothing" not in text
 

@@ -40,8 +40,8 @@ HOPELESS = 1e6
 """Condition of the scaled equations beyond which normal equations have no digits that could be compared."""
 TOLD = ("adjust.weak", "adjust.rounding")
 """Of the engine's remarks that its values may be off."""
-SAID = "differ, and said so"
-ENDINGS = ("agree", "too weak to compare", "not converged", "refused by name", SAID, "differ")
+REPORTED = "differ, and reported"
+ENDINGS = ("agree", "too weak to compare", "not converged", "refused by name", REPORTED, "differ")
 
 
 def _size(random: np.random.Generator) -> dict[str, object]:
@@ -193,7 +193,7 @@ def _compared(block: Block, result: Result) -> Comparison:
     fine = max(EXACT, ROUNDING * condition**2, _bent(block, result, deviations / scale))
     same = moved < max(NEAR, fine) and cofactors < fine and redundancy < fine
     told = any(message.code.startswith(remark) for message in result.messages for remark in TOLD)
-    ending = "agree" if same else SAID if told else "differ"
+    ending = "agree" if same else REPORTED if told else "differ"
     return Comparison(ending, condition, moved, cofactors, redundancy)
 
 

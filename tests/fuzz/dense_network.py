@@ -263,13 +263,14 @@ def main() -> int:
     rarest = min((*KINDS, *MODELS), key=lambda name: seen[name])
     lines = [
         f"{asked.networks:,} networks of seed {asked.seed} on {machine()}. Of {len(MODELS)} cameras and"
-        f" {len(KINDS)} kinds the rarest among those that agree, {rarest}, is in {seen[rarest]:,}.",
+        f" {len(KINDS)} observation types, the rarest in networks that agree is {rarest},"
+        f" in {seen[rarest]:,}.",
         "",
         *rows,
         "",
-        "Errors are drawn with the standard deviations that are given: $v^T P v$ of a kind, over the sum of",
-        "its redundancy numbers, is 1 but for chance (three standard deviations in the last column). Points",
-        "on lines and priors are drawn without errors: less is left there.",
+        "The random errors have the given standard deviations. The expected ratio of $v^T P v$ of a type to",
+        "the sum of its redundancy numbers is therefore 1, within three standard deviations (last column).",
+        "Points on lines and priors have no random errors, so their ratio is smaller.",
         "",
         "| observations | networks | redundancy | $v^T P v$ over it | 1 within |",
         "|---" + "|---:" * 4 + "|",

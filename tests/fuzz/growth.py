@@ -38,7 +38,7 @@ def main() -> None:
     asked = parser.parse_args()
     block = photogram.simulate(strips=3, photos_per_strip=6, points_per_photo=30, seed=1).block
     result = photogram.adjust(block)
-    rows = ["| what | times | held after a fifth of them | held after all |", "|---|---:|---:|---:|"]
+    rows = ["| action | times | memory after a fifth of them | memory at the end |", "|---|---:|---:|---:|"]
     actions: list[tuple[str, int, Callable[[], object]]] = [
         ("adjustments", ADJUSTMENTS, lambda: photogram.adjust(block)),
         ("reports for the browser", REPORTS, result.to_html),
@@ -47,7 +47,8 @@ def main() -> None:
         before, after = (f"{each / 2**20:.1f} MiB" for each in growth(action, times))
         rows.append(f"| {what} | {times} | {before} | {after} |")
     lines = [
-        f"A block of {len(block.photo_ids)} photos and {len(block.image_xy)} images on {machine()}.",
+        f"A block of {len(block.photo_ids)} photos and {len(block.image_xy)} image observations"
+        f" on {machine()}.",
         "",
         *rows,
     ]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzz.dense import ENDINGS, KINDS, SAID, TOLERANCE, _compared, compare, random_block
+from fuzz.dense import ENDINGS, KINDS, REPORTED, TOLERANCE, _compared, compare, random_block
 from photogram import adjust, network, simulate
 
 BLOCKS = 100
@@ -29,7 +29,7 @@ def test_random_blocks_agree_with_a_dense_solution_or_are_refused():
 def test_what_differs_says_so(number, remark):
     _, block = random_block(12, number)
     result = adjust(block, threads=1, max_iterations=300, tolerance=TOLERANCE)
-    assert _compared(block, result).ending == SAID
+    assert _compared(block, result).ending == REPORTED
     assert any(message.code.startswith(remark) for message in result.messages)
 
 
