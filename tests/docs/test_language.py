@@ -1,4 +1,4 @@
-"""Text for readers is plain English: patterns that hide the subject of sentences are rare, old terms are gone.
+"""Text for readers is plain English: few patterns hide the subject of sentences, old terms are gone.
 
 The patterns are an indicator: a sentence without them that must be read twice is still wrong.
 """
@@ -29,12 +29,29 @@ PATTERNS = {
 }
 RULES = {name: re.compile(rule, re.IGNORECASE) for name, rule in PATTERNS.items()}
 GIANT_TERMS = "stand, lie, held, kept"  # "held" and "unheld" are terms of GIANT
-CEILINGS = {"pages": 9.5, "help": 4.0, "errors": 4.0, "words": 4.0, "docstrings": 36.1, "Rust": 42.3}
+CEILINGS = {"pages": 4.0, "help": 4.0, "errors": 4.0, "words": 4.0, "docstrings": 36.1, "Rust": 42.3}
 """Patterns per 1,000 words. They may only fall."""
 TERMS = {
+    "at fault": "invalid",
+    "beside images": "additional observations",
+    "error that is found": "minimal detectable bias",
+    "first values": "initial values",
+    "foretells?|foretold": "predicts, predicted",
+    "good to [0-9]": "accurate to",
+    "guilty": "most probable gross error",
+    "harms? the whole": "ill-conditioned point",
+    "largest T may be": "critical value",
+    "lens of knots": "B-spline lens model",
+    "mended": "corrected",
+    "own point effect": "influence on its own point",
+    "set aside": "rejected, excluded",
+    "start values": "initial values",
+    "(taken?|takes) out": "removed, removes",
+    "the house": "package layers",
     "unheld": "free",
+    "what lacks": "missing data",
 }
-"""Terms that must not return in pages, help, errors and words, with their replacement."""
+"""Terms that must not return in pages, help, errors and words, with their replacement, except for GIANT."""
 
 
 def texts(value):
@@ -112,6 +129,6 @@ def test_old_terms_do_not_return(term):
         (path.relative_to(ROOT).as_posix(), text[:120])
         for corpus in ("pages", "help", "errors", "words")
         for path, text in corpora()[corpus]
-        if "giant" not in path.as_posix() and re.search(rf"\b{term}\b", text, re.IGNORECASE)
+        if not re.search("giant", path.as_posix()) and re.search(rf"\b({term})\b", text, re.IGNORECASE)
     ]
     assert found == [], f"write {TERMS[term]!r}"
