@@ -8,7 +8,7 @@ Blocks between these marks and `<!-- end -->` are made anew, of all pages unless
 * `<!-- printed: COMMAND -->`: lines of what a command prints, as many as there are, or a table;
 * `<!-- quote: PATH -->`: a file of the repository;
 * `<!-- quote: PATH | LINE -->`: what begins with the line and ends with the next bracket that closes where it
-  is indented.
+  is indented; of a page its first block of code in the language.
 
 `<!-- measured: COMMAND -->` marks what takes hours or depends on the machine. It is not made anew; that the
 command is there, and that it knows the words of the block, is checked. docs/walk.py walks through tutorials.
@@ -74,6 +74,9 @@ def quoted(path: Path, first: str | None) -> list[str]:
     lines = path.read_text(encoding="utf-8").splitlines()
     if first is None:
         return lines
+    if path.suffix == ".md":
+        start = lines.index(f"```{first}") + 1
+        return lines[start : lines.index("```", start)]
     start = next(number for number, line in enumerate(lines) if line.strip() == first)
     margin = len(lines[start]) - len(lines[start].lstrip())
     end = next(
@@ -182,7 +185,8 @@ def regenerated(page: str, blocks: Mapping[str, Callable[[], list[str] | None]])
 
     def quote(match: re.Match[str]) -> str:
         path = DOCS.parent / match[2]
-        return "\n".join([f"{match[1]}```{LANGUAGES[path.suffix]}", *quoted(path, match[3]), "```", match[4]])
+        language = LANGUAGES.get(path.suffix, match[3])
+        return "\n".join([f"{match[1]}```{language}", *quoted(path, match[3]), "```", match[4]])
 
     def printed(match: re.Match[str]) -> str:
         lines = window(match[3].splitlines(), told(match[2]))

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -63,3 +64,16 @@ def test_the_citation_is_of_this_version_and_names_the_reports():
     for each in cited["references"]:
         assert each["title"]
         assert each["authors"]
+
+
+def test_crates_and_changelog_have_the_version_of_the_package():
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]
+    assert workspace["package"]["version"] == __version__
+    for member in workspace["members"]:
+        package = tomllib.loads((ROOT / member / "Cargo.toml").read_text(encoding="utf-8"))["package"]
+        assert package["version"] == {"workspace": True}
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    entries = re.findall(r"^## \[(\S+)\] - (?:unreleased|\d{4}-\d\d-\d\d)$", changes, re.MULTILINE)
+    assert entries[0] == __version__
+    headings = set(re.findall(r"^### (.*)$", changes, re.MULTILINE))
+    assert headings <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security", "Known limitations"}

@@ -108,6 +108,7 @@ SENTENCES = {
     "tutorials/drone.md": 3,
     "tutorials/metrology.md": 5,
     "tutorials/rolling-shutter.md": 6,
+    "tutorials/stars.md": 2,
     "tutorials/statement.md": 3,
     "tutorials/vision.md": 3,
 }

@@ -16,6 +16,7 @@ COMMANDS = {
     "tutorials/metrology.md": 5,
     "tutorials/planetary.md": 11,
     "tutorials/rolling-shutter.md": 14,
+    "tutorials/stars.md": 13,
     "tutorials/statement.md": 8,
     "tutorials/vision.md": 6,
 }

@@ -175,7 +175,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
-    """Return the block with poses for all its photos, and first values if it required some."""
+    """Return the block with poses for all its photos, and initial values if it required some."""
     import numpy as np
 
     from photogram import first_values

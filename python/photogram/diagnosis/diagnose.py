@@ -140,14 +140,16 @@ def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
 
 def _started(block: Block) -> tuple[Block | None, Section]:
     """Give photos without poses their first values."""
-    section = Section("First values", "Photos without positions or attitudes are started from their images.")
+    section = Section(
+        "Initial values", "Photos without positions or attitudes are oriented from their image observations."
+    )
     try:
         found: FirstValues = first_values(block)
         usable = found.usable()
     except (AdjustmentError, InputError) as error:
         note(section, "grave", phrase("check.no-first-values.all", reason=str(error)))
         return None, section
-    section.remark(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
+    section.remark(f"{len(found.sources)} of {len(block.photo_ids)} photos have initial values")
     for photo, why in found.missing.items():
         note(section, "grave", phrase("check.no-first-values.photo", photo=photo, reason=why), [photo])
     aside = found.set_aside

@@ -62,7 +62,7 @@ def degrees(text: str) -> float:
     values = [float(part.replace(",", ".")) for part in parts if part]
     # What is followed by smaller units is whole.
     if not match or (before and behind) or not all(each.is_integer() for each in values[:-1]):
-        raise ValueError(f"{quoted(text)} is no angle in degrees, minutes and seconds")
+        raise ValueError(f"{quoted(text)} must be an angle in degrees, minutes and seconds")
     if any(each >= 60 for each in values[1:]):
         raise ValueError(f"{quoted(text)} has minutes or seconds of 60 or more")
     value = sum((each / 60.0**k for k, each in enumerate(values)), 0.0)

@@ -1,0 +1,139 @@
+"""Write parts of pages from the program while mkdocs builds them.
+
+Lines of pages that are replaced:
+
+* `<!-- generated: commands -->`: all commands with their options;
+* `<!-- generated: verdicts -->`: all verdicts with their exit codes and next steps;
+* `<!-- generated: messages FAMILY ... -->`: all messages of some families, the first words of their codes;
+* `<!-- generated: messages -->`: those of all families that the page has not named.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from html import escape
+from typing import Any
+
+MARK = re.compile(r"^<!-- generated: (\w+) ?(.*?) ?-->$", re.MULTILINE)
+WIDTH = "500"  # Columns of the help, so that no line is wrapped
+PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
+VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
+FIELD = re.compile(r"\{(\w+)[^}]*\}")
+COMMAND = "\n"  # Between the sentences of Python and of the command line
+DECIDED = {"take-out": "snoop", "lens": "calibrate"}  # Usual case of next steps that the program decides
+
+
+def cell(text: str) -> str:
+    """Return text for a cell of an HTML table: backquotes are code, the fields of messages are variables."""
+    text = FIELD.sub(lambda field: f"<var>{field[1].replace('_', ' ')}</var>", escape(text, quote=False))
+    text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
+    return text.replace(COMMAND, "<br><em>On the command line:</em> ")
+
+
+def code(text: str) -> str:
+    """Return text as code."""
+    return f"<code>{escape(text, quote=False)}</code>"
+
+
+def table(heads: Iterable[str], rows: Iterable[tuple[str, ...]]) -> str:
+    """Return an HTML table, which needs no escapes of Markdown; a row of one cell is a heading."""
+    head = "".join(f"<th>{each}</th>" for each in heads)
+    body = "\n".join(
+        f'<tr><th colspan="2">{row[0]}</th></tr>'
+        if len(row) == 1
+        else f"<tr>{''.join(f'<td>{each}</td>' for each in row)}</tr>"
+        for row in rows
+    )
+    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"
+
+
+def helps() -> Iterator[tuple[str, str]]:
+    """Yield each command with its help text."""
+    from typer.testing import CliRunner
+
+    from photogram.cli import app
+    from photogram.cli.commands import COMMANDS
+
+    for name, (_, home) in COMMANDS.items():
+        _, *others = [home] if isinstance(home, str) else home
+        for words in [[name], *([name, part] for part in others)]:
+            environment = {"COLUMNS": WIDTH, "TERMINAL_WIDTH": WIDTH, "NO_COLOR": "1"}
+            shown = CliRunner().invoke(app, [*words, "--help"], env=environment).output
+            yield " ".join(words), "\n".join(line.rstrip() for line in shown.splitlines())
+
+
+def options_of(help_text: str) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of a table of options: panels, and options with their meaning."""
+    for panel, lines in PANEL.findall(help_text):
+        yield (panel,)
+        for line in lines.splitlines():
+            *words, meaning = re.split(r"\s{2,}", line.strip("│").strip().removeprefix("*").strip())
+            names = [word for word in words if word.startswith("-")] or words[:1]
+            kinds = [word for word in words if word not in names and word != "<path>"]
+            option = ", ".join(code(name) for name in names)
+            yield " ".join([option, *(escape(kind).replace("|", "|<wbr>") for kind in kinds)]), cell(meaning)
+
+
+def commands(_: str) -> str:
+    """Return the commands with their options as Markdown."""
+    parts = []
+    for name, text in helps():
+        before, *_ = text.split("╭─", 1)
+        usage, *paragraphs = [" ".join(each.split()) for each in before.strip().split("\n\n")]
+        parts += [f"### photogram {name}", f"```text\n{usage.removeprefix('Usage: ')}\n```"]
+        parts += [cell(each) for each in paragraphs]
+        parts.append(table(("Option", "Meaning"), options_of(text)))
+    return "\n\n".join(parts)
+
+
+def sentences() -> dict[str, str]:
+    """Return the sentence of each message by code, with that of the command line if it has one.
+
+    A sentence for a count of one is omitted if there is one for other counts.
+    """
+    from photogram.words import table_of
+
+    words = table_of("en")
+    bases = {name: VARIANT.sub("", name) for name in words}
+    return {
+        name: text + (f"{COMMAND}{words[f'{name}.cli']}" if f"{name}.cli" in words else "")
+        for name, text in words.items()
+        if bases[name] == name or bases[name] not in words
+    }
+
+
+def verdicts(_: str) -> str:
+    """Return a table of all verdicts."""
+    from photogram.statistics.verdict import RULES
+
+    texts = sentences()
+    steps: dict[str, list[str]] = {}
+    exits: dict[str, set[int]] = {}
+    for rule in RULES:
+        steps.setdefault(rule.code, []).extend(f"advice.{DECIDED.get(name, name)}" for name in rule.advice)
+        exits.setdefault(rule.code, set()).update({0, rule.exit} if rule.warning else {rule.exit})
+    rows = []
+    for name in [name for name in texts if name.startswith("verdict.")]:
+        rule_code = name.split(".")[1]
+        advice = "".join(
+            f"<li>{cell(texts[step])}</li>" for step in dict.fromkeys(steps[rule_code] or ["advice.nothing"])
+        )
+        end = " or ".join(map(str, sorted(exits[rule_code])))
+        rows.append((cell(texts[name]), end, f"<ul>{advice}</ul>", code(name)))
+    return table(("Message", "Exit code", "Next steps", "Code"), rows)
+
+
+def messages(families: str) -> str:
+    """Return a table of the messages of some families."""
+    names = families.split()
+    rows = [(cell(text), code(name)) for name, text in sentences().items() if name.partition(".")[0] in names]
+    return table(("Message", "Code"), rows)
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put generated parts into a page."""
+    named = " ".join(["verdict", *(arguments for _, arguments in MARK.findall(markdown))]).split()
+    rest = " ".join(dict.fromkeys(name.partition(".")[0] for name in sentences()).keys() - set(named))
+    parts = {"commands": commands, "messages": messages, "verdicts": verdicts}
+    return MARK.sub(lambda mark: parts[mark[1]](mark[2] or rest), markdown)
