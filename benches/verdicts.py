@@ -255,7 +255,7 @@ def surveys(rng: np.random.Generator, count: int) -> Iterator[Survey]:
 
 
 def size_of(result: Result, hypothesis: str) -> float:
-    """Return the largest component of the minimal detectable bias of a mistake; NaN if any size is undetected."""
+    """Return the largest component of the MDB of a mistake; NaN if an error of any size is undetected."""
     code, _, axis = hypothesis.partition(" ")
     for each in result.reliability_summary.hypotheses.every if result.reliability_summary else ():
         component = None if not axis else "XYZ".index(axis)
@@ -306,14 +306,12 @@ def main() -> None:
                 off = moved(clean, result) if hypothesis else math.inf
                 counts[name, f"{size:g}"][result.verdict.code] += 1
                 if off > WRONG and result.verdict.code == "accepted":
-                    bad.append(
-                        f"block {number} ({survey.kind}, {len(survey.control)} control, {len(survey.bars)} bars), {name} {size:g}: {off:.1f} sd"
-                    )
+                    of = f"{survey.kind}, {len(survey.control)} control, {len(survey.bars)} bars"
+                    bad.append(f"block {number} ({of}), {name} {size:g}: {off:.1f} sd")
+
     for (name, what), found in counts.items():
         print(f"{name:28s} {what:18s}", ", ".join(f"{code} {n}" for code, n in sorted(found.items())))
-    print(
-        f"\n{len(bad)} results accepted without reserve although a point is wrong by more than {WRONG:g} standard deviations"
-    )
+    print(f"\n{len(bad)} results accepted without reserve; a point is wrong by more than {WRONG:g} sd")
     print(*bad[:30], sep="\n")
 
 

@@ -1,4 +1,4 @@
-"""Hypotheses against a dense program: scores, redundancy, estimates, minimal detectable biases, effects on points."""
+"""Hypotheses against a dense program: tests, redundancy, estimates, detectable biases, effects on points."""
 
 import gzip
 import json
@@ -72,6 +72,7 @@ def case(request):
         control_sets=[],
         readouts=[[0.0, 1 / camera["height"], -0.5]],
         widths=[float(camera["width"])],
+        checks=[],
         centre=[0.0, 0.0, 0.0],
         estimated=None,
         detection=(GOLDEN["alpha0"], GOLDEN["power"]),
@@ -114,7 +115,7 @@ def test_every_hypothesis_agrees_with_a_dense_program(case):
         if row["effect"] is None:
             assert row["bias_to_noise"] <= GOLDEN["K"] or row["component"] is not None
             continue
-        points, others, ratio, _, change = row["effect"]
+        points, others, ratio, _, change, _ = row["effect"]
         assert points == expected["points_beyond_4"], name
         assert others == expected["points_beyond_4_besides_own"], name
         assert ratio == pytest.approx(expected["largest_sd"], rel=1e-6), name

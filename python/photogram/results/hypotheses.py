@@ -211,7 +211,7 @@ class Hypotheses:
         order = sorted(range(len(self.every)), key=lambda k: -np.nan_to_num(effects[k].ratio))
         note = (
             f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of"
-            f" 100 cases. If it is not detected, points moved change by more than {LIMIT:g} standard deviations."
+            f" 100 cases. Otherwise, points moved change by more than {LIMIT:g} standard deviations."
         )
         return Table(
             "external-reliability",
@@ -251,7 +251,7 @@ def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
     rows, correlations = trial.core.hypotheses(
         **{**NO_FACTS, **facts}, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
     )
-    name = group_names(trial.suspects, getattr(result.given, "camera_names", ()))
+    name = group_names(cast("NamedSuspects", trial.suspects), getattr(result.given, "camera_names", ()))
     axes = result._terms().point_axes
     length, image = unit_written(axes[2].small), result.given.image_unit
     units = {"camera-f": f" {image}", "camera-point": f" {image}", "attitude": " rad", "boresight": " rad"}
@@ -347,9 +347,9 @@ def block_facts(result: Result) -> dict[str, Any]:
     _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
     own = np.unique(kinds[control])
     if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        number = {kind: k for k, kind in enumerate(own.tolist())}
+        set_of = {kind: k for k, kind in enumerate(own.tolist())}
         facts["control_sets"] = [
-            number[kind] if is_control else None
+            set_of[kind] if is_control else None
             for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
         ]
     return facts

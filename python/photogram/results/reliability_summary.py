@@ -100,9 +100,7 @@ class ReliabilitySummary:
         }
 
 
-def reliability_summary(
-    found: Reliability, hypotheses: Hypotheses, *, heights: bool
-) -> ReliabilitySummary:
+def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: bool) -> ReliabilitySummary:
     """Return what a report says of the reliability of a network.
 
     Parameters
