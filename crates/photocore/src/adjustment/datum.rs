@@ -4,12 +4,12 @@
 //! If the observations leave d degrees of freedom (position, orientation, scale), the columns of G are the *null vectors*: A G = 0 (see
 //! [`Motions`]). A datum is a set of d conditions B^T (x - x_0) = 0. B has the rows of G for the unknowns that carry the datum, times their
 //! squared factors, and zeros elsewhere. Changes of these carriers are minimal (inner constraints if all unknowns are carriers, Meissl
-//! 1969). The network is transformed exactly, as a whole. With Q in any datum at these values,
+//! 1969). The network is transformed exactly, as a whole. From the cofactors Q in any datum at these values,
 //!
-//! S = I - G (B^T G)^-1 B^T,    Q_S = S Q S^T,
+//! S = I - G (B^T G)^-1 B^T,    Q_S = S Q S^T.
 //!
-//! with T = G (B^T G)^-1 and W = Q B, which requires d additional right-hand sides. A block of Q_S is Q_ij - T_i W_j^T - W_i T_j^T + T_i
-//! (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
+//! W = Q B requires d additional right-hand sides. With T = G (B^T G)^-1, a block of Q_S is Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W)
+//! T_j^T. Redundancy numbers and residuals are the same in every datum.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};

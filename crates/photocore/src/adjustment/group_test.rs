@@ -27,8 +27,8 @@ pub struct GroupTest {
     pub cofactors: Few,
     /// Smallest redundancy of a detectable direction; NaN if there is none.
     pub least: f64,
-    /// Maximum h of the redundancy absorbed by unknowns of other points, relative to the redundancy of a direction. It bounds correlations:
-    /// |rho| <= root of the product of both h. NaN without `known`.
+    /// Maximum fraction h of the redundancy of a direction that unknowns other than the own point absorb. It bounds correlations: |rho| <=
+    /// root of the product of both h. NaN without `known`.
     pub shared: f64,
 }
 

@@ -23,8 +23,8 @@ pub(super) struct Open {
 }
 
 /// Maximum eigenvalue of a free combination: squared change of the observations relative to the changes by its parts. Rounding errors are
-/// about 1e-15. Photo positions with a standard deviation of 100 m change a hundred times as much. Ellipsoid normals, which attitudes
-/// separate only over kilometres, have 2e-14, which a factor cannot distinguish from zero.
+/// about 1e-15. Photo positions with a standard deviation of 100 m give a hundred times this limit. Ellipsoid normals, which attitudes
+/// separate only over kilometres, give 2e-14, which a factor cannot distinguish from zero.
 const NULL: f64 = 1e-12;
 /// Minimum relative change of an unknown by a combination that it may constrain: preferred, or at all. Example of a weak constraint: the
 /// height at a plumb line changes the latitude by 1e-6 over some metres.

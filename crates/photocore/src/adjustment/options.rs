@@ -87,8 +87,8 @@ pub enum Method {
     /// Full steps; a step that raises the sum of squares is repeated with damping (Levenberg-Marquardt) until damping is unnecessary. In
     /// case of slow convergence ([`super::Model::ends_slowly`]) a full step is followed by a chord.
     Damped(Stop),
-    /// Steps with damping from the start, controlled by the ratio of actual and predicted decrease (Levenberg-Marquardt with the gain ratio
-    /// of Nielsen 1999): for poor initial values. Damping replaces a missing datum; the datum is constrained at the end, for the cofactors.
+    /// Damped steps from the start, controlled by the gain ratio of actual to predicted decrease (Levenberg-Marquardt, Nielsen 1999): for
+    /// poor initial values. Damping replaces a missing datum; the datum is constrained at the end, for the cofactors.
     TrustRegion(Stop),
 }
 
@@ -153,7 +153,7 @@ pub enum Published {
 /// Maximum change, in standard deviations, of a Gauss-Newton step that is accepted without a test. Its decrease of the sum of squares may
 /// be smaller than the rounding errors of computed observations. Geocentric coordinates, for example, are accurate to one nanometre only.
 pub(super) const NEGLIGIBLE: f64 = 1e-3;
-/// Minimum change per root of the number of unknowns for a change of cofactors: the bound of a single change grows with this root.
+/// Change per root of the number of unknowns below which cofactors count as unchanged: the bound of a change grows with this root.
 pub(super) const IN_THE_MEAN: f64 = 1e-5;
 
 /// Whether a step of `change` standard deviations in total leaves the cofactors of all unknowns practically unchanged.

@@ -104,7 +104,6 @@ impl<'a> Numbered<'a> {
         (columns, exact)
     }
 
-    /// Writes a column.
     fn write(&self, column: Column, classes: usize, z: &mut [f64]) {
         for (row, z) in z.iter_mut().enumerate() {
             let (group, number) = (self.groups.of[row], self.number[row]);

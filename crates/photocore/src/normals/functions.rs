@@ -53,8 +53,8 @@ const TOGETHER: usize = 16;
 impl System {
     /// Eliminates the local blocks from linear functions.
     ///
-    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` and `prior` must be those of the factor; functions
-    /// must not contain constrained unknowns.
+    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` and `prior` must belong to the factor; functions
+    /// must not contain fixed or constrained unknowns.
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.

@@ -10,6 +10,7 @@
 //!    factorisation on dense panels, front by front;
 //! 4. [`System::solve`]: solution for the right-hand side of the equations or for any others;
 //! 5. [`System::invert`]: the selected inverse with all cofactors. [`System::reduce`] prepares the cofactors of linear functions.
+//!
 //! A system may be part of a larger one ([`Layout::as_part`]). Its outer retained blocks are not eliminated: their front, ordered last, is
 //! assembled but not factored. It is the contribution to the parent system ([`Factor::take_contribution`]), which adds it to its own fronts
 //! ([`Equations::contribution`]). The parent system returns the step and the inverse of the outer blocks as options of the later phases. A

@@ -27,8 +27,8 @@ impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout, for one or several right-hand sides; solutions follow one
     /// another. Retained blocks are computed from the factor, then each local block. Bitwise identical for any number of threads.
     ///
-    /// `equations` and `prior` must be those of the factor. Without a cache the equations are evaluated again, once for local blocks with
-    /// zero right-hand sides, otherwise twice.
+    /// `equations` and `prior` must belong to the factor. Without a cache the equations are evaluated again; for local blocks with zero
+    /// right-hand sides only once.
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.

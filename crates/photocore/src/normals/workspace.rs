@@ -59,7 +59,7 @@ impl Workspace {
         Ok(buffer)
     }
 
-    /// Returns an uninitialised buffer. `Err`: size of the failed allocation in bytes.
+    /// Returns a buffer with undefined contents. `Err`: size of the failed allocation in bytes.
     pub fn any(&self, length: usize) -> Result<Vec<f64>, usize> {
         let mut buffer = self.take(length)?;
         buffer.resize(length, 0.0);

@@ -10,7 +10,6 @@ use super::Layout;
 /// does not couple its groups. Each of these groups is therefore an *independent* unit, numbered after the local blocks, and the block
 /// itself has no groups.
 impl Layout {
-    /// Number of units.
     pub(in crate::normals) fn units(&self) -> usize {
         self.locals + self.apart.len()
     }
@@ -25,7 +24,6 @@ impl Layout {
         unit.checked_sub(self.locals).map_or(unit, |apart| self.apart[apart][1] as usize)
     }
 
-    /// Returns the groups of a unit.
     pub(in crate::normals) fn groups_of_unit(&self, unit: usize) -> Range<usize> {
         if let Some(apart) = unit.checked_sub(self.locals) {
             let group = self.apart[apart][0] as usize;
