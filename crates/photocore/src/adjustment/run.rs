@@ -70,7 +70,7 @@ pub fn adjust_in_datum(
 ///
 /// * `joint`: unknowns with mutual cofactors ([`Adjustment::joint`]), computed from the last factor;
 /// * `memory`: maximum size of these cofactors in bytes (None: unlimited).
-///
+/// * `memory`: maximum size of these cofactors in bytes, above which they are omitted (None for unlimited).
 /// # Errors
 /// As for [`adjust`].
 ///

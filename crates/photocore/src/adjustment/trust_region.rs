@@ -224,8 +224,8 @@ impl<'a> Run<'a, '_> {
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone())))
     }
 
-    /// Ends at the current values although steps still change them. Stores the retained unknowns that a full step with a datum moves
-    /// insignificantly far beyond the observations' precision; empty if only local ones move so.
+    /// Ends at the current values although steps still change them. Stores the retained unknowns that a full step with a datum moves much
+    /// more than the observations justify; empty if only local ones move so.
     fn rest_in_valley(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a>, AdjustError> {
         if self.iterations.last().is_none_or(|last| last.largest_change > SHORT) {
             return self.rest(unknowns, status);

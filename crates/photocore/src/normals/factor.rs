@@ -66,9 +66,8 @@ struct Visited {
     factorisation: f64,
 }
 
-/// Maximum rounding error of an undetermined combination of unknowns, relative to the information from the equations of each unknown alone.
-/// It is less than one unit in the last digit. Priors that only define the datum (GIANT's default of 60000 m for a station) give a hundred
-/// units.
+/// Threshold for an undetermined combination of unknowns: its information relative to the equations of each unknown alone. Rounding errors
+/// are less than one unit in the last digit. Priors that only define the datum (GIANT's default of 60000 m for a station) give a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl System {
