@@ -69,8 +69,8 @@ pub fn adjust_in_datum(
 /// Adjusts, and stores the data for tests of groups of observations, which [`Leverages::of`] uses.
 ///
 /// * `joint`: unknowns with mutual cofactors ([`Adjustment::joint`]), computed from the last factor;
-/// * `memory`: maximum size of these cofactors in bytes (None: unlimited).
 /// * `memory`: maximum size of these cofactors in bytes, above which they are omitted (None for unlimited).
+///
 /// # Errors
 /// As for [`adjust`].
 ///
