@@ -187,8 +187,8 @@ impl Trial {
         Ok(points.iter().map(of).collect())
     }
 
-    /// Returns R of excluded points, as if they took part: each one alone, given photos determined by the others. Empty also for points
-    /// that their rays do not determine.
+    /// Returns R of excluded points, as if they were active: each one alone, given photos determined by the others. It is empty also for
+    /// points that their rays do not determine.
     ///
     /// # Errors
     /// Predictions before any adjustment.
