@@ -7,8 +7,8 @@ use super::in_block::InBlock;
 use super::{Network, Photo, Trajectory};
 use crate::geometry::POSE;
 
-/// Retained blocks before those of points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The
-/// pose of a photo on a frame is fixed.
+/// Retained blocks, except points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The pose of
+/// a photo on a frame is fixed.
 #[derive(Debug)]
 pub(super) struct Blocks {
     /// Block i contains the retained parameters `first[i]..first[i + 1]`.
