@@ -43,7 +43,6 @@ impl CameraPrior {
 }
 
 impl Camera {
-    /// Returns the weighted parameters.
     pub(super) fn weighted(&self) -> Vec<usize> {
         (0..self.sd.len()).filter(|&k| self.sd[k] > 0.0 && self.sd[k].is_finite()).collect()
     }

@@ -10,7 +10,6 @@ use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
-    /// Returns an error if the network is inconsistent.
     pub(super) fn check(&self) -> Result<(), NetworkError> {
         let counts = (self.photos.len(), self.points.len());
         let outside = |image: &Image| image.photo >= counts.0 || image.point >= counts.1;

@@ -20,7 +20,6 @@ impl Bundle {
         self.mounts.carrier(photo)
     }
 
-    /// Returns true if its own six parameters are replaced.
     pub(super) fn is_carried(&self, photo: usize) -> bool {
         self.mounts.is_carried(photo)
     }
@@ -138,7 +137,6 @@ impl Bundle {
         self.mounts.are_timed(of) && self.grounds(&photo, &common).compose(of, self.time_of(image), own)
     }
 
-    /// Returns the motion of a photo; None without a trajectory.
     pub(super) fn moving(&self, mounted: &Mounted, commons: &[CommonState], photo: usize) -> Option<Moving> {
         let own = |photo: usize| mounted.own[photo];
         let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);

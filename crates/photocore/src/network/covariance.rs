@@ -38,15 +38,12 @@ pub enum Of {
 pub struct Covariances {
     pub(super) assembled: Assembled,
     pub(super) linearized: Linearized,
-    /// Number of images of the network.
     pub(super) images: usize,
     /// Number of additional observations.
     pub(super) observations: usize,
     /// Index of each point among the active ones.
     pub(super) point: Vec<Option<usize>>,
-    /// One photo of each camera.
     pub(super) photo_of_camera: Vec<Option<usize>>,
-    /// Camera of each photo.
     pub(super) camera_of_photo: Vec<usize>,
     pub(super) suspects: OnceLock<Arc<Suspects>>,
     memory: Option<usize>,

@@ -19,7 +19,6 @@ pub(super) struct At<'a> {
 }
 
 impl Bundle {
-    /// Writes the equations of an image.
     pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         match &stations.bent {
             None => {
@@ -32,7 +31,6 @@ impl Bundle {
         }
     }
 
-    /// Writes the equations of a tie.
     pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
             return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);

@@ -3,7 +3,6 @@
 /// Position of consecutive parameters inside a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InBlock {
-    /// Block index.
     pub block: usize,
     /// First parameter inside the block.
     pub first: usize,

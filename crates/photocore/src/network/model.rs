@@ -38,7 +38,6 @@ pub struct Bundle {
     pub blocks: Blocks,
     /// Observed camera parameters with a covariance matrix.
     pub camera_priors: Vec<CameraPrior>,
-    /// Shared parameters.
     pub commons: Vec<PlacedCommon>,
     /// Relations of photos to rig frames and trajectories.
     pub mounts: Mounts,
@@ -60,11 +59,9 @@ pub struct Bundle {
     pub images_on: Vec<usize>,
     /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
-    /// Additional observations.
     pub observations: Vec<TiedObservation>,
     /// Datum information of the network and the user.
     pub datum: GivenDatum,
-    /// Active screens.
     pub screens: Screens,
     /// Connected components, computed at first use from all fields above.
     pub parts: OnceLock<Parts>,
@@ -198,7 +195,6 @@ impl Bundle {
         self.images.len() - self.point_images.start[self.locals]
     }
 
-    /// Returns the point of an image.
     pub(super) fn point_of(&self, image: usize) -> usize {
         self.point_images.start.partition_point(|&start| start <= image) - 1
     }
@@ -277,17 +273,14 @@ impl Bundle {
         Placed { photos, commons, mounted, films }
     }
 
-    /// Returns only the photos.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
         self.placed(unknowns).photos
     }
 
-    /// Returns the shared parameters at given values.
     pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
         (0..self.commons.len()).map(|common| self.common_state(common, unknowns)).collect()
     }
 
-    /// Returns one shared parameter at given values.
     pub fn common_state(&self, common: usize, unknowns: &[f64]) -> CommonState {
         let start = 3 * self.locals;
         let own = self.of_common(common).map_or(0..0, |own| own.start - start..own.end - start);
@@ -322,7 +315,6 @@ impl Bundle {
         own.map(|(owner, range)| (owner, unknown - range.start))
     }
 
-    /// Returns the cofactors of a retained block.
     pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
         &all.retained[self.blocks.squares[block]..self.blocks.squares[block + 1]]
     }
@@ -388,7 +380,6 @@ impl Bundle {
         }
     }
 
-    /// Returns the images of a point.
     pub fn images_of(&self, point: usize) -> &[Image] {
         &self.images[self.point_images.start[point]..self.point_images.start[point + 1]]
     }

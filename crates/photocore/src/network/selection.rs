@@ -55,7 +55,6 @@ impl Reason {
     }
 }
 
-/// Excluded points and photos of an adjustment.
 #[derive(Debug, Clone)]
 pub(super) struct LeftOut {
     pub points: Vec<bool>,
@@ -176,7 +175,6 @@ impl Network {
 }
 
 impl PointImages {
-    /// Returns the images of the i-th point.
     pub fn of(&self, i: usize) -> &[usize] {
         &self.order[self.start[i]..self.start[i + 1]]
     }

@@ -23,7 +23,7 @@ pub const LEAST_REDUNDANCY: f64 = 1e-9;
 pub struct SumsOfSquares {
     /// Weighted poses, cameras and shared parameters.
     pub camera: f64,
-    /// Fixed or weighted components of control points.
+    /// Weighted coordinates of control points.
     pub ground: f64,
     /// Image coordinates.
     pub plates: f64,
@@ -48,7 +48,7 @@ impl SumsOfSquares {
 pub struct Redundancies {
     /// Weighted poses, cameras and shared parameters.
     pub camera: f64,
-    /// Fixed or weighted components of control points.
+    /// Weighted coordinates of control points.
     pub ground: f64,
     /// Image coordinates.
     pub plates: f64,
@@ -298,7 +298,6 @@ fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(
     model.owner(unknown)
 }
 
-/// Returns the adjusted additional observations.
 pub(super) fn observations(
     network: &Network,
     problem: &Problem<Bundle>,

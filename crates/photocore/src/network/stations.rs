@@ -38,7 +38,6 @@ pub struct Bent {
     pub films: Vec<Option<FilmAt>>,
 }
 
-/// Mounted photos.
 #[derive(Debug)]
 pub struct Mounted {
     /// Orientations of all photos from their own six parameters.
@@ -47,7 +46,6 @@ pub struct Mounted {
     pub composed: Vec<Option<Composed>>,
 }
 
-/// Photos and shared parameters at given values.
 pub struct Placed {
     pub photos: Vec<Station>,
     pub commons: Vec<CommonState>,
@@ -80,7 +78,6 @@ impl Mounted {
 }
 
 impl Bent {
-    /// Returns the film of a photo.
     pub fn film(&self, photo: usize) -> Option<&FilmAt> {
         self.films.get(photo)?.as_ref()
     }

@@ -43,7 +43,7 @@ pub(super) enum Row {
 pub(super) enum Home {
     /// An image of a local point, as a group of equations.
     Group { group: usize, point: usize },
-    /// A tie.
+    /// A tie, by its index among the ties.
     Tie(usize),
     /// A point, numbered as in the model.
     Point(usize),

@@ -27,7 +27,6 @@ pub struct Trial {
     pub(super) place: Vec<Option<usize>>,
     /// Test groups of each local point.
     pub(super) on_place: Vec<Vec<usize>>,
-    /// Camera of each photo.
     pub(super) camera_of_photo: Vec<usize>,
     /// Parameters fixed as a minimal datum at the end of the adjustment.
     pub(super) held: Vec<usize>,

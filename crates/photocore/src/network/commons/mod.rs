@@ -211,7 +211,6 @@ pub(super) struct PlacedCommon {
     origin: [f64; 3],
     /// Given position; coordinates of the object space are relative to the origin.
     coordinates: [f64; 3],
-    /// Given pose.
     given: Pose,
     /// Axes of the given rotation, as rows.
     axes: Matrix3,

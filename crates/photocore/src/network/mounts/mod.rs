@@ -174,13 +174,11 @@ impl Mounts {
         self.given[common]
     }
 
-    /// Returns the mounts of a photo.
     #[inline]
     pub(super) fn of(&self, photo: usize) -> &[Mount] {
         self.by_photo.get(photo).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns all mounts.
     pub(super) fn all(&self) -> impl Iterator<Item = &Mount> {
         self.by_photo.iter().flatten()
     }
@@ -208,12 +206,10 @@ impl Mounts {
         own.map_or(carrier, |own| own.block)
     }
 
-    /// Returns all trajectories.
     pub(super) fn trajectories(&self) -> &[Trajectory] {
         &self.trajectories
     }
 
-    /// Returns the trajectory of a photo.
     pub(super) fn trajectory_of(&self, photo: usize) -> Option<usize> {
         [photo, self.carrier(photo)]
             .iter()

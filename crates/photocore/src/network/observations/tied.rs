@@ -10,7 +10,6 @@ use crate::network::mounts::Moving;
 /// An observation of points, photos and shared parameters of a model.
 #[derive(Debug)]
 pub struct TiedObservation {
-    /// Index in the network.
     pub index: usize,
     pub observation: Observation,
     /// Objects of the observation, with points as numbered in the model.

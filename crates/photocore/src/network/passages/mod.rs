@@ -98,12 +98,10 @@ pub(super) struct Passages {
     /// Figure of each point of the model, and the index of the point there.
     of_point: Vec<Option<(usize, usize)>>,
     lenses: Vec<Knots>,
-    /// Lens of each photo's camera.
     of_photo: Vec<Option<usize>>,
     /// Active knots of each image of the model; empty before they are determined.
     windows: Vec<Option<Window>>,
     scans: Vec<Scan>,
-    /// Scan of each photo.
     scan_of: Vec<Option<usize>>,
     /// Pattern cell of each image of the model; empty if all patterns consist of one cell.
     pub cells: Vec<usize>,
@@ -153,7 +151,6 @@ impl Passages {
         !self.figures.is_empty()
     }
 
-    /// Returns the film of a photo.
     pub fn film(&self, photo: usize) -> Option<&FilmOf> {
         Some(&self.scans[(*self.scan_of.get(photo)?)?].film)
     }
@@ -172,7 +169,6 @@ impl Passages {
         self.scans.iter().flat_map(|own| own.unknowns().into_iter().map(|(common, _)| (common, own.photo)))
     }
 
-    /// Returns the pattern cell of an image.
     pub fn cell(&self, image: usize) -> usize {
         self.cells.get(image).copied().unwrap_or(0)
     }
@@ -182,7 +178,6 @@ impl Passages {
         &self.lenses
     }
 
-    /// Returns the lens of a photo.
     pub fn lens(&self, photo: usize) -> Option<usize> {
         *self.of_photo.get(photo)?
     }

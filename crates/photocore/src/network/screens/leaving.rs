@@ -33,7 +33,6 @@ pub(super) struct Leaves {
     pub photos: Vec<usize>,
 }
 
-/// Excluded objects.
 #[derive(Debug, Clone)]
 pub(in crate::network) struct Leaving {
     pub left_out: LeftOut,
