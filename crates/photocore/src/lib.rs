@@ -1,13 +1,13 @@
 //! Photogrammetric least-squares adjustment with the covariance of every result.
 //!
-//! Four floors; each knows only the ones below it:
+//! Four layers; each layer depends only on the layers below it in this list:
 //!
-//! * [`network`]: cameras, photos, points and images adjusted together; [`programs`]: the other photogrammetric models;
-//! * [`adjustment`]: iteration, weights, convergence, statistics; knows no photograph;
-//! * [`normals`]: block normal equations, ordered, reduced, factored, solved, selectively inverted; knows no observation;
+//! * [`network`]: joint adjustment of cameras, photos, points and image observations; [`programs`]: the other photogrammetric models;
+//! * [`adjustment`]: iteration, weights, convergence, statistics; independent of photogrammetry;
+//! * [`normals`]: block normal equations (ordering, reduction, factorization, solution, selected inverse); independent of observations;
 //! * [`geometry`]: poses, cameras, projection, ellipsoid, refraction: pure functions with their partial derivatives.
 //!
-//! Vectors and matrices are those of [`nalgebra`]. The crate reads no files, prints nothing and has no global state.
+//! Vectors and matrices are [`nalgebra`] types. The crate reads no files, prints nothing and uses no global state.
 
 pub mod adjustment;
 pub mod geometry;
@@ -21,7 +21,7 @@ mod threads;
 pub use nalgebra;
 pub use threads::{Stopped, Threads};
 
-/// What the README shows is compiled and run.
+/// The code examples of the README, compiled and run as doctests.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
