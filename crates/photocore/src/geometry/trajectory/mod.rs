@@ -4,9 +4,8 @@
 //! C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
 //! ```
 //!
-//! C0, A0 are the table. The coefficients are c_k, in its axes, and rotation vectors r_k, in the axes of the photo; alternatives are
-//! [`Axes`] and [`Rotations`]. A frame photo has one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners:
-//! Poli 2007.
+//! The table is C0, A0. The coefficients are c_k, in its axes, and rotation vectors r_k, in photo axes; alternatives: [`Axes`],
+//! [`Rotations`]. A frame photo has one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
 mod axes;
 mod functions;
