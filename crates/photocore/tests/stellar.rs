@@ -22,7 +22,7 @@ fn atan(z: C) -> C {
     C::new(z.re.atan(), z.im / (1.0 + z.re * z.re))
 }
 
-/// Independent implementation of the model for complex arguments: direction (2), attitude (3), common parameters (17).
+/// Independent implementation of the model for complex arguments: direction (2), attitude (3), shared parameters (17).
 fn image(kind: &Kind, time: f64, unknowns: &[C]) -> [C; 2] {
     let (ra, dec) = (unknowns[0], unknowns[1]);
     let (sp, cp) = LATITUDE.sin_cos();

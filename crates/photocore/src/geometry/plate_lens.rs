@@ -19,7 +19,7 @@ pub enum Form {
 pub enum Decentering {
     /// K4, K5 and the direction phi_T.
     Polar,
-    /// Brown's P1 = K4 cos phi_T, P2 = K4 sin phi_T, P3 = K5 / K4: regular for zero distortion, too.
+    /// Brown's P1 = K4 cos phi_T, P2 = K4 sin phi_T, P3 = K5 / K4: also regular for zero distortion.
     Cartesian,
 }
 

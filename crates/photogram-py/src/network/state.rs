@@ -51,7 +51,7 @@ pub struct BlockState {
 }
 
 impl BlockState {
-    /// Takes the converged network at the first call; None for copies and unpickled states.
+    /// Removes and returns the converged network at the first call; None for copies and unpickled states.
     pub fn take_kept(&self) -> Option<Box<Converged>> {
         self.kept.lock().ok().and_then(|mut kept| kept.take())
     }

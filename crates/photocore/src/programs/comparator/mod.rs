@@ -4,7 +4,7 @@
 //! comparator: two scales, nonorthogonality, and two polynomials. The polynomials (NOAA TR NOS 57, equations 36 and 59) exclude degrees 0
 //! and 1, which equal the linear transformation. Observations are measured coordinates.
 //!
-//! Example: nine points of a plate, measured in two placements by a comparator whose x is too short by ten millionths:
+//! Example: nine points of a plate, measured in two placements by a comparator whose x scale is wrong by ten millionths:
 //!
 //! ```
 //! use photocore::adjustment::Options;
@@ -81,7 +81,7 @@ pub struct Measurement {
 /// Calibration data of one comparator. All lengths, including the coefficients, have the same unit.
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// Initial scales, lack of orthogonality and coefficients.
+    /// Initial scales, nonorthogonality and coefficients.
     pub comparator: Comparator,
     /// Standard deviations of the coefficients about their initial values: infinite free, zero fixed.
     pub coefficient_sd: [Vec<f64>; 2],
@@ -127,7 +127,7 @@ pub enum CalibrationError {
 /// Adjusted calibration. Cofactors are for a priori unit weight.
 #[derive(Debug)]
 pub struct Solution {
-    /// Scales, lack of orthogonality, coefficients of x, coefficients of y.
+    /// Scales, nonorthogonality, coefficients of x, coefficients of y.
     pub comparator: Vec<f64>,
     /// Cofactors of the comparator parameters, square, row by row.
     pub comparator_cofactors: Vec<f64>,

@@ -168,7 +168,7 @@ impl Search<'_> {
             let mut model = apart.remove(index);
             let before = apart.len();
             self.join_all(&mut model, apart)?;
-            // Earlier models may have been joined, too.
+            // The join may have removed earlier models.
             apart.insert(index.min(apart.len()), model);
             index = if before + 1 > apart.len() { 0 } else { index + 1 };
         }

@@ -7,7 +7,7 @@
 //!
 //! Relative orientation over a plane: the homography of four points, and its poses.
 //!
-//! With a plane n . P = d in the axes of the first photo, u2 ~ H u1, H = R + t n^T / d, R = A^T and t = -A^T b. The two poses come from
+//! With a plane n . P = d in the axes of the first photo, u2 ~ H u1, H = R + t n^T / d, R = A^T and t = -A^T b. The two poses follow from
 //! the singular values of H (Ma, Soatto, Kosecka and Sastry, An Invitation to 3-D Vision, 2004, section 5.3).
 
 use nalgebra::{SMatrix, SVector, Schur};

@@ -55,7 +55,7 @@ pub struct Solution {
     pub points: Vec<AdjustedControl>,
     /// Image observations.
     pub images: Vec<AdjustedImage>,
-    /// Points behind the camera, ascending: they satisfy the equations as well.
+    /// Points behind the camera, ascending; the equations do not exclude them.
     pub behind: Vec<usize>,
     /// Weighted sum of squares of all observations.
     pub sum_of_squares: f64,
@@ -67,8 +67,8 @@ pub struct Solution {
     pub history: Vec<Pose>,
     /// Other minima; their sum of squares exceeds the least by at most nine times the variance of unit weight (at least nine).
     pub alternatives: Vec<Alternative>,
-    /// Reason why a pose that fits as well is not determined. Three points may have such a pose on the danger cylinder in addition to
-    /// determined ones.
+    /// Reason why an alternative pose with a similar fit is not determined. With three points it may be on the danger cylinder, unlike the
+    /// other poses.
     pub undetermined: Option<Degeneracy>,
     /// Distance of the projection centre from the right cylinder over the circle through three points, negative inside; None unless there
     /// are exactly three. On this danger cylinder the pose is not determined.
@@ -246,7 +246,7 @@ impl SinglePhoto {
         }
     }
 
-    /// Returns the points behind the camera, ascending; they satisfy the equations as well.
+    /// Returns the points behind the camera, ascending; the equations do not exclude them.
     pub fn behind(&self, unknowns: &[f64]) -> Vec<usize> {
         let At { photo, .. } = self.evaluated(unknowns);
         let points = unknowns[..3 * self.points.len()].as_chunks().0.iter().enumerate();

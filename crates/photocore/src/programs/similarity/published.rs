@@ -117,7 +117,7 @@ fn misclosure_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &S
     })
 }
 
-/// Returns the rows of the bulletin, v = s A X + B - x, constant -v (equations 2.10); missing X are taken from the last cycle.
+/// Returns the rows of the bulletin, v = s A X + B - x, constant -v (equations 2.10); missing X are results of the last cycle.
 fn bulletin_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &Station) -> [[f64; 8]; 3] {
     let known = station.known();
     let carried = similarity.control_at(&station.model);

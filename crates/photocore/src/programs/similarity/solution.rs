@@ -36,7 +36,7 @@ pub struct Solution {
     pub initial: Similarity,
     /// Source of the initial values.
     pub started: Started,
-    /// Other orientations that fit as well.
+    /// Alternative orientations with a similar fit.
     pub alternatives: Vec<Similarity>,
     /// Status at the end of the iteration.
     pub status: Status,

@@ -32,7 +32,7 @@ pub enum Started {
 pub struct Chosen {
     pub similarity: Similarity,
     pub started: Started,
-    /// Other orientations that fit as well.
+    /// Alternative orientations with a similar fit.
     pub alternatives: Vec<Similarity>,
 }
 

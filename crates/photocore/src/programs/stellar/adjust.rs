@@ -109,7 +109,7 @@ impl Calibration {
         stars
     }
 
-    /// Returns the number of parameters: attitudes and common ones.
+    /// Returns the number of parameters: attitudes and shared ones.
     pub fn parameters(&self) -> usize {
         3 * self.pointings.len() + COMMON
     }

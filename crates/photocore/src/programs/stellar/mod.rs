@@ -127,7 +127,7 @@ pub struct Axis {
 /// Weighted parameters: given values and their weight matrix.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    /// Indices of the parameters: attitudes three each, then the common ones.
+    /// Indices of the parameters: attitudes three each, then the shared ones.
     pub parameters: Vec<usize>,
     /// Given values.
     pub values: Vec<f64>,
@@ -146,7 +146,7 @@ pub struct Calibration {
     pub pointings: Vec<[f64; 3]>,
     /// Initial interior parameters, then coefficients of refraction in seconds of arc.
     pub common: [f64; COMMON],
-    /// Whether each parameter is fixed: attitudes three each, then the common ones.
+    /// Whether each parameter is fixed: attitudes three each, then the shared ones.
     pub fixed: Vec<bool>,
     /// Weights of parameters.
     pub weights: Weights,

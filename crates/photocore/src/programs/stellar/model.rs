@@ -78,7 +78,7 @@ pub struct Rows {
     pub star: [[f64; 2]; 2],
     /// Partials with respect to the attitude.
     pub pointing: [[f64; 3]; 2],
-    /// Partials with respect to the common parameters.
+    /// Partials with respect to the shared parameters.
     pub common: [[f64; COMMON]; 2],
 }
 
@@ -236,7 +236,7 @@ impl Calibration {
             ties.push((Tied::Axis(root), tie));
         }
         for row in 0..self.weights.parameters.len() {
-            // The common block is always included: its cofactors with every attitude are needed.
+            // The shared block is always included: its cofactors with every attitude are needed.
             let mut retained: Vec<u32> = self
                 .weighted(row)
                 .map(|(parameter, ..)| common.min(parameter as u32 / 3))

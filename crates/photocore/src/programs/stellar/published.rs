@@ -26,7 +26,7 @@ pub struct PublishedRows {
 /// One correction of all parameters.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Corrections of the parameters: attitudes three each, then the common ones.
+    /// Corrections of the parameters: attitudes three each, then the shared ones.
     pub parameters: Vec<f64>,
     /// Full cofactor matrix of the parameters, row by row; zero for fixed parameters and those without effect.
     pub cofactors: Vec<f64>,

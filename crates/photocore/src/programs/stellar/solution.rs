@@ -44,16 +44,16 @@ pub struct Observations {
 pub struct ParameterCofactors {
     /// Cofactors of each attitude (3 x 3).
     pub own: Vec<f64>,
-    /// Cofactors of each attitude with the common parameters (3 x common).
+    /// Cofactors of each attitude with the shared parameters (3 x shared).
     pub cross: Vec<f64>,
-    /// Cofactors of the common parameters.
+    /// Cofactors of the shared parameters.
     pub common: Vec<f64>,
 }
 
 /// Adjusted calibration.
 #[derive(Debug)]
 pub struct Solution {
-    /// Attitudes three each, then the common parameters.
+    /// Attitudes three each, then the shared parameters.
     pub parameters: Vec<f64>,
     /// Stars and images.
     pub observations: Observations,
