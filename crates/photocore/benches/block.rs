@@ -196,10 +196,10 @@ impl Phases {
         ))
     }
 
-    /// Returns the multiply-adds of the formation with its reduction, and of the cofactors of points and observations, from the numbers of
-    /// rays of the points. In addition to the reduction an observation needs 146: normal matrix and right-hand side of the point (20),
-    /// coupling and triangular solution (72), block and right-hand side of the photograph (54). H Q_oo needs 3 (6 k)^2 for k photographs,
-    /// the redundancy numbers of an observation about 100.
+    /// Returns the multiply-adds of the formation with its reduction, and of the cofactors, from the numbers of rays of the points. In
+    /// addition to the reduction an observation needs 146. These are 20 for the normal matrix and right-hand side of the point, 72 for the
+    /// coupling and triangular solution, 54 for block and right-hand side of the photograph. H Q_oo needs 3 (6 k)^2 for k photographs, the
+    /// redundancy numbers of an observation about 100.
     fn operations(&self) -> (f64, f64) {
         let layout = self.system.layout();
         let reduction = self.system.symbolic().operations(layout).reduction;

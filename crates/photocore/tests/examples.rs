@@ -1,4 +1,4 @@
-//! The examples run, with the expected results.
+//! Runs of the examples, compared with expected results.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, dead_code)]
 

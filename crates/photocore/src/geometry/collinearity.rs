@@ -1,5 +1,5 @@
-//! Collinearity equations x = c u1/u3, y = c u2/u3 with u = A^T (P - C), linearized in all nine unknowns: a central perspective with an
-//! orientation given by position and angles.
+//! Collinearity equations x = c u1/u3, y = c u2/u3 with u = A^T (P - C), linearized in all nine unknowns. The camera is a central
+//! perspective, the orientation is given by position and angles.
 //!
 //! C is the projection centre and P the point, both cartesian. They are object coordinates in rectangular space and geocentric coordinates
 //! in geographic space. There, omega, phi, kappa refer to the local vertical frame at the station.

@@ -405,7 +405,7 @@ pub type Watch<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
 /// Number of points between two calls.
 const PATIENCE: usize = 1024;
 
-/// Calls `watch` at every 1024th point; fails if it breaks.
+/// Calls `watch` once per `PATIENCE` points; fails if it breaks.
 pub fn go_on(watch: &mut dyn FnMut() -> ControlFlow<()>, point: usize) -> Result<(), Reason> {
     match point.is_multiple_of(PATIENCE) && watch().is_break() {
         true => Err(Stopped::Interrupted.into()),

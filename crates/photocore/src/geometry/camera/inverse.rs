@@ -254,7 +254,7 @@ pub fn way_back(
         let step = [by[1][1] * x - by[0][1] * y, by[0][0] * y - by[1][0] * x];
         at = [at[0] + step[0], at[1] + step[1]];
         let [square, size] = [step, at].map(square_of);
-        // Expected error after a step: its square times the curvature, estimated from the previous step or assumed of typical lens size.
+        // Expected error after a step: its square times the curvature, estimated from the previous step or assumed as for typical lenses.
         let (rounding, shown) = (ROUNDING * ROUNDING * size, if square > before { square } else { before });
         if square * square <= rounding * size && square * square * square <= rounding * shown * shown {
             return Some(at);

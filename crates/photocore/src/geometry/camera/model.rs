@@ -92,7 +92,7 @@ pub trait CameraModel: Clone {
         self.radius(u, measured) > self.fold()
     }
 
-    /// Returns the argument of the radial part of the lens.
+    /// Returns the radius on which the radial part of the lens depends.
     fn radius(&self, _u: &Vector3, _measured: [f64; 2]) -> f64 {
         0.0
     }

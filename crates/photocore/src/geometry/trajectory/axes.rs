@@ -9,9 +9,9 @@ pub enum Axes {
     /// The axes of the table.
     #[default]
     Table,
-    /// Along, across and radial axes of an orbit: radial points away from the centre, along is the horizontal velocity, across points left.
+    /// Orbit about a centre: radial points outward, along is the velocity component perpendicular to it, across points left.
     Orbit(Vector3),
-    /// Along, across and radial axes of a flight: radial is the third axis of the table, up.
+    /// Flight: the same axes, with the third axis of the table (up) as radial.
     Flight,
 }
 

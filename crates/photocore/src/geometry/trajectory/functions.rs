@@ -41,7 +41,7 @@ pub trait BasisModel: Sized {
         None
     }
 
-    /// Returns the time tolerance within which the active functions are also prepared; None if all functions are always active.
+    /// Returns the time offset up to which `Basis::near` includes functions; None if all functions are always active.
     fn reach(&self) -> Option<f64> {
         None
     }

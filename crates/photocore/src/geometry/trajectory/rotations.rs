@@ -83,7 +83,7 @@ impl Rotations {
             Self::Zxz => {
                 let (s2, c2) = turn.y.sin_cos();
                 let [first, second, _] = columns((*turn).into());
-                // The third axis rotates the previous columns by -a3', the second the columns before it by -a2'.
+                // The rotation by a3 changes the first two columns by -a3', the rotation by a2 only the first by -a2'.
                 let by_third = |v: &Vector3| -rate.z * Vector3::z().cross(v);
                 let (s3, c3) = turn.z.sin_cos();
                 let by_second = rate.y * Vector3::new(s3 * c2, c3 * c2, -s2);

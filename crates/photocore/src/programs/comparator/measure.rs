@@ -73,7 +73,7 @@ pub struct Measured {
     pub comparator: [Vec<f64>; 2],
 }
 
-/// Newton steps of the inverse correction: the first step of a correction of about 1e-5 leaves its square.
+/// Newton steps of the inverse correction: the first step reduces an error of about 1e-5 to its square.
 const STEPS: usize = 4;
 
 impl Comparator {

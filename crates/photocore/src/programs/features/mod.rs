@@ -3,8 +3,7 @@
 //! The fitted feature minimizes the sum of squared orthogonal distances of the points: the Gaussian associated feature of coordinate
 //! metrology (A. B. Forbes, *Least-squares best-fit geometric elements*, NPL report DITC 140/89, 1989; C. M. Shakarji, J. Res. NIST 103,
 //! 1998). Points have equal weights, so that the reported form deviation is independent of the precision of the points. The precision of
-//! the feature is propagated from the joint covariance of the points with the exact derivatives of the feature with respect to the points
-//! ([`fit`]).
+//! the feature is propagated from the joint covariance of the points, with exact derivatives ([`fit`]).
 //!
 //! ```
 //! use photocore::geometry::Vector3;

@@ -1,6 +1,6 @@
 //! Initial values: poses of photos from the available data, before any adjustment.
 //!
-//! The steps are: copy given poses; intersect rays of known photos; resect photos with four known points; use GNSS and inertial poses.
+//! The steps are: copy given poses, intersect rays of known photos, resect photos with four known points, use GNSS and inertial poses.
 //! Photos without a-priori data are oriented relative to each other, first a pair, then further photos. The resulting model is transformed
 //! by a similarity to the rest, or to control and observed positions. Without these, the first photo is the datum and the first base has
 //! length 1. Finally all photos and points are adjusted with a robust loss.

@@ -18,8 +18,8 @@ pub struct Placement {
     pub to_photo: Matrix3,
 }
 
-/// Limits for errors of the rays near the danger cylinder, where two solutions merge and vanish: the discriminant of a quadratic equation,
-/// relative to b^2, and the relative misclosures of the squared sides.
+/// Largest misfits due to errors of the rays near the danger cylinder, at which two solutions merge and vanish: discriminant of a quadratic
+/// equation relative to b^2; relative misclosures of the squared sides.
 const NOT_REAL: f64 = 1e-2;
 const NOT_CLOSED: f64 = 1e-2;
 /// Relative difference of the distances below which two solutions are identical.

@@ -4,7 +4,7 @@
 //! shared block. A direction of the axis and weights of parameters are constraints. A fixed star does not couple attitudes: each of its
 //! images has a separate local block.
 //!
-//! Unit weight refers to the plate coordinates: its mean error has the unit of the inverse root of their weights.
+//! Unit weight refers to the plate coordinates: its mean error has the unit of a coordinate times the root of a weight.
 //!
 //! Example: a camera of 300 mm with principal distance and attitude known to some millimetres and minutes of arc, and nine stars:
 //!
