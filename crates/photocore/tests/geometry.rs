@@ -16,7 +16,7 @@ fn wgs84() -> Ellipsoid {
     Ellipsoid::new(WGS84.0, WGS84.1).unwrap()
 }
 
-/// Photo and image point with its distance to the object: in rectangular space if `spheroid` is None.
+/// Photo and image point with its distance to the object, in rectangular space without `spheroid`.
 #[derive(Debug, Clone)]
 struct Case {
     spheroid: Option<(f64, f64)>,

@@ -121,8 +121,8 @@ mod bent {
     }
 }
 
-/// Photo and a point below it: in rectangular space if `spheroid` is None. Lengths are in units of `metres`, the third coordinate is
-/// relative to `datum`.
+/// Photo and a point below it, in rectangular space without `spheroid`. Lengths are in units of `metres`, the third coordinate is relative
+/// to `datum`.
 #[derive(Debug, Clone)]
 struct Case {
     spheroid: Option<(f64, f64)>,

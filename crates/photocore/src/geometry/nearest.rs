@@ -3,7 +3,7 @@
 /// Returns the nearest of the others to each point within a limit; None if the limit contains none of them.
 ///
 /// `but` names one excluded neighbour per point. Equal distances are resolved by the order of cells and indices. The others are sorted into
-/// cells as wide as the limit, so that only nine cells are searched. The result is None for a point that is not finite.
+/// cells as wide as the limit, so that only nine cells are searched. Points that are not finite yield None.
 ///
 /// # Panics
 ///
