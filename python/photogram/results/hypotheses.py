@@ -279,6 +279,8 @@ def _is_checked(result: AdjustedNetwork, effect: Effect | None) -> bool:
     if effect is None or not len(effect.checks):
         return False
     checks = cast("Result", result).check_points
+    if checks.agreement is None:
+        return False
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.abs(np.array(effect.checks)) / np.hypot(checks.sd, checks.given_sd)
     return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
@@ -347,7 +349,7 @@ def block_facts(result: Result) -> dict[str, Any]:
     _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
     own = np.unique(kinds[control])
     if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of = {kind: k for k, kind in enumerate(own.tolist())}
+        set_of: dict[int, int] = {kind: k for k, kind in enumerate(own.tolist())}
         facts["control_sets"] = [
             set_of[kind] if is_control else None
             for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
