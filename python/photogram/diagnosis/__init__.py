@@ -1,4 +1,4 @@
-"""Mistakes in the data of a network: one module for each thing that is looked at."""
+"""Checks of the data of a network, one module per check."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Adjustments of a check: each block once, and which of several changed blocks is what was meant."""
+"""Adjustments of a check: stored results, and the choice between several corrected blocks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Adjuster:
         self._known: list[tuple[Block, Result | AdjustmentError]] = []
 
     def __call__(self, block: Block) -> Result:
-        """Adjust a block; the same block raises its error again."""
+        """Adjust a block; raise the same error for the same block."""
         result = next((result for known, result in self._known if known == block), None)
         if result is None:
             try:
@@ -51,14 +51,14 @@ class Adjuster:
         return result if result is not None and result.converged else None
 
     def otherwise(self, **options: Any) -> Adjuster:
-        """Return one with other options."""
+        """Return an adjuster with changed options."""
         return Adjuster({**self.options, **options})
 
 
 def put_right(
     first: Result | None, tried: Iterable[tuple[Phrase, Block]], adjusted: Adjuster
 ) -> tuple[Phrase, Block, Judged] | None:
-    """Adjust blocks without possible mistakes; return the mistake and the block that explain the residuals.
+    """Adjust corrected blocks; return the mistake and the block that explain the residuals.
 
     `first` is the adjustment of the unchanged block; None if that failed.
     """
@@ -71,7 +71,7 @@ def put_right(
     freedom = next((result.degrees_of_freedom for *_, result in results if result is not None), 0)
     if not np.isfinite(left).any() or freedom < 1:
         return None
-    # What cannot be adjusted as it is leaves more than anything that can be.
+    # A block that cannot be adjusted counts as worse than all blocks that can.
     most = 1e6 * max(each for each in left if math.isfinite(each))
     verdict = judged(min(given, most), left, freedom, known_weight=True)
     if verdict is None or not verdict.accepted:

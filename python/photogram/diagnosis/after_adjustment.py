@@ -1,6 +1,6 @@
-"""What is wrong where an adjustment has failed or fits badly: looked for when somebody asks.
+"""Explanations of an adjustment that failed or fits badly.
 
-Most adjustments fit: what explains the others is loaded for them.
+The explaining modules are imported on demand, because most adjustments fit.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
     from photogram.diagnosis.diagnosis import Diagnosis
 
-BAD = 5.0  # Sigma0 above which an adjustment that has converged is doubted
+BAD = 5.0  # Sigma0 above which a converged adjustment is suspect
 
 
 @contextmanager
@@ -43,17 +43,16 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
 
 
 def diagnosed(result: Result) -> Result:
-    """Return a result, with what explains it where it has not converged or fits badly.
+    """Add hints and exchanged names to a result that has not converged or fits badly.
 
-    Mistakes in conventions (`hints`) and exchanged names (`exchanged`) are for its verdict. The hints stand
-    among its messages too, and so do those on standard deviations, which are no mistakes of conventions: the
-    verdict has tests of its own for them.
+    Mistakes in conventions (`hints`) and exchanged names (`exchanged`) enter the verdict. Hints are also
+    messages. Hints on standard deviations are messages only, because the verdict tests these separately.
     """
     return with_exchanges(_with_hints(result))
 
 
 def explained(result: Result) -> list[Message]:
-    """Name mistakes in what the data of an adjustment mean that explain why it has failed, or fits badly."""
+    """Return mistakes in the conventions of the data that explain a failed or bad adjustment."""
     if result.loss is not None:
         return []
     found = _of_block(result.block) if _bad(result) else []
@@ -66,7 +65,7 @@ def explained(result: Result) -> list[Message]:
 
 
 def remarks(result: Result) -> list[Message]:
-    """Name what fits and is hardly what was meant: directions of readouts, offsets of clocks, marks."""
+    """Return hints on a result that fits: readout directions, clock offsets, fiducial marks."""
     if not (result.converged and (result.unknowns or result.block.observations)):
         return []
     from photogram.diagnosis.clocks import known_offsets
@@ -75,14 +74,13 @@ def remarks(result: Result) -> list[Message]:
     from photogram.diagnosis.film_scans import line_hints, seam_hints
     from photogram.diagnosis.shutters import backward_readouts
 
-    # A film in two pieces makes marks fail, too, and so does one that has changed along one axis.
+    # A film in two pieces, or one that has changed along one axis, also makes marks fail.
     films = seam_hints(result) or axis_hints(result) or mark_hints(result)
     films += [*lens_hints(result), *line_hints(result)]
     return [*backward_readouts(result), *known_offsets(result), *films]
 
 
 def _of_block(block: Block) -> list[Message]:
-    """Try conventions of photos at rest, and of those on trajectories."""
     from photogram.diagnosis.conventions import hints
     from photogram.diagnosis.trajectory_hints import flown_hints
 
@@ -110,7 +108,7 @@ def _with_hints(result: Result) -> Result:
 
 
 def diagnosis_of(result: Result) -> Diagnosis:
-    """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
+    """Return the diagnosis of an adjustment that failed or fits badly, with its own verdict."""
     from photogram.diagnosis.diagnosis import Diagnosis
     from photogram.diagnosis.findings import Section, note_all, note_verdict
     from photogram.diagnosis.weights import weight_hints

@@ -1,4 +1,4 @@
-"""One observation that does not fit: its test value, and what is said of it."""
+"""A single observation that does not fit: its test value and its finding."""
 
 from __future__ import annotations
 
@@ -18,21 +18,20 @@ from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 from photogram.words import Phrase, phrase
 
-ODDS = 20.0  # An image that is less likely by this factor is no rival
-ALIKE = 0.98  # Nor can tests be told apart that differ by less: photos are not known quite
-INVISIBLE = 1e-6  # Eigenvalue of a block of R along which an error leaves no residual
+ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
+ALIKE = 0.98  # Ratio of test values that cannot be distinguished, because poses are uncertain
+INVISIBLE = 1e-6  # Eigenvalue of a block of R below which an error leaves no residual
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
-"""Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
+"""Redundancy numbers below which image coordinates, and control or stations, are not tested.
 
-Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
-value still means something.
-"""
-BESIDE = "beside images: "  # Before the names of further kinds of observations
+Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth. Its test
+value is still meaningful."""
+BESIDE = "beside images: "  # Prefix of the names of additional observations
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """One observation: its kind, its place in the arrays of the block, and its test value."""
+    """One observation: its type, its row and column in the arrays of the block, and its test value."""
 
     kind: str
     row: int
@@ -41,7 +40,7 @@ class Suspect:
 
 
 def tests(result: Result) -> dict[str, Floats]:
-    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
+    """Return test values by type, in standard deviations of the residuals; 0 without redundancy."""
     images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
     others = {
         "control": (result.point_redundancy, result.point_standardized),
@@ -58,12 +57,12 @@ def tests(result: Result) -> dict[str, Floats]:
 
 
 def kind_of(result: Result, suspect: Suspect) -> ObservedKind:
-    """Return the observations of its kind, beside images."""
+    """Return all additional observations of the type of a suspect."""
     return result.kinds[suspect.kind.removeprefix(BESIDE)]
 
 
 def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
-    """Say that an observation does not fit; `spread` is that of the test values of its adjustment."""
+    """Return the finding on an observation; `spread` is the robust sd of all test values."""
     if suspect.kind == "image":
         return _image_finding(result, suspect, spread)
     if suspect.kind == "control":
@@ -79,7 +78,7 @@ def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
 
 
 def with_rivals(misfit: Finding, result: Result, suspect: Suspect, spread: float) -> Finding:
-    """Name the control whose error would leave nearly the same residuals: odds below 20."""
+    """Add control points whose error would leave nearly the same residuals (likelihood ratio below 20)."""
     values = tests(result)["control"].max(axis=1) / spread
     near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
     near &= values > critical(int((values > 0).sum()))
@@ -93,7 +92,6 @@ def with_rivals(misfit: Finding, result: Result, suspect: Suspect, spread: float
 
 
 def _other_finding(result: Result, suspect: Suspect) -> Finding:
-    """Say that an observation beside images does not fit."""
     kind = kind_of(result, suspect)
     observation = result.block.observations[int(kind.rows[suspect.row])]
     redundancy = float(kind.redundancy[suspect.row, suspect.axis])
@@ -114,7 +112,7 @@ def _other_finding(result: Result, suspect: Suspect) -> Finding:
 
 
 def control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
-    """Say that a component of control does not fit; `error` is that of the given value."""
+    """Return the finding on a component of control; `error` is the error of the given value."""
     angle = block.geographic and axis < 2
     unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
     component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
@@ -153,13 +151,13 @@ def _image_finding(result: Result, suspect: Suspect, spread: float) -> Finding:
 
 
 def rival_images(result: Result, row: int, spread: float) -> Indices:
-    """Return the rows of other images of a point that may be wrong instead of the image in a row.
+    """Return other observations of a point that may be wrong instead of the one in a row.
 
-    With two rays, or three of photos in a row, an error of one image leaves the residuals that an error of
-    another would leave. The test of an image as a group (x and y together) is T = v' R^- v, its residuals in
-    standard deviations and its block of R = I - A N^-1 A', here with the photos known: A are the partials of
-    the images of the point with respect to its position. The odds of two images are
-    exp((T_i - T_j) / 2 - (m_i - m_j)), m the rank of the block (Akaike weights).
+    With two rays, or three of photos in a row, errors of different observations leave the same residuals. The
+    test of an observation as a group (x and y together) is T = v' R^- v. Its residuals v are in standard
+    deviations, and R = I - A N^-1 A' is its block for fixed photos. A contains the partials of the
+    observations of the point by its position. The likelihood ratio of two observations is exp((T_i - T_j) / 2
+    - (m_i - m_j)), with m the rank of the block (Akaike weights).
     """
     block = result.block
     point = int(block.image_points[row])
@@ -187,7 +185,6 @@ def rival_images(result: Result, row: int, spread: float) -> Indices:
 
 
 def _test(block: Floats, residuals: Floats) -> tuple[float, int]:
-    """Return T and the rank of the block."""
     sizes, axes = np.linalg.eigh(block)
     seen = sizes > INVISIBLE
     return float(((axes.T @ residuals)[seen] ** 2 / sizes[seen]).sum()), int(seen.sum())

@@ -1,4 +1,4 @@
-"""Scales of time and offsets of clocks that are their differences; lines of scanners counted otherwise."""
+"""Clock offsets that equal differences of time scales, and scan lines that are counted half a line off."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
 LEAPS = range(13, 19)  # GPS - UTC in seconds from 1999 on; 18 since 2017
-TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms
-WITHIN = 0.010  # Seconds: a shift of time this near to a difference is that
+TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET as in SPICE, within 2 ms
+WITHIN = 0.010  # Seconds within which a time shift equals a difference of scales
 
 
 def differences() -> Iterator[tuple[str, str, float]]:
-    """Return two scales and by how many seconds the first is ahead of the second."""
+    """Yield two time scales and by how many seconds the first is ahead of the second."""
     yield "TAI", "GPS", TAI_GPS
     yield "ET", "TAI", ET_TAI
     yield "ET", "GPS", TAI_GPS + ET_TAI
@@ -33,7 +33,7 @@ def differences() -> Iterator[tuple[str, str, float]]:
 
 
 def scales_of(shift: float) -> list[Phrase]:
-    """Return pairs of time scales whose difference is a shift in seconds, which is added to the second."""
+    """Return pairs of time scales whose difference is a shift; seconds added to the second scale."""
     return [
         phrase("moving.time-scales", first=to, second=of, seconds=sign * seconds)
         for ahead, behind, seconds in differences()
@@ -47,7 +47,7 @@ HALVES, NEARLY = (0.5, 1.0), 0.1  # Lines
 
 
 def known_offsets(result: Result) -> list[Message]:
-    """Name offsets of clocks that are known differences of scales of time."""
+    """Return messages on clock offsets that equal known differences of time scales."""
     found = []
     for each in result.unknowns:
         offset = float(each.position[0])
@@ -59,9 +59,9 @@ def known_offsets(result: Result) -> list[Message]:
 
 
 def counted_lines(block: Block, adjusted: Adjuster) -> list[Finding]:
-    """Look for scanners whose lines are counted half a line, or one, off: a free offset of their time.
+    """Find scanners whose lines are off by one half or one, from a free time offset.
 
-    Scanners with as many seconds per line have one offset; those with an offset of their own are left out.
+    Scanners with the same seconds per line share one offset, unless they have an offset of their own.
     """
     clocks: dict[float, Clock] = {}
 

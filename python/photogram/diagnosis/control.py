@@ -1,4 +1,4 @@
-"""Control that does not fit, with its remedies (Appendix H)."""
+"""Control points that do not fit, with remedies (Appendix H)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from photogram.diagnosis.findings import Finding, Level, Section, Words, finding
 from photogram.results.result import Result
 from photogram.words import phrase
 
-MANY = 0.2  # Of the control: when more does not fit, it is hardly the points
+MANY = 0.2  # Part of the control points above which a common cause is more probable
 
 
 def control(edited: Edited, words: Words) -> Section:
-    """Say which control does not fit, and what may be done about it."""
+    """Return the section on control that does not fit, with remedies."""
     section = Section(
         "Control", "Control fails by misidentification, poor transfer of the point, or bad coordinates."
     )
@@ -41,7 +41,7 @@ def control(edited: Edited, words: Words) -> Section:
 def _misfit(
     result: Result, name: str, findings: list[Finding], images_too: bool, common: bool, words: Words
 ) -> Finding:
-    """Put the components of one control point together, with the remedies of the guide."""
+    """Join the findings on the components of one control point, and add the remedies of the guide."""
     axes = {int(misfit.values["component"]) for misfit in findings}
     kept = np.isfinite(result.block.point_sd[result.block.point_ids.index(name)])
     part = "plan" if 2 not in axes else "height" if axes == {2} else "both"

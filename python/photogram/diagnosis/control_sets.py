@@ -1,13 +1,12 @@
-"""Control as a whole against the model that the photos make without it: units, axes, mirror images.
+"""Control points as a set against the free model of the photos: units, axes, mirror images.
 
-With the control left out the images make a free model: positions Y of the control points with their joint
-covariance C_Y, in a datum of its own. Control X with covariance C_X is compared with it by a similarity,
+Without control, the image observations define a free model with its own datum: positions Y of the control
+points with their joint covariance C_Y. A similarity compares control X, with covariance C_X, with this model:
 
     Omega = min over m, R, t of e' (C_X + C_Y)^-1 e,     e = X - (m R Y + t)
 
-which in a linear model is what the adjustment with that control would add to the sum of squares. So a
-hypothesis about the whole control (heights in feet, X and Y exchanged ...) costs a fit of seven parameters
-and no adjustment.
+In a linear model, this is the increase of the sum of squares if that control is added. So a hypothesis about
+all control (heights in feet, X and Y exchanged ...) costs a fit of seven parameters and no adjustment.
 """
 
 from __future__ import annotations
@@ -36,20 +35,20 @@ from photogram.results.result import Result
 from photogram.statistics.likelihood import judged
 from photogram.words import phrase
 
-MOST = 60  # Control points that are compared
+MOST = 60  # Maximum number of compared control points
 FEWEST = 3
-TRIPLES = 400  # Threes of them that are tried
-CLEARLY = 2 * math.log(20)  # What explaining it by single points must cost more: odds of 20
-PAIRS = 15  # Pairs that are exchanged on trial
+TRIPLES = 400  # Maximum number of tried triples of control points
+CLEARLY = 2 * math.log(20)  # Additional cost of an explanation by single points (likelihood ratio of 20)
+PAIRS = 15  # Maximum number of tried exchanges
 GROWTHS = 5
 NEAR = 6.0  # Standard deviations within which a point agrees with a similarity
 STEPS = 30
 CONVERGED = 1e-9
-MANY = 2  # Control points that do not fit, for control as a whole to be doubted
+MANY = 2  # Number of control points that do not fit above which the whole set is doubted
 
 EXCHANGED = "X and Y exchanged"
 
-Change = Callable[[Floats], Floats]  # Makes of (n, 3) coordinates as given those that were meant
+Change = Callable[[Floats], Floats]  # Changes (n, 3) given coordinates to the intended ones
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class _Set:
     change: Change
 
     def meant(self, block: Block) -> Block:
-        """Return a block with the control that was meant."""
+        """Return the block with the intended control."""
         held = np.isfinite(block.point_sd).any(axis=1, keepdims=True)
         positions = np.where(held, self.change(block.point_positions), block.point_positions)
         order = [1, 0, 2] if self.kind == EXCHANGED else [0, 1, 2]
@@ -85,28 +84,28 @@ SAME_BUT_SCALE = {"metres in heights", "feet in X and Y"}
 
 @dataclass(frozen=True, eq=False)
 class FreeModel:
-    """Control points in the model that is free of them."""
+    """Control points in the free model, which does not depend on them."""
 
     block: Block  # The block with its control
     axes: LocalAxes  # Its metric axes
     points: Indices  # (k,) the control points
-    held: Bools  # (k, 3) which of their components are held
-    model: Floats  # (k, 3) their positions in the model, in the axes
-    given: Floats  # (k, 3) the same in the block's own coordinates
+    held: Bools  # (k, 3) their control components (finite sd)
+    model: Floats  # (k, 3) positions in the model, in the axes
+    given: Floats  # (k, 3) positions in the model, in the block's own coordinates
     covariance: Floats  # (3k, 3k) of `model`
-    per_unit: Floats  # (3,) units of the axes of a unit of each coordinate, about
+    per_unit: Floats  # (3,) approximate size of a unit of each coordinate, in units of the axes
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Of the comparison."""
+        """Degrees of freedom of the comparison."""
         return int(self.held.sum()) - 7
 
     def omega(self, change: Change | None = None) -> float:
-        """Return what is left of the control under a hypothesis; infinite where it cannot be fitted."""
+        """Return Omega under a hypothesis; infinite if it cannot be fitted."""
         return self._best(self._target(change))[0]
 
     def scale(self, change: Change) -> float:
-        """Return the scale of the similarity under a hypothesis: 1 where the stations are right."""
+        """Return the scale of the similarity under a hypothesis: 1 if the stations are correct."""
         return self._best(self._target(change))[1].scale
 
     def _best(self, target: Floats) -> tuple[float, _Similarity]:
@@ -120,7 +119,7 @@ class FreeModel:
         return min((self._fitted(each, target, rows) for each in starts), key=lambda each: each[0])
 
     def two_exchanged(self) -> float:
-        """Return what is left of the control when the best two points are exchanged."""
+        """Return Omega after the best exchange of two points."""
         target = self._target(None)
         _, similarity = self._nearest(target)
         placed = similarity.of(self.model)
@@ -143,11 +142,11 @@ class FreeModel:
         return left
 
     def some_wrong(self, change: Change | None = None) -> float:
-        """Return what explaining the misfit, under a hypothesis, by wrong points costs.
+        """Return the cost of explaining the misfit, under a hypothesis, by wrong points.
 
-        That is Omega of the others and, for each wrong one, 2 ln(3 k) for its being one of k, and for each of
-        its errors, which may be anything, 2 ln(error / standard deviation). The points that are right are
-        those of the similarity of three points to which most others are nearest.
+        The cost is Omega of the other points plus two terms. Each wrong point adds 2 ln(3 k), because it is
+        one of k. Each of its errors adds 2 ln(error / standard deviation). The correct points are the ones
+        nearest to the similarity of three points that most other points fit.
         """
         target, full = self._target(change), np.flatnonzero(self.held.all(axis=1))
         deviations = self._deviations
@@ -173,12 +172,12 @@ class FreeModel:
 
     @property
     def _deviations(self) -> Floats:
-        """(k, 3) of the differences of control and model, without what a similarity takes."""
+        """(k, 3) standard deviations of control minus model, not reduced by the similarity."""
         own = np.sqrt(np.maximum(np.diag(self.covariance), 0)).reshape(-1, 3)
         return np.asarray(np.hypot(own, self.per_unit * self.block.point_sd[self.points]))
 
     def _nearest(self, target: Floats) -> tuple[Floats, _Similarity]:
-        """Return (k, 3) misses of the similarity of three points to which most are nearest, and this one."""
+        """Return the similarity of three points that most points fit, after its (k, 3) misfits."""
         deviations = self._deviations
         best, nearest = math.inf, (np.zeros(target.shape), _Similarity.start(self.model, target))
         for three in _triples(np.flatnonzero(self.held.all(axis=1))):
@@ -190,7 +189,7 @@ class FreeModel:
         return nearest
 
     def _left_out(self, similarity: _Similarity, target: Floats, gone: Indices) -> Floats:
-        """Return the errors of some components in their standard deviations, as the others predict them."""
+        """Return errors of omitted components, predicted by the others, in their standard deviations."""
         rows = np.flatnonzero(self.held.ravel())
         error, design, own = self._equations(similarity, target, rows)
         weighted = np.linalg.solve(own, design)
@@ -204,7 +203,7 @@ class FreeModel:
     def _equations(
         self, similarity: _Similarity, target: Floats, rows: Indices
     ) -> tuple[Floats, Floats, Floats]:
-        """Return misclosures, partials (shift, scale, rotation) and covariance matrix of some rows."""
+        """Return misclosures, partials (shift, scale, rotation) and covariance of some rows."""
         turned = similarity.scale * (self.model - self.model.mean(axis=0)) @ similarity.rotation.T
         whole = np.kron(np.eye(len(turned)), similarity.scale * similarity.rotation)
         variances = ((self.per_unit * self.block.point_sd[self.points]).ravel()[rows]) ** 2
@@ -212,19 +211,17 @@ class FreeModel:
         return (target - similarity.of(self.model)).ravel()[rows], _similarity_partials(turned)[rows], own
 
     def _target(self, change: Change | None) -> Floats:
-        """(k, 3) control as it was meant, in the axes."""
         supplied = self.block.point_positions[self.points]
         meant = supplied if change is None else change(supplied)
-        # A component that is not held says nothing: it is where the model has it.
+        # A free component carries no information: it has the coordinate of the model.
         return self.axes.positions(np.where(self.held, meant, self.given))
 
     def _closest(self, which: Indices, target: Floats) -> _Similarity:
-        """Return the similarity that brings some points closest to their targets."""
         some = self.model[which]
         return _Similarity.closest(some, target[which]).about(some, self.model)
 
     def _fitted(self, similarity: _Similarity, target: Floats, rows: Indices) -> tuple[float, _Similarity]:
-        """Return Omega of some rows, and the similarity, after Gauss-Newton steps."""
+        """Return Omega of some rows and the similarity after Gauss-Newton steps."""
         before = math.inf
         for _ in range(STEPS):
             error, design, own = self._equations(similarity, target, rows)
@@ -245,7 +242,7 @@ class FreeModel:
 
 
 def _triples(points: Indices) -> list[Indices]:
-    """Return threes of some points: all, or some drawn at random from a fixed seed."""
+    """Return triples of points: all, or a random sample with a fixed seed."""
     if math.comb(len(points), 3) <= TRIPLES:
         return [np.array(three) for three in combinations(points.tolist(), 3)]
     random = np.random.default_rng(0)
@@ -260,29 +257,29 @@ class _Similarity:
 
     @classmethod
     def start(cls, model: Floats, target: Floats) -> _Similarity:
-        """Return the shift that brings points onto others in the mean."""
+        """Return the shift between the means of two sets of points."""
         return cls(1.0, np.eye(3), target.mean(axis=0) - model.mean(axis=0))
 
     @classmethod
     def closest(cls, model: Floats, target: Floats) -> _Similarity:
-        """Return the one that brings points closest to others, unweighted."""
+        """Return the unweighted least-squares similarity."""
         scale, rotation, _ = turn_and_scale(model, target)
         return cls(max(scale, 1e-6), rotation, target.mean(axis=0) - model.mean(axis=0))
 
     def of(self, model: Floats) -> Floats:
-        """(k, 3) where points of the model come; turned and scaled about their mean."""
+        """Return (k, 3) transformed points of the model; rotation and scale are about their mean."""
         centre = model.mean(axis=0)
         placed: Floats = self.scale * (model - centre) @ self.rotation.T + centre + self.shift
         return placed
 
     def about(self, some: Floats, model: Floats) -> _Similarity:
-        """Return the same similarity, as one about the mean of all points that was one about that of some."""
+        """Return the same similarity about the mean of all points instead of the mean of some."""
         from_some, to_all = some.mean(axis=0), model.mean(axis=0)
         moved = self.scale * (to_all - from_some) @ self.rotation.T + from_some + self.shift - to_all
         return _Similarity(self.scale, self.rotation, moved)
 
     def moved(self, step: Floats) -> _Similarity:
-        """Return it after a step of translation, scale and rotation, about the mean of all points."""
+        """Return the similarity after a step of translation, scale and rotation about the mean."""
         return _Similarity(
             self.scale * math.exp(float(np.clip(step[3], -1, 1))),
             Attitudes.of("rotation_vector", step[np.newaxis, 4:]).matrices[0] @ self.rotation,
@@ -291,7 +288,7 @@ class _Similarity:
 
 
 def doubtful(first: Result | None, *kinds: str) -> bool:
-    """Whether all observations of some kinds may be wrong: an adjustment fails, or several do not fit."""
+    """Test whether all observations of some types may be wrong: no adjustment, or several misfits."""
     if first is None or not first.converged:
         return True
     values = tests(first)
@@ -303,7 +300,7 @@ def doubtful(first: Result | None, *kinds: str) -> bool:
 
 
 def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
-    """Return the control points in the model that the rest of the block makes; None where it makes none."""
+    """Return the control points in the free model of the other observations; None if it has none."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     points = spread(np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & (rays >= 2)), MOST)
     if len(points) < FEWEST:
@@ -333,9 +330,9 @@ def free_model(block: Block, adjusted: Adjuster) -> FreeModel | None:
 
 
 def _of_shape(covariance: Floats, model: Floats) -> Floats:
-    """Return a covariance matrix with that of shape, and as much of what a similarity changes.
+    """Return a covariance whose datum part has the average variance of its shape part.
 
-    A similarity is found anyhow; what the datum of the model says of it would only cost digits.
+    The comparison estimates a similarity anyway. The datum part of the model would only cost digits.
     """
     basis, _ = np.linalg.qr(_similarity_partials(model - model.mean(axis=0)))
     across = np.eye(len(covariance)) - basis @ basis.T
@@ -345,7 +342,7 @@ def _of_shape(covariance: Floats, model: Floats) -> Floats:
 
 
 def _similarity_partials(turned: Floats) -> Floats:
-    """(3k, 7) partials of points, counted from their mean, by shift, scale and rotation."""
+    """(3k, 7) partials of points, relative to their mean, by shift, scale and rotation."""
     design = np.zeros((len(turned), 3, 7))
     design[:, :, :3] = np.eye(3)
     design[:, :, 3] = turned
@@ -355,7 +352,7 @@ def _similarity_partials(turned: Floats) -> Floats:
 
 
 def explain(model: FreeModel) -> Explained | None:
-    """Return the mistake in the control as a whole that explains why it does not fit, if there is one."""
+    """Return the mistake in the control as a set that explains the misfit, if any."""
     sets = [
         each
         for each in SETS
@@ -365,7 +362,7 @@ def explain(model: FreeModel) -> Explained | None:
     single = min(model.some_wrong(), model.two_exchanged())
     verdict = judged(model.omega(), changed, model.degrees_of_freedom)
     if verdict is None or min(changed) + CLEARLY > single:
-        # Points that are wrong besides hide a mistake in all: both with what wrong points cost.
+        # Other wrong points hide a mistake in the set: both are compared with the cost of wrong points.
         changed = [
             min(omega, model.some_wrong(each.change)) for omega, each in zip(changed, sets, strict=True)
         ]
@@ -374,11 +371,11 @@ def explain(model: FreeModel) -> Explained | None:
             return None
     best = [sets[place] for place in verdict.best]
     if {each.kind for each in best} == SAME_BUT_SCALE:
-        # Only the scale differs, which the stations tell.
+        # The hypotheses differ only in scale, which the stations determine.
         best = [min(best, key=lambda each: abs(math.log(model.scale(each.change))))]
         verdict = replace(verdict, best=verdict.best[:1])
     if model.held.all(axis=1).sum() < FEWEST:
-        # Nothing tells a mistake in all from one in some.
+        # A mistake in the set cannot be distinguished from one in some points.
         verdict = replace(verdict, explained=False)
     causes = [phrase(f"mistake.control.{each.kind}") for each in best]
     effect = phrase("mistake.control-misfit", times=verdict.fall)

@@ -1,10 +1,10 @@
-"""Mistakes in conventions: units, axes and angles of images, photos and points, found by trying.
+"""Mistakes in conventions: units, axes and angles of observations, photos and points, found by trial.
 
-One such mistake makes every observation look wrong. So it is asked for before all else, named once, and put
-right for what follows; the data are never changed.
+Such a mistake makes every observation look wrong. So the check searches for it first and reports it once.
+Later steps use corrected values; the data are not changed.
 
-The verdict is the ratio of the misfit m of images under a hypothesis to that as given
-(:mod:`photogram.diagnosis.regression`); `docs/hints.md` has the table of hypotheses and the limits.
+The criterion is the ratio of the misfit m under a hypothesis to the misfit of the given data
+(:mod:`photogram.diagnosis.regression`). `docs/hints.md` lists hypotheses and limits.
 """
 
 from __future__ import annotations
@@ -49,24 +49,24 @@ from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 from photogram.words import phrase
 
-SUSPICION = 0.35  # Misfit m above which photos are looked at more closely
+SUSPICION = 0.35  # Misfit m above which photos are examined
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
-"""What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
+"""Largest ratio of the median misfit if the result is below ROUGH; otherwise initial poses are rough."""
 EACH = 0.5
-"""What it must fall to on each photo that does not fit as it is, and in the median of images of control."""
-AS_GOOD = 1.5  # Another hypothesis is as good when its misfit is below so many times the least
-SLIGHT = float(np.radians(1.0))  # Attitudes that differ from resected ones by less are right
-CLEARLY = 5.0  # So many times nearer to the resected attitudes must those of a rival reading be
-PUT_RIGHT = 5  # Mistakes that are put right one upon the other, at the most
+"""Largest ratio for each photo that did not fit, and for the median residual of control."""
+AS_GOOD = 1.5  # Another hypothesis is as good if its misfit is below this multiple of the least
+SLIGHT = float(np.radians(1.0))  # Attitudes closer than this to the resected ones are correct
+CLEARLY = 5.0  # A rival reading must be closer to the resected attitudes by this factor
+PUT_RIGHT = 5  # Maximum number of successive corrections
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
-"""A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
+"""Factor between metres and millimetres; limits of the median, and of the logarithm of each distance."""
 
 
 class Verdict:
-    """Hypotheses that pass, the best first; several if the data do not decide.
+    """Hypotheses that pass, best first; several if the data do not decide.
 
-    `photos` are the names of the photos with the mistake; empty for all. `change` and `exact` belong to the
-    first hypothesis.
+    `photos` lists the photos with the mistake; empty for all photos. `change` and `exact` belong to the first
+    hypothesis.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class Verdict:
         found.sort(key=lambda each: each[0])
         least = found[0][0]
         best = [each for misfit, each in found if misfit <= AS_GOOD * least]
-        # One mistake may be right in several forms.
+        # The same mistake may occur in several forms.
         best = list({str(each.message): each for each in reversed(best)}.values())[::-1]
         self.names = [each.name for each in best]
         self.change, self.exact = best[0].change, best[0].exact
@@ -94,10 +94,10 @@ class Verdict:
 
 
 def hints(block: Block) -> list[Message]:
-    """Return mistakes in the conventions of data that would explain why images do not fit.
+    """Return mistakes in the conventions of the data that would explain the misfit of the observations.
 
-    The block has positions and attitudes of photos, be they rough; without them it is an InputError. Photos
-    on trajectories, which have no single pose, are left out.
+    The block must have positions and attitudes of photos, which may be rough; otherwise InputError is raised.
+    Photos on trajectories are skipped, because a single pose is undefined.
     """
     rest = at_rest(block) if isinstance(block, Block) else block
     if rest is not block and not len(rest.image_xy):
@@ -111,7 +111,7 @@ def hints(block: Block) -> list[Message]:
 
 
 def verdicts(block: Block) -> list[Verdict]:
-    """Return what the comparison of images with predictions says; see :func:`hints`."""
+    """Compare observations with predictions and return the verdicts; see :func:`hints`."""
     photos = eligible(block)
     if not len(photos):
         return []
@@ -130,9 +130,10 @@ def verdicts(block: Block) -> list[Verdict]:
 def passing(
     tried: Iterable[Hypothesis], looked: Block, given: Floats, misfits_of: Callable[[Block], Floats]
 ) -> list[tuple[float, Hypothesis]]:
-    """Return hypotheses under which photos fit, with the remaining misfit.
+    """Return the hypotheses under which photos fit, with their remaining misfit.
 
-    `given` are (k,) misfits of the photos in the block `looked`, `misfits_of` returns them for a changed one.
+    `given` are (k,) misfits of the photos in the block `looked`. `misfits_of` returns the misfits of a
+    changed block.
     """
     found: dict[str, tuple[float, Hypothesis]] = {}
     for hypothesis in tried:
@@ -147,7 +148,7 @@ def passing(
 
 
 def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
-    """Try what makes given points fit, where rays meet well but not there."""
+    """Find hypotheses for rays that intersect well but miss the given points."""
     given = control_misfit(looked)
     if not given_points(looked)[looked.image_points].any() or given <= SUSPICION:
         return []
@@ -156,7 +157,7 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
         meant = hypothesis.change(looked)
         left = control_misfit(meant)
         fits = left < given * (PASSES_ROUGH if left > ROUGH else PASSES) and left < SUSPICION
-        # Most images must be nearer, not only those of a few points that are far off.
+        # Most observations must improve, not only the ones of a few distant points.
         before, after = (float(np.median(control_residuals(each))) for each in (looked, meant))
         if fits and after < EACH * before and np.median(misfits(meant, photos)) < SUSPICION:
             fitting.append((left, hypothesis))
@@ -164,7 +165,7 @@ def _of_control(looked: Block, photos: Indices) -> list[Verdict]:
 
 
 def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
-    """Try photos one by one, the others being right."""
+    """Try photos one by one, with the other photos unchanged."""
     by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
     for photo in photos.tolist():
         own, alone = np.array([photo]), np.arange(len(block.photo_ids)) == photo
@@ -184,7 +185,6 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
 
 
 def _latitudes(block: Block) -> list[Message]:
-    """Latitudes beyond the poles are certain."""
     if block.spheroid is None:
         return []
     return [
@@ -195,7 +195,7 @@ def _latitudes(block: Block) -> list[Message]:
 
 
 def _readings(block: Block) -> list[Message]:
-    """Compare given attitudes with resected ones: mistakes in small angles, which images hardly show."""
+    """Compare given attitudes with resected ones; finds mistakes in small angles."""
     if block.spheroid is not None:
         return []
     known = given_points(block)
@@ -218,7 +218,7 @@ def _readings(block: Block) -> list[Message]:
 
 
 def _resected(block: Block, photo: int) -> Floats | None:
-    """(3, 3) attitude, photo to object, from the points that are given."""
+    """Return the (3, 3) attitude, photo to object, resected from given points."""
     rows = np.flatnonzero((block.image_photos == photo) & given_points(block)[block.image_points])
     points = block.image_points[rows]
     count = len(rows)
@@ -239,13 +239,13 @@ def _resected(block: Block, photo: int) -> Floats | None:
 
 
 def _apart(given: Floats, found: Floats) -> float:
-    """Rms angle between attitudes, radians."""
+    """Return the rms angle between attitudes, radians."""
     trace = np.einsum("pij,pij->p", given, found)
     return float(np.sqrt((np.arccos(np.clip((trace - 1) / 2, -1, 1)) ** 2).mean()))
 
 
 def distances_in_millimetres(block: Block) -> Hypothesis | None:
-    """Compare observed distances with those between points: millimetres for metres, all alike."""
+    """Compare observed distances with coordinates, to find millimetres instead of metres."""
     bars = [each for each in block.observations if isinstance(each, Distance)]
     if not bars:
         return None
@@ -269,7 +269,6 @@ def distances_in_millimetres(block: Block) -> Hypothesis | None:
 
 
 def _shorter(block: Block, factor: float) -> Block:
-    """Return a block with its observed distances divided by a factor."""
     return block.replace(
         observations=[
             replace(each, length=each.length / factor) if isinstance(each, Distance) else each
@@ -279,12 +278,12 @@ def _shorter(block: Block, factor: float) -> Block:
 
 
 def conventions(view: View) -> tuple[Section, View, bool]:
-    """Name the mistakes of whole sets that explain the images, and put them right.
+    """Report the mistakes of whole sets that explain the misfit, and correct them.
 
-    Signs, quarter turns and mirrored plates are left to the section on the sides of the cameras, which has
-    words for groups of photos and single ones.
+    Signs, quarter turns and mirrored plates are left to the section on the sides of the cameras, which can
+    name groups of photos and single photos.
 
-    Returns the section, the view of what was meant, and whether it is exactly that.
+    Returns the section, the corrected view, and whether the correction is exact.
     """
     section = Section(
         "Units, axes and angles (images against their predictions)",
@@ -312,5 +311,5 @@ def conventions(view: View) -> tuple[Section, View, bool]:
 
 
 def further(section: Section, view: View) -> None:
-    """Add the hints that the sides of the cameras have not explained, nor anything before."""
+    """Add the hints that neither the sides of the cameras nor earlier sections have explained."""
     note_all(section, "convention", "grave", hints(view.block))

@@ -1,8 +1,8 @@
-"""The check of a network: mistakes of whole sets, then gross errors, then blunders, then what is odd.
+"""The check of a network: mistakes of whole sets, gross errors, single errors, then remarkable values.
 
-The order is that of Appendix H of the guide (Elassal and Malhotra, NOAA 1987), by intersection first and by
-adjustment then; before it, units, axes and angles of everything are asked for, because one such mistake looks
-like a blunder in every observation.
+The order is the one of Appendix H of the guide (Elassal and Malhotra, NOAA 1987): first by intersection, then
+by adjustment. Units, axes and angles are checked before, because one such mistake looks like a gross error in
+every observation.
 """
 
 from __future__ import annotations
@@ -51,51 +51,53 @@ from photogram.words import phrase
 __all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
-HARDLY = 10.0  # So many times the usual residual before the adjustment comes from coarse stations
-MOST_SETS = 5  # Mistakes in the control as a whole that are put right one upon the other, at the most
+HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
+MOST_SETS = 5  # Maximum number of successive corrections of control as a set
 
 
 @dataclass(frozen=True)
 class Manner:
-    """How a block is checked."""
+    """Settings of a check."""
 
-    options: dict[str, Any] = field(default_factory=dict)  # Of :func:`photogram.adjust`
-    words: Words = field(default_factory=Words)  # What things are called
-    intersect_only: str = ""  # Why stations are kept as they are; empty where they are adjusted
+    options: dict[str, Any] = field(default_factory=dict)  # Options of :func:`photogram.adjust`
+    words: Words = field(default_factory=Words)  # Names of things in messages
+    intersect_only: str = ""  # Reason for not adjusting stations; empty if they are adjusted
 
 
 def diagnose(
     network: object, result: Result | Snooped | None = None, *, threads: int | None = None
 ) -> Diagnosis:
-    """Look for mistakes and gross errors in a network: units, axes, signs, names, images, control, stations.
+    """Find mistakes and gross errors in the data of a network.
 
-    Nothing is changed. What an earlier step explains (feet for metres, a mirrored photo) is put right for the
-    later ones, and what it finds wrong is left out of them, so that every error shows by itself and one
-    mistake is named once.
+    The check covers units, axes, signs, names, image observations, control points and stations. The data are
+    not changed. Mistakes that an earlier step explains (feet for metres, a mirrored photo) are corrected in
+    memory for the later steps. Observations that it rejects are excluded from them. So every error is
+    reported separately and once.
 
     Parameters
     ----------
     network
-        A block with any observations, a project of GIANT files, or a collection of photos. Photos of a block
-        may be without poses: they are given first values then. A block with photos on trajectories is
-        adjusted and snooped: nothing is tried on photos that move.
+        A block with any observations, a project of GIANT files, or a collection of photos. Photos without
+        poses get initial values. A block with photos on trajectories is adjusted and tested by data snooping;
+        conventions of moving photos are not tried.
     result
-        An adjustment of the block that is to be explained, or what snooping has made of it. Nothing is
-        adjusted then: where it has not converged, or fits badly, mistakes in conventions and exchanged names
-        are looked for, and standard deviations that it contradicts; the `result` that is returned has them
-        in its verdict.
+        An adjustment of the block to explain, or a result of data snooping. The block is not adjusted again
+        in this case. If the result has not converged or fits badly, the check looks for mistakes in
+        conventions, exchanged names and wrong standard deviations. The verdict of the returned `result`
+        includes them.
     threads
-        Threads of the adjustment; the findings do not depend on it. Default: all processors.
+        Number of threads of the adjustment; the findings do not depend on it. Default: all processors.
 
     Returns
     -------
-    The findings, section by section, with a report and a JSON document. Grave ones make results wrong or
+    The findings by section, with a report and a JSON document. Grave findings make results wrong or
     impossible.
 
     Raises
     ------
     InputError
-        What is no network, a block without images, what is no result of a block.
+        If `network` is not a network, the block lacks image observations, or `result` is not the result of a
+        block.
 
     Examples
     --------
@@ -122,10 +124,10 @@ def diagnose(
 
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
-    """Check a block; returns the sections, and the adjustment where there was one."""
+    """Check a block; return the sections and the adjustment, if any."""
     if not len(block.image_xy):
         raise argument_error("block", "no-images")
-    # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
+    # Absurd values overflow, and comparisons with them fail. Their effect is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):
             return flown_checked(block, manner.words, Adjuster(manner.options))
@@ -139,7 +141,6 @@ def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
 
 
 def _started(block: Block) -> tuple[Block | None, Section]:
-    """Give photos without poses their first values."""
     section = Section(
         "Initial values", "Photos without positions or attitudes are oriented from their image observations."
     )
@@ -192,7 +193,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
             edited = _edited(oriented, suspects, manner, adjusted)
     if edited.last is not None and edited.last.converged and edited.spread < HOPELESS:
         errors.findings = _fitting(errors.findings, edited.last.block)
-    # What the adjustment has explained or disproved.
+    # Names that the adjustment has explained or disproved.
     settled = {name for pair in edited.exchanged for name in pair} | set(edited.cleared)
     errors.findings = [
         each for each in errors.findings if each.kind != "control-difference" or not settled & {*each.points}
@@ -202,7 +203,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
         edited.section.findings[:0] = held_values(edited.first) + points_left_out(edited.last, named)
     if edited.first is not None:
         rolls = [finding("grave", each.phrase) for each in rolling_hints(edited.first) if each.phrase]
-        # What a lens, control or single images seem to have is what a shutter does to them.
+        # A rolling shutter can look like errors of a lens, of control or of single observations.
         sets.findings, exact = [*rolls, *sets.findings], exact and not rolls
     sections = [structure_section(block, edited.first, words), sets, upright, errors, edited.section]
     sections += _after_adjustment(oriented, edited, misleading, words)
@@ -218,7 +219,7 @@ def _checked(block: Block, manner: Manner) -> tuple[list[Section], Any]:
 
 
 def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
-    """Return findings, photos that are hardly bad and fit when adjusted being no more than looked at."""
+    """Return the findings; bad photos that fit after the adjustment are downgraded to `look`."""
     return [
         replace(each, level="look")
         if each.kind == "bad-photo"
@@ -230,7 +231,7 @@ def _fitting(findings: list[Finding], adjusted: Block) -> list[Finding]:
 
 
 def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) -> tuple[View, bool]:
-    """Put right what is wrong with control, or with observed positions of photos, as a whole.
+    """Correct mistakes in control, or in observed positions of photos, as a whole.
 
     Returns the view, and whether it has changed.
     """
@@ -251,7 +252,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
 
 
 def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
-    """Return the kind of finding and the mistake of a whole set, if there is one."""
+    """Return the type of finding and the mistake of a whole set, if any."""
     control = np.isfinite(block.point_sd).any()
     if control and doubtful(adjusted.tried(block), "control"):
         model = free_model(block, adjusted)
@@ -269,7 +270,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
 
 
 def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) -> Edited:
-    """Adjust the block, or intersect it when that is the job and its stations are good enough."""
+    """Adjust the block, or intersect it if only that is required and its stations are good enough."""
     suspects = replace(suspects, images=view.images(suspects.images))
     if not manner.intersect_only:
         return edit(view.block, suspects, adjusted)
@@ -282,7 +283,6 @@ def _edited(view: View, suspects: Suspects, manner: Manner, adjusted: Adjuster) 
 
 
 def _after_adjustment(view: View, edited: Edited, misleading: Collection[str], words: Words) -> list[Section]:
-    """Return the sections that rest on the adjustment, as far as there is one."""
     result = edited.last
     if result is None or not result.converged:
         return [stations(view.block, None), key_numbers(edited, words)]

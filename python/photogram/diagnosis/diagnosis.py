@@ -31,7 +31,7 @@ CONVENTIONS = frozenset(
         "observed-positions",
     }
 )
-"""Kinds of findings that are mistakes in what the data of a whole set mean."""
+"""Kinds of findings on conventions of a whole data set."""
 
 
 @dataclass(repr=False)
@@ -41,14 +41,14 @@ class Diagnosis(Documented, Brief):
     Attributes
     ----------
     title
-        Of the project.
+        Title of the project.
     sections
-        In the order of Appendix H of the guide.
+        Sections, in the order of Appendix H of the guide.
     result
-        The adjustment, where there was one; without what the check left out of it.
+        The adjustment without the observations that the check rejected; None if there is none.
     adjusted_before
-        Whether it is the adjustment that was to be explained: the verdict is its own then, with the mistakes
-        that were found.
+        True if the given adjustment was to be explained. The verdict is then its own, with the mistakes
+        found.
     """
 
     title: str
@@ -57,7 +57,7 @@ class Diagnosis(Documented, Brief):
     adjusted_before: bool = False
 
     def brief(self) -> tuple[str, Rows]:
-        """Return how many findings there are, and which, the grave ones first."""
+        """Return the number of findings, and the findings, grave ones first."""
         grave = self.grave
         found = [*grave, *(each for each in self.findings if each.level == "look")]
         title = (
@@ -77,10 +77,10 @@ class Diagnosis(Documented, Brief):
 
     @property
     def verdict(self) -> Verdict:
-        """What the findings come to, in the form of the verdict on an adjustment.
+        """Verdict on the findings, in the same form as the verdict on an adjustment.
 
-        Grave findings make results wrong: exit code 3, that of the command. Mistakes in what data mean stand
-        as hints; tests are those of the adjustment, where there was one.
+        Grave findings make results wrong: exit code 3, as of the command. Mistakes in conventions are hints;
+        the tests are the tests of the adjustment, if any.
         """
         if self.adjusted_before and self.result is not None:
             return self.result.verdict
@@ -99,7 +99,7 @@ class Diagnosis(Documented, Brief):
 
     @property
     def _ordered(self) -> list[Finding]:
-        """The findings: mistakes in the meaning of data, other grave ones, and those to look at."""
+        """Findings on conventions, other grave findings, and the findings to look at."""
         return sorted(self.findings, key=lambda each: (each.level != "grave", each.kind not in CONVENTIONS))
 
     def document(self) -> Document:
@@ -114,7 +114,7 @@ def _message(finding: Finding) -> Phrase:
 
 
 def _grave(code: str, check: Diagnosis) -> Phrase | None:
-    """Return the message on grave findings: on mistakes in the meaning of data (`hint`), or on others."""
+    """Return the message on grave findings, on conventions (`hint`) or on others."""
     if not check.grave or any(each.kind in CONVENTIONS for each in check.grave) is not (code == "hint"):
         return None
     fields = {"finding": _message(check._ordered[0]), "n": len(check.grave) - 1}
@@ -131,4 +131,4 @@ RULES = (
     Rule("look-at", _look, 0, ("look", "adjust"), warning=True),
     Rule("accepted", lambda _: phrase("check.verdict.accepted"), 0, ("adjust",)),
 )
-"""The rules of a check; the first that fits gives the headline."""
+"""Rules of a check; the first applicable one is the headline."""

@@ -1,4 +1,4 @@
-"""The document of a check: its findings, then its parts."""
+"""The document of a check: findings, then sections."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_FINDINGS = 200  # rows of the table of findings
 
 
 def check_document(title: str, verdict: Verdict, parts: Sequence[Section], result: Result | None) -> Document:
-    """Return the document of a check with these parts, and of its adjustment."""
+    """Return the document of a check and its adjustment."""
     findings = [(finding, part.title) for part in parts for finding in part.findings]
     grave = sum(finding.level == "grave" for finding, _ in findings)
     look = len(findings) - grave
@@ -82,7 +82,7 @@ def _section(number: int, section: Section) -> page.Section:
 
 
 def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
-    """Return the table of findings with the titles of their parts, grave findings first."""
+    """Return the table of findings with the titles of their sections, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
     columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
     rows: list[list[Cell]] = []

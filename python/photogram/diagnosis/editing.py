@@ -1,12 +1,12 @@
-"""Blunders found by the adjustment: data snooping, one after the other (Appendix H, 3-sigma rule).
+"""Gross errors found by the adjustment: iterative data snooping (Appendix H, 3-sigma rule).
 
-A gross error spoils the test values of its neighbours. So only the largest of a neighbourhood is taken out
-before the block is adjusted anew, and the others are judged again.
+A gross error affects the test values of its neighbours. So only the largest of a neighbourhood is removed
+before the block is adjusted again, and the others are re-evaluated.
 
-Not by `photogram.snoop`, which takes control out as a group: of 63 wrong images, one in a hundred, it took
-out 61 where this takes 50, but with one wrong coordinate of control it made good control and photos grave in
-16 of 200 projects (`benches/giant_check.py`, control 5 m and 500 m), this in 3. Components of control, which
-have hardly any redundancy, are judged one by one here.
+`photogram.snoop` is not used, because it removes control as a group. Of 63 wrong observations, one in a
+hundred, it removed 61; this module removes 50. With one wrong coordinate of control, however, it reported
+good control and photos as grave in 16 of 200 projects, and this module in 3 (`benches/giant_check.py`,
+control 5 m and 500 m). Components of control have hardly any redundancy and are tested one by one here.
 """
 
 from __future__ import annotations
@@ -42,55 +42,55 @@ from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.show.quantity import Axis, Quantity, Table
 
-ROUNDS = 20  # Adjustments at the most
+ROUNDS = 20  # Maximum number of adjustments
 COMPARABLE = 0.4  # Smaller test values (of the largest) may be consequences
 HOPELESS = 5.0
-"""Spread of the test values above which photos that did not fit before the adjustment are left out.
+"""Spread of the test values above which photos that did not fit before the adjustment are removed.
 
-Nor is what such an adjustment says held against what was found before."""
-EXCHANGES = 5  # Pairs of control points that are exchanged back, at the most
-LOOSE = 0.01  # Standard deviation of control that strains no block, as a part of the flying height
+Such an adjustment cannot disprove earlier findings either."""
+EXCHANGES = 5  # Maximum number of control point pairs that are exchanged back
+LOOSE = 0.01  # Standard deviation of loose control, as a part of the flying height
 BLUNDER = 3.0
 TWENTIETH = 1.96
-SURE = 1e-4  # Chance that the largest test value of a good block is beyond what is grave
+SURE = 1e-4  # Probability that a good block has a grave test value
 SHOWN = 20
-RETURNS = 10  # Images that are tried anew when all blunders are out, at the most
+RETURNS = 10  # Maximum number of observations that are reinstated
 
 
 @dataclass
 class Edited:
-    """The adjustment and what was taken out of it."""
+    """The adjustment and the removed observations."""
 
-    first: Result | None  # The first and the last adjustment; None where it cannot be done
+    first: Result | None  # The first and the last adjustment; None if it failed
     last: Result | None
-    reason: str  # Why it cannot
-    spread: float  # Robust standard deviation of the last test values: 1 when the weights are right
-    section: Section  # The blunder list
-    # Findings on control, by point: which components were taken out
+    reason: str  # The reason for the failure
+    spread: float  # Robust standard deviation of the last test values: 1 if the weights are correct
+    section: Section  # List of gross errors
+    # Findings on removed components of control, by point
     control: dict[str, list[Finding]] = field(default_factory=dict)
-    # Pairs of control points that had each other's coordinates
+    # Pairs of control points with exchanged coordinates
     exchanged: list[tuple[str, str]] = field(default_factory=list)
-    # Control points that were left out as suspects and agree with their predictions
+    # Suspected control points that agree with their predictions
     cleared: list[str] = field(default_factory=list)
-    asked: bool = True  # Whether an adjustment was wanted
+    asked: bool = True  # Whether an adjustment was requested
 
     @property
     def taken_out(self) -> int:
-        """How many observations the last adjustment did without."""
+        """Number of observations excluded from the last adjustment."""
         return len(self.section.findings) + sum(len(each) for each in self.control.values())
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
-    """Adjust a block and remove observations that do not fit, the largest error of a neighbourhood at a time.
+    """Adjust a block and remove gross errors, the largest of a neighbourhood at a time.
 
-    Suspected images are left out from the beginning, suspected photos if the block does not fit with them,
-    suspected control until its prediction has confirmed it. Control points that agree with each other's
-    predictions are exchanged, and the search starts again.
+    Suspected observations are excluded from the beginning. Suspected photos are excluded if the block does
+    not fit with them, suspected control until its prediction confirms it. Control points that agree with each
+    other's predictions are exchanged, and the search restarts.
     """
     found = _edited(block, suspects, adjusted)
     if not suspects.control.any() or not found.control:
         return found
-    # What is left out together takes the redundancy that tells it from other control.
+    # Joint removal reduces the redundancy that distinguishes wrong control from other control.
     none = np.zeros_like(suspects.control)
     plain = _edited(block, replace(suspects, control=none), adjusted)
     usable = plain.last is not None and plain.last.converged and plain.spread < HOPELESS
@@ -147,10 +147,10 @@ def _names(block: Block, pair: tuple[int, int]) -> tuple[str, str]:
 
 
 def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
-    """Return the control points without which a block that does not converge does so with loose control.
+    """Return the wrong control points of a block that converges only with loose control.
 
-    With standard deviations of a hundredth of the flying height, control strains no block, and what is wrong
-    by many times that shows.
+    With standard deviations of a hundredth of the flying height, control causes no strain, and much larger
+    errors become visible.
     """
     rays = Rays.of(View.of(block).seen)
     away = np.linalg.norm(
@@ -172,7 +172,7 @@ def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
 def _exchanged(
     result: Result, given: Block, points: Indices, spread: float, adjusted: Adjuster
 ) -> tuple[int, int] | None:
-    """Find two of some doubtful control points that are exchanged."""
+    """Find an exchanged pair among doubtful control points."""
     points = points[np.isfinite(given.point_sd[points]).any(axis=1) & result.used_points[points]]
     if len(points) < 2:
         return None
@@ -193,7 +193,7 @@ def _judged(
     section: Section,
     control: dict[str, list[Finding]],
 ) -> tuple[Result, float]:
-    """Hold what agrees with its prediction of the control that was left out, and report the rest."""
+    """Restore removed control that agrees with its prediction, and report the rest."""
     errors, tests = tests_of_predictions(result, given, points, spread)
     limit = critical(int(np.isfinite(given.point_sd).sum()))
     point_sd = result.block.point_sd.copy()
@@ -213,7 +213,7 @@ def _judged(
 
 
 def blunder_section() -> Section:
-    """Return the blunder list without entries."""
+    """Return an empty list of gross errors."""
     return Section(
         "Blunders (adjustment, 3-sigma rule)",
         "A residual beyond three of its standard deviations is suspect; what is taken out is named below.",
@@ -221,7 +221,7 @@ def blunder_section() -> Section:
 
 
 def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tuple[Result, Block]:
-    """Adjust with all photos, or without those bad ones with which the block does not fit."""
+    """Adjust with all photos, or without the bad photos with which the block does not fit."""
     error = None
     if not bad.any():
         return adjusted(block), block
@@ -283,7 +283,7 @@ def _largest(result: Result, spread: float) -> list[Suspect]:
     ]
     beyond.sort(key=lambda each: -each.test)
     if not beyond or beyond[0].kind != "image":
-        # An error of control or of a station spoils test values far away: nothing is taken out with it.
+        # An error of control or of a station affects distant test values: it is removed alone.
         return beyond[:1]
     taken: list[Suspect] = []
     photos: set[int] = set()
@@ -301,7 +301,6 @@ def _largest(result: Result, spread: float) -> list[Suspect]:
 
 
 def _without(result: Result, suspects: list[Suspect]) -> Block:
-    """Leave out images and observations; give up the weights of components of control and of stations."""
     block = result.block
     point_sd = block.point_sd.copy()
     station_sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
@@ -326,9 +325,10 @@ def _without(result: Result, suspects: list[Suspect]) -> Block:
 
 
 def _returned(result: Result, whole: Block, section: Section, spread: float, adjusted: Adjuster) -> Result:
-    """Take back images that fit once all others are out: a blunder beside them made them look wrong.
+    """Reinstate observations that fit after all removals: they looked wrong because of a gross error nearby.
 
-    They are tried one by one, the smallest test value first; the largest of all is the blunder itself.
+    They are tried one by one, in the order of their test values. The one with the largest test value is the
+    gross error itself.
     """
     blunders = sorted(
         (each for each in section.findings if each.kind == "blunder"),
@@ -340,7 +340,7 @@ def _returned(result: Result, whole: Block, section: Section, spread: float, adj
         block = result.block
         number = block.photo_ids.index(finding.photos[0])
         if ((block.image_photos == number) & (block.image_points == point)).any():
-            # It has come back already: both its coordinates were named.
+            # The observation is already reinstated: both its coordinates were named.
             section.findings.remove(finding)
             continue
         back = block.replace(
@@ -363,9 +363,9 @@ def _returned(result: Result, whole: Block, section: Section, spread: float, adj
 
 
 def _grave(result: Result, spread: float) -> float:
-    """Return the test value from which a finding is grave.
+    """Return the test value above which a finding is grave.
 
-    Where errors have heavier tails than normal ones, the tail tells the spread: one in twenty is beyond 1.96.
+    If errors have heavier tails than normal ones, the 95 % quantile (1.96 sd) defines the spread.
     """
     values = tests(result)
     images = values["image"][values["image"] > 0]
@@ -374,14 +374,14 @@ def _grave(result: Result, spread: float) -> float:
 
 
 def _graded(findings: list[Finding], limit: float) -> list[Finding]:
-    """Return findings, grave where their test value is beyond a limit."""
+    """Grade findings: grave if their test value exceeds a limit."""
     return [
         replace(each, level="grave" if each.values["test_value"] > limit else "look") for each in findings
     ]
 
 
 def _list(result: Result, spread: float, section: Section) -> None:
-    """Say how many test values are beyond 3 when all is done, and list the largest."""
+    """Report the number of test values beyond 3 after all removals, and list the largest."""
     values = tests(result)["image"] / spread
     tested = int((values > 0).sum())
     images, axes = np.nonzero(values > BLUNDER)

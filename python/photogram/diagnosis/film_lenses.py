@@ -1,12 +1,12 @@
-"""Lenses of certificates that images contradict: distortion with the other sign, another principal point.
+"""Certificate lens parameters contradicted by the observations: opposite distortion, wrong principal point.
 
-What is known of parameters of a camera beforehand, mu with the covariance C, is an observation: its residuals
-v = mu - x have the cofactors Q = C - Q_x. Were it mu + D a, and all else that is correlated with it moved
-along, the weighted sum of squares would be, to first order,
+Prior values mu of camera parameters, with covariance C, are observations. Their residuals v = mu - x have the
+cofactors Q = C - Q_x. If mu + D a were given, and all correlated values were moved along, the weighted sum of
+squares would be, to first order,
 
     Omega + 2 a' g + a' M a,    g = D' C^-1 v,    M = D' C^-1 Q C^-1 D
 
-so that it falls by T = g' M^-1 g at a = -M^-1 g (covariance M^-1). Nothing is adjusted again.
+so that it decreases by T = g' M^-1 g at a = -M^-1 g (covariance M^-1). No further adjustment is needed.
 """
 
 from __future__ import annotations
@@ -26,32 +26,33 @@ from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AK]\d")
 POINT = ("xp", "yp")
-CHANCE = 1e-4  # Of any hint where nothing is wrong
-EXPLAINED = 0.8  # Of what the sum of squares would fall by if nothing were known of the camera
+CHANCE = 1e-4  # Probability of any hint in correct data
+EXPLAINED = 0.8  # Part of the decrease of the sum of squares if all camera parameters were free
 NEAR, WITHIN = 0.3, 3.0
-"""How near images have the opposite of what is given: in parts of it, or in standard deviations."""
-TAKEN_UP = 1e-6  # Images say nothing of what they check by a smaller part
+"""Limits of the difference between the observed and the opposite value: relative, and in standard
+deviations."""
+TAKEN_UP = 1e-6  # Observations give no information on parameters with a smaller redundancy
 
 
 @dataclass(frozen=True)
 class _Fall:
-    """What the sum of squares falls by where something else is known of a camera."""
+    """Decrease of the sum of squares for other given values of a camera."""
 
-    value: float  # T, in the unit weight that is left, and its degrees of freedom
+    value: float  # T, relative to the remaining unit variance, and its degrees of freedom
     freedom: int
     moved: Floats  # (k,) a, and its standard deviations
     sd: Floats
 
     @classmethod
     def of(cls, result: Result, camera: AdjustedCamera, rows: list[int], columns: Floats) -> Self:
-        """Return it for some weighted parameters of a camera, (n,) rows, moved along (n, k) columns."""
+        """Compute the decrease for weighted parameters (n,) `rows`, moved along (n, k) `columns`."""
         own, given = np.ix_(rows, rows), camera.given
         whole = np.diag(given.deviations**2)
         if (correlated := given.prior_covariance) is not None:
             whole[np.ix_(camera.weighted, camera.weighted)] = correlated
         prior = whole[own]
         weighted = np.linalg.solve(prior, columns)
-        # In standard deviations of a, were images to say all.
+        # In standard deviations of a, for perfect observations.
         size = np.sqrt(np.einsum("nk,nm,mk->k", weighted, prior, weighted))
         weighted = weighted / size
         vector = weighted.T @ (given.values - camera.values)[rows]
@@ -64,13 +65,13 @@ class _Fall:
         return cls(fall / unit, axes.shape[1], -axes @ (axes.T @ vector) / size, sd / size)
 
     def is_sure(self, whole: _Fall, level: float) -> bool:
-        """Whether it is none of chance, and nearly all that anything of the camera would explain."""
+        """Whether it is significant, and nearly the decrease if the whole camera were free."""
         chance = _photocore.chi_square(self.value, float(self.freedom)) if self.freedom else 1.0
         return chance < level and self.value > EXPLAINED * whole.value
 
 
 def lens_hints(result: Result) -> list[Message]:
-    """Name cameras of films with a given lens that images contradict in a known way."""
+    """Return hints on film cameras whose given lens is contradicted in a known way."""
     of_photos = result.block.photo_cameras
     if of_photos is None or result.loss is not None:
         return []
@@ -99,14 +100,13 @@ def _contradiction(result: Result, camera: AdjustedCamera, level: float) -> Phra
 
 
 def _of_sign(camera: AdjustedCamera, times: float, sd: float) -> Phrase | None:
-    """Return the hint if images show the radial distortion with the opposite sign."""
     if abs(times + 1.0) > max(NEAR, WITHIN * sd):
         return None
     return phrase("film-lens.sign", camera=camera.name, times=times, sd=sd)
 
 
 def _of_point(camera: AdjustedCamera, given: Floats, fall: _Fall) -> Phrase:
-    """Return the principal point of images, and the probable mistake in the given one."""
+    """Return the observed principal point, and the probable mistake in the given one."""
     found = given + fall.moved
     size = float(np.hypot(*given))
     opposite = (np.abs(found + given) < WITHIN * fall.sd).all() and size > WITHIN * float(fall.sd.max())

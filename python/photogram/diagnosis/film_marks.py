@@ -1,14 +1,13 @@
-"""Fiducial marks that do not fit: of all photos, of one photo, or one reading; what to look at first.
+"""Fiducial marks that do not fit: of all photos, of one photo, or one reading; and the probable cause.
 
-Films that have changed along one axis and are taken for conformal: marks of a photo lie apart alike.
-
-With d the readings of a photo's marks, brought back to the frame of the camera, less their places in the
-certificate, and the covariance of both, d is fitted by a shift, a rotation and a change of size, and then by
+Films that have changed along one axis but are modelled as conformal leave a pattern at the marks. Let d be
+the mark readings of a photo, transformed to the camera frame, minus their certificate positions, with the
+covariance of both. d is fitted by a shift, a rotation and a scale, and then also by
 
     d = (b1 x + b2 y, b2 x - b1 y)
 
-besides: along the axis at atan2(b2, b1)/2 the film is longer by h = sqrt(b1^2 + b2^2), and shorter across.
-What that takes of the weighted sum of squares is chi-square (2) where there is nothing of the kind.
+Along the axis at atan2(b2, b1)/2 the film is longer by h = sqrt(b1^2 + b2^2), and shorter across. The
+decrease of the weighted sum of squares is chi-square (2) if there is no such change.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ def mark_hints(result: Result) -> list[Message]:
     """Return the probable mistake in fiducial marks.
 
     If a mark fails on all photos, its certificate is wrong. If all marks of a photo fail, their names, the
-    side of the film or the camera are wrong. A single reading may refer to the wrong place. The largest test
+    side of the film or the camera are wrong. A single reading may refer to a wrong location. The largest test
     value decides.
     """
     readings, marks = list(_readings(result)), list(_marks(result))
@@ -84,7 +83,7 @@ def mark_hints(result: Result) -> list[Message]:
 
 
 def _photos(readings: list[_Tested], limit: float) -> list[str]:
-    """Return the photos of whose marks more than half fail, three at least, and that are worst in all."""
+    """Return the worst photos on which at least three marks, and more than half, fail."""
     found: dict[str, list[float]] = {}
     for each in readings:
         found.setdefault(each.photo, []).append(each.value)
@@ -115,20 +114,19 @@ def _marks(result: Result) -> Iterator[_Tested]:
 
 
 def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the number of each observation of a kind, and how large its test values are."""
     if kind is not None:
         yield from zip(kind.rows.tolist(), np.abs(np.nan_to_num(kind.standardized)), strict=True)
 
 
-FEWEST = 4  # Marks of a photo: three are alike along any axis
-CHANCE = 1e-3  # Of a hint where nothing is wrong
+FEWEST = 4  # Marks of a photo: three fit any axis
+CHANCE = 1e-3  # Probability of a hint in correct data
 EXPLAINED = 0.7  # Least explained part of the weighted sum of squares of a photo
-ALONE = 1e-6  # Part of the largest column that the others must leave of one
+ALONE = 1e-6  # Least part of the largest column that is independent of the others
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """How much longer the film of a photo is along an axis than across, and the axis: degrees from x."""
+    """Relative elongation of the film of a photo along an axis, and the angle of the axis from x, degrees."""
 
     photo: str
     longer: float
@@ -137,7 +135,7 @@ class _Axis:
 
 
 def axis_hints(result: Result) -> list[Message]:
-    """Name photos whose marks say that their films have changed along one axis, and whose model cannot."""
+    """Report photos whose marks show a change of the film along one axis that their model lacks."""
     held = {
         row: film
         for row, film in result.films
@@ -160,7 +158,7 @@ def axis_hints(result: Result) -> list[Message]:
 
 
 def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
-    """Yield what the marks of photos say, where it is beyond chance and most of what they say."""
+    """Yield photos with a significant elongation that explains most of the misfit of their marks."""
     if not films:
         return
     residuals, marks = mark_residuals(result), result.fiducials
@@ -192,7 +190,7 @@ def _sd_of(read: object) -> Floats:
 
 
 def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
-    """Return (2 n, 2 n) the covariance of what is known of marks; 0 of marks that are errorless."""
+    """Return the (2 n, 2 n) prior covariance of marks; 0 for errorless marks."""
     first = {id(mark): 2 * k for k, mark in enumerate(marks)}
     found = np.zeros((2 * len(marks),) * 2)
     for each in known:
@@ -210,9 +208,9 @@ def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
 
 
 def _fitted(places: Floats, away: Floats, covariance: Floats) -> tuple[float, float, Floats]:
-    """Return the weighted sum of squares of a conformal fit, what b1 and b2 take of it, and these.
+    """Return the sum of squares of a conformal fit, its decrease by b1 and b2, and these.
 
-    Marks in one line tell nothing of them: both are 0 then.
+    Marks in one line cannot determine b1 and b2, which are then 0.
     """
     x, y = places.T
     one, none = np.ones_like(x), np.zeros_like(x)

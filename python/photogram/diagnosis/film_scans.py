@@ -1,16 +1,15 @@
-"""Scans that were joined of two parts: readings of one half are shifted against those of the other.
+"""Scans that were joined of two parts, and jitter of scan lines.
 
-Jitter of the lines of a scanner: residuals of images in nearly the same line are alike.
-
-With v the residuals of a photo's images in standard deviations, what is smooth over the scan taken out, r
-their redundancy numbers, and sums over all pairs of images that lie within some distance across the lines
-(n), or beyond it within four times as much (f: what is smooth is alike there, too),
+Readings of one half of a joined scan are shifted against the other half. With jitter, the residuals in nearly
+the same scan line are correlated. Let v be the residuals of a photo in standard deviations, reduced by a
+smooth function over the scan, and r their redundancy numbers. Sums are over all pairs within some distance
+across the lines (n), or between it and four times that distance (f, where smooth effects are still similar):
 
     S = sum_n v_i v_j - q sum_f v_i v_j,    q = sum_n r_i r_j / sum_f r_i r_j
     z = S / sqrt(sum_n v_i^2 v_j^2 + q^2 sum_f v_i^2 v_j^2),    s^2 = S / sum_n r_i r_j
 
-z is normal where errors do not know each other, and s is what lines have in common: of two images in one line
-both have it, and v = R e, R about r on its diagonal.
+z is normal if errors are independent. s is the common error of a line: two observations in one line share it,
+and v = R e with about r on the diagonal of R.
 """
 
 from __future__ import annotations
@@ -26,22 +25,23 @@ from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
-FEWEST_OF_HALVES = 12  # Images of a photo
-EXPLAINED = 0.4  # Of the sum of squares of a photo's residuals that a shift of one half explains at least
-BEYOND = 2.0  # Standard deviations of a reading by which halves are shifted at least
+FEWEST_OF_HALVES = 12  # Observations of a photo
+EXPLAINED = 0.4  # Least part of a photo's sum of squares that a shift of one half explains
+BEYOND = 2.0  # Least shift between halves, in standard deviations of a reading
 
 
 def seam_hints(result: Result) -> list[Message]:
-    """Name the photo whose residuals have the largest step amid the scan, beside what is affine.
+    """Report the photo whose residuals have the largest step in the middle of the scan.
 
-    Marks say little of it: a film of its own takes theirs up. Photos that overlap it show a part of it.
+    An affine deformation is estimated together with the step. Marks hardly show the step, because the film
+    parameters absorb it. Overlapping photos show a part of it.
     """
     block, forms, found = result.block, result.film_forms, []
     used = np.isfinite(result.residuals).all(axis=1)
     for row, film in result.films:
         own = np.flatnonzero((block.image_photos == row) & used)
         if len(own) >= FEWEST_OF_HALVES:
-            # Both parts meet where the middle of the photo is read.
+            # The two parts join at the middle of the photo.
             given = block.image_xy[own] - forms[block.photo_ids[row]].matrix[:, 0], result.residuals[own]
             found += [
                 (*_step(*given, block.image_sd[own], axis), axis, row, film.readings.pitch) for axis in (0, 1)
@@ -55,9 +55,9 @@ def seam_hints(result: Result) -> list[Message]:
 
 
 def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float, float]:
-    """Return the test value of a step amid an axis, and the step: of x or y, the larger; 0 without.
+    """Return the test value of a step along an axis, and the larger step of x or y; 0 if not significant.
 
-    `away`: (n, 2) readings from the middle of the photo.
+    `away` are (n, 2) readings relative to the middle of the photo.
     """
     design = np.column_stack([np.ones(len(away)), away / np.abs(away).max(), np.sign(away[:, axis]) / 2])
     best = 0.0, 0.0
@@ -73,18 +73,18 @@ def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float
     return best
 
 
-FEWEST = 20  # Images of a photo
-WINDOWS = tuple(0.001 * 2.0**k for k in range(7))  # How far apart lines are, in parts of the scan
-FAR = 2  # So many of these on are those that are far
-CHANCE = 1e-3  # Of a hint where nothing is wrong
+FEWEST = 20  # Observations of a photo
+WINDOWS = tuple(0.001 * 2.0**k for k in range(7))  # Distances between lines, as parts of the scan
+FAR = 2  # Number of windows between near and far distances
+CHANCE = 1e-3  # Probability of a hint in correct data
 OTHERWISE = 2.0  # Least ratio of z along lines to z across lines
-WORTH = 0.5  # Standard deviations of a reading that lines have in common at least
+WORTH = 0.5  # Least common error of a line, in standard deviations of a reading
 TINY = 1e-9
 
 
 @dataclass(frozen=True)
 class _Found:
-    """Lines of a scanner: rows (1) or columns (0), of x or y; z, s in pixels, and pixels between them."""
+    """Jitter along rows (1) or columns (0), of x or y: z, s in pixels, and the distance in pixels."""
 
     z: float
     jitter: float
@@ -122,12 +122,12 @@ def _jitter_message(result: Result, scanner: str, rows: list[int], found: _Found
 
 
 def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
-    """Yield what lines have in common, where it is more than what those across have."""
+    """Yield the jitter of lines if it exceeds the correlation across the lines."""
     images = _of_photos(result, rows)
     if images is None:
         return
     extent = float(np.ptp(images.xy, axis=0).max())
-    # Photos lie apart: no distance reaches from one to another.
+    # Offsets separate the photos: no distance reaches from one to another.
     at = images.xy + 2.0 * extent * images.photos[:, np.newaxis]
     for axis in (0, 1):
         own = images.values[:, axis], images.redundancy[:, axis]
@@ -139,7 +139,7 @@ def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
         total = near[..., 0] - ratio * far[..., 0]
         z = total / np.sqrt(np.maximum(near[..., 1] + ratio**2 * far[..., 1], TINY))
         for lines in (0, 1):
-            # The narrower the distance, the less is in it that lines have not in common.
+            # A smaller distance contains fewer pairs of different lines.
             k = int((z[lines] >= z[lines].max() / 2).argmax())
             jitter = float(np.sqrt(max(total[lines, k], 0.0) / max(near[lines, k, 2], TINY)))
             if z[lines].max() > OTHERWISE * z[1 - lines].max() and jitter > WORTH:
@@ -148,17 +148,17 @@ def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
 
 @dataclass(frozen=True, eq=False)
 class _Images:
-    """Images of a scanner, photo by photo."""
+    """Observations of a scanner, photo by photo."""
 
-    photos: Indices  # (m,) and (m, 2): their photos and readings
+    photos: Indices  # (m,) photos and (m, 2) readings
     xy: Floats
-    values: Floats  # (m, 2) residuals in standard deviations, free of what is smooth, and redundancy numbers
+    values: Floats  # (m, 2) residuals in sd, reduced by a smooth function, and redundancy numbers
     redundancy: Floats
-    sd: float  # The median standard deviation of a reading
+    sd: float  # Median standard deviation of a reading
 
 
 def _of_photos(result: Result, rows: list[int]) -> _Images | None:
-    """Return the images of those photos that have enough; None without."""
+    """Return the observations of the photos that have enough; None without."""
     block, residuals = result.block, result.residuals
     photos, redundancy = block.image_photos, result.redundancy
     used = np.isfinite(residuals).all(axis=1) & np.isfinite(redundancy).all(axis=1) & np.isin(photos, rows)
@@ -177,7 +177,7 @@ def _of_photos(result: Result, rows: list[int]) -> _Images | None:
 
 
 def _pairs(at: Floats, values: Floats, redundancy: Floats, within: float) -> Floats:
-    """Return (3,) sums over pairs within a distance: of v_i v_j, of their squares, of r_i r_j."""
+    """Return (3,) sums over pairs within a distance: v_i v_j, their squares, and r_i r_j."""
     order = np.argsort(at)
     at = at[order]
     first, last = np.searchsorted(at, at - within), np.searchsorted(at, at + within, "right")

@@ -34,12 +34,12 @@ Level = Literal["grave", "look"]
 
 
 def small_unit(unit: str) -> tuple[str, float]:
-    """Return the unit of printed image errors, and its number in the unit of images."""
+    """Return the unit of printed image residuals, and its factor."""
     return ("um", 1000.0) if unit == "mm" else (unit, 1.0)
 
 
 class Words:
-    """Words for any block; a program with words of its own has a subclass."""
+    """Wording for any block; a program with its own terms has a subclass."""
 
     sense: str = "`photo_to_ground`"  # Specifies the sense of the angles
     order: str = "the photos"  # Specifies the order of the photos
@@ -48,12 +48,12 @@ class Words:
     iterations: bool = False  # Whether each iteration is a key number, as in Appendix H of the guide
 
     def remedy(self, kept: Bools) -> Phrase:
-        """Return the change of a control point, (3,) components of which remain control."""
+        """Return the change of a control point; (3,) components `kept` stay control."""
         axes = [name for name, held in zip(("first", "second", "third"), kept.tolist(), strict=True) if held]
         return phrase("check.remedy.components", n=len(axes), axes=axes)
 
     def values(self, kept: Bools) -> dict[str, float]:
-        """Return further figures of such a finding."""
+        """Return additional values of such a finding."""
         del kept
         return {}
 
@@ -70,22 +70,22 @@ class Explained:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found.
+    """One finding of a check.
 
     Attributes
     ----------
     kind
-        What it is, in a word or two with hyphens: `gross-error`, `control-misfit`.
+        Type of the finding, hyphenated: `gross-error`, `control-misfit`.
     level
         `grave` makes results wrong or impossible; `look` deserves a look.
     text
-        The finding in a sentence, with what to do.
+        The finding and its remedy, as a sentence.
     photos, points
         Identifiers of the photos and points concerned.
     values
-        Its figures, the unit in the name.
+        Numeric values; the names contain the units.
     phrase
-        The sentence as a code with fields; None if it has none.
+        The sentence as a code with fields; None without code.
     """
 
     kind: str
@@ -111,7 +111,7 @@ class Section:
         self.parts.append(Text(f"{sentence[:1].upper()}{sentence[1:].removesuffix('.')}."))
 
     def figure(self, name: str, value: object) -> None:
-        """Add a figure with its unit."""
+        """Add a named value with its unit."""
         fact = Fact(f"{name[:1].upper()}{name[1:]}", str(value))
         if self.parts and isinstance(self.parts[-1], Facts):
             self.parts[-1] = Facts("", [*self.parts[-1].facts, fact])
@@ -166,7 +166,7 @@ def likely(causes: Sequence[Phrase], effect: Phrase) -> Phrase:
 
 
 def note_verdict(section: Section, verdict: Verdict) -> None:
-    """Put the verdict on top of a section that has no grave finding."""
+    """Insert the verdict at the top of a section without grave findings."""
     if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
         level: Level = "grave" if verdict.exit else "look"
         section.findings.insert(0, Finding(verdict.code, level, verdict.headline))

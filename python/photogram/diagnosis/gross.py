@@ -1,6 +1,6 @@
-"""Gross errors seen from the initial stations: frames, images, exchanged names, control (Appendix H).
+"""Gross errors seen from the initial stations: photos, observations, exchanged names, control (Appendix H).
 
-Coarse stations leave large residuals with a pattern; what counts is a break in the pattern.
+Coarse stations leave large residuals with a pattern; a break in the pattern indicates an error.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from photogram.network.rays import Rays, meet
 from photogram.results.result import Result
 from photogram.words import phrase
 
-BAD_PHOTO = 4.0  # A photo is bad when its median residual is so many times that of the median photo,
+BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,
 BAD_PHOTO_SD = 4.3
-"""... and stands out among all photos by so many robust standard deviations (of the logarithm)."""
-BREAK = 10.0  # A break in the pattern: so many robust standard deviations from what its photo suggests
-FLAGRANT = 24.0  # A break so large that it is grave though no single image explains it
-CHANCE = 2.0  # A break so many times the least one is grave with three rays too
+"""... and exceeds all photos by this number of robust standard deviations (of the logarithm)."""
+BREAK = 10.0  # Robust standard deviations from the pattern of the photo that are a break
+FLAGRANT = 24.0  # A break that is grave even if no single observation explains it
+CHANCE = 2.0  # A break this many times the least one is grave with three rays as well
 EXPLAINED = 0.35  # Largest part of the residuals that remains after an explanation
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
-"""Control differences that stand out by so many robust standard deviations."""
+"""Control differences in robust standard deviations that are reported."""
 FEWEST_CONTROL = 4  # Control points that a comparison needs
 FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
-"""So many gross errors, and such a part of its images, condemn a photo as a whole."""
-CANDIDATES = 5  # Photos with the largest residuals that are left out on trial
+"""Number of gross errors, and part of its observations, above which a photo is rejected as a whole."""
+CANDIDATES = 5  # Number of photos with the largest residuals that are omitted by trial
 IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
-"""Findings on images, which the adjusted stations may disprove."""
+"""Findings on observations that the adjusted stations may disprove."""
 PARTED, FEWEST_OF_TWO = 0.1, 2
-"""One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
-AS_WELL = 3.0  # And so many times less than leaving out one ray leaves
+"""Largest part of the residuals, and least rays per group, if one name belongs to two points."""
+AS_WELL = 3.0  # Least ratio to the remaining residual without one ray
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 
 
 @dataclass(frozen=True, eq=False)
 class Suspects:
-    """Observations that the adjustment may have to leave out."""
+    """Observations that the adjustment may have to exclude."""
 
     images: Bools  # (m,) gross errors
     photos: Bools  # (P,) bad photos
@@ -50,9 +50,9 @@ class Suspects:
 
 
 def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
-    """Look for bad photos, gross errors of images and exchanged names, and control that is far off.
+    """Find bad photos, gross errors of observations, exchanged names, and distant control.
 
-    `unit` is what image coordinates are called.
+    `unit` is the printed unit of image coordinates.
     """
     section = Section(
         "Gross errors (intersection from the initial stations)",
@@ -61,7 +61,7 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
     rays, photos = _bad_photos(Rays.of(block, unit=unit), section)
     findings, images = _broken(rays)
     while (photo := _overrun(rays, findings)) is not None:
-        # One mistake, not one for each of its points.
+        # One mistake is reported, not one per point.
         photos[photo] = True
         name, count = block.photo_ids[photo], int((rays.used & (block.image_photos == photo)).sum())
         message = phrase("check.bad-photo.points", photo=name, n=count)
@@ -74,10 +74,10 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
 
 
 def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
-    """Return (m,) suspected images of :func:`gross` that fit the pattern from the adjusted stations.
+    """Return (m,) suspected observations of :func:`gross` that fit from the adjusted stations.
 
-    A wrong station spoils the intersections of its neighbours, so that good images seem wrong. `adjusted` is
-    a converged adjustment without the suspected images; photos that it lacks have no image in the return.
+    A wrong station affects the intersections of its neighbours, so that good observations seem wrong.
+    `adjusted` is a converged adjustment without the suspects. Photos missing in it are not in the return.
     """
     number = {name: index for index, name in enumerate(adjusted.block.photo_ids)}
     index = np.array([number.get(name, -1) for name in block.photo_ids])
@@ -92,7 +92,7 @@ def disproved(block: Block, suspects: Suspects, adjusted: Result) -> Bools:
 
 
 def without(block: Block, findings: list[Finding], images: Bools) -> list[Finding]:
-    """Return the findings of :func:`gross` without those that rest on nothing but the given images."""
+    """Return the findings of :func:`gross` that do not depend on the given observations alone."""
 
     def stands(finding: Finding) -> bool:
         photos = np.isin(np.array(block.photo_ids)[block.image_photos], finding.photos)
@@ -103,7 +103,7 @@ def without(block: Block, findings: list[Finding], images: Bools) -> list[Findin
 
 
 def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
-    """Return the photo with so many gross errors that it is wrong as a whole, if there is one."""
+    """Return the photo with too many gross errors, if any."""
     block = rays.block
     number = {name: index for index, name in enumerate(block.photo_ids)}
     shares = np.zeros(len(number))
@@ -116,7 +116,7 @@ def _overrun(rays: Rays, findings: list[Finding]) -> int | None:
 
 
 def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
-    """Leave out the photo without which the others fit best, as long as it stands out from them."""
+    """Exclude the photo without which the others fit best, until none is conspicuous."""
     block = rays.block
     bad = np.zeros(len(block.photo_ids), dtype=bool)
     for step in range(MOST_PHOTOS + 1):
@@ -140,10 +140,10 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
 
 
 def _worst(rays: Rays, medians: Floats, known: Indices) -> tuple[int, float, Rays] | None:
-    """Return the photo that stands out, the median of the others without it, and the rays without it.
+    """Return the conspicuous photo, the median of the others without it, and the rays without it.
 
-    A bad photo spoils the medians of its neighbours, in a small block those of all. So it is compared with
-    what the others are without it.
+    A bad photo affects the medians of its neighbours, in a small block of all photos. So the photo is
+    compared with the others after its removal.
     """
     block = rays.block
     doubtful = known[medians[known] > BAD_PHOTO * np.quantile(medians[known], 0.25)]
@@ -175,7 +175,7 @@ def _medians(block: Block, sizes: Floats, used: Bools) -> Floats:
 
 
 def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
-    """Find images that break the pattern of their photo, and say what explains each."""
+    """Find observations that break the pattern of their photo, and explain each."""
     block = rays.block
     departure = _departures(rays, rays.intersect().residuals)
     points = np.unique(block.image_points[departure > BREAK])
@@ -195,7 +195,7 @@ def _broken(rays: Rays) -> tuple[list[Finding], Bools]:
 
 
 def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> tuple[Finding, Indices]:
-    """Say which image of a point is wrong, if leaving out one explains it; with the doubtful images."""
+    """Find the wrong observation of a point; return the finding and the doubtful rows."""
     block = solver.rays.block
     before = solver.largest(rows, solver.changed(point, [], []))
     left = [solver.without(point, rows, row) for row in rows.tolist()] if len(rows) > 2 else []
@@ -213,7 +213,7 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
     if left and min(left) < EXPLAINED * before:
         place = int(np.argmin(left))
         message = phrase("check.gross-error.one", **fields, photo=photos[place], after=min(left))
-        # Any two of three rays may meet by chance: a small break is no proof against the third.
+        # Any two of three rays may meet by chance: a small break does not prove an error of the third.
         proof: Level = "grave" if len(rows) > 3 or departure > CHANCE * BREAK else "look"
         return finding(proof, message, [photos[place]], [name], values=values), rows[[place]]
     message = phrase("check.gross-error.some", **fields, photos=photos)
@@ -224,12 +224,12 @@ def _explained(solver: _Solver, point: int, rows: Indices, departure: float) -> 
 def _parted(
     solver: _Solver, point: int, rows: Indices, before: float
 ) -> tuple[Indices, Indices, float] | None:
-    """Return the images of a point in two groups that meet well by themselves, and how far they miss then."""
+    """Return two groups of a point's observations that intersect well separately, and their residual."""
     best, found = PARTED * before, None
     for pair in combinations(rows.tolist(), 2):
         position = solver.changed(point, rows[~np.isin(rows, pair)].tolist(), [])
         residuals, in_front = solver.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
-        # Rays of two points may meet anywhere, even behind the cameras, and then miss by any number.
+        # Rays of two points may meet anywhere, even behind the cameras, with any residual.
         sizes = np.linalg.norm(residuals, axis=1)
         near = in_front & (sizes < PARTED * min(before, float(np.nan_to_num(sizes, nan=0.0).max())))
         one, other = rows[near], rows[~near]
@@ -269,7 +269,6 @@ def _departures(rays: Rays, residuals: Floats) -> Floats:
 
 
 def _rows_of(rays: Rays, points: Indices) -> dict[int, Indices]:
-    """Return the used images of some points."""
     block = rays.block
     rows = np.flatnonzero(rays.used & np.isin(block.image_points, points))
     rows = rows[np.argsort(block.image_points[rows], kind="stable")]
@@ -281,7 +280,7 @@ def _rows_of(rays: Rays, points: Indices) -> dict[int, Indices]:
 
 
 class _Solver:
-    """Intersections with a ray left out, or exchanged for another."""
+    """Intersections with a ray omitted or replaced."""
 
     def __init__(self, rays: Rays) -> None:
         self.rays = rays
@@ -289,7 +288,7 @@ class _Solver:
         self.normal, self.constant, self.count = rays.totals()
 
     def largest(self, rows: Indices, position: Floats) -> float:
-        """Return the largest residual of some images for one position, millimetres."""
+        """Return the largest residual of some observations for one position, millimetres."""
         residuals, _ = self.rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
         return float(np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf).max())
 
@@ -302,19 +301,19 @@ class _Solver:
         return position
 
     def without(self, point: int, rows: Indices, row: int) -> float:
-        """Return the largest residual of a point's other images when one is left out."""
+        """Return the largest residual of a point's other observations without one of them."""
         return self.largest(rows[rows != row], self.changed(point, [row], []))
 
     def exchanged(self, point: int, rows: Indices, own: int, other: int) -> float:
-        """Return the largest residual of a point that takes another image in the place of its own."""
+        """Return the largest residual of a point that uses another observation instead of its own."""
         taken = np.where(rows == own, other, rows)
         return self.largest(taken, self.changed(point, [own], [other]))
 
 
 def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Finding], dict[int, list[int]]]:
-    """Find pairs of points whose names are exchanged on a photo; with the findings the photos of each point.
+    """Find pairs of points with exchanged names on a photo; return findings and photos of each point.
 
-    A name stands in one pair of a photo only, that which explains it best.
+    A name occurs in only one pair per photo, the pair that explains it best.
     """
     block = solver.rays.block
     on_photo: dict[int, list[int]] = {}
@@ -347,9 +346,9 @@ def _exchanged(solver: _Solver, rows_of: dict[int, Indices]) -> tuple[list[Findi
 
 
 def _control(rays: Rays, section: Section) -> Bools:
-    """Compare held control with the intersected positions; what stands out from the others is named.
+    """Compare control with intersected positions and report conspicuous differences.
 
-    Returns (n,) the points that are gravely off.
+    Returns (n,) the points with grave differences.
     """
     block = rays.block
     held = np.isfinite(block.point_sd)
@@ -369,7 +368,7 @@ def _control(rays: Rays, section: Section) -> Bools:
 def _control_component(
     block: Block, control: Indices, differences: Floats, name: str, section: Section
 ) -> None:
-    """Name the control points whose difference in one component stands out from the others."""
+    """Report the control points whose difference in one component is conspicuous."""
     known = np.flatnonzero(np.isfinite(differences))
     if not known.size:
         return
@@ -381,7 +380,7 @@ def _control_component(
     )
     if len(known) < FEWEST_CONTROL or spread == 0:
         return
-    # The spread of few points is itself uncertain.
+    # The spread of few points is uncertain.
     sizes = np.abs(differences[known] - middle) / spread / (1 + FEWEST_CONTROL / len(known))
     for row, size in zip(known.tolist(), sizes.tolist(), strict=True):
         if size > CONTROL_LOOK:

@@ -1,4 +1,4 @@
-"""What may be wrong with given data, each as what makes of a block the one that would have been meant."""
+"""Hypotheses on mistakes in the data; each can convert a block to the intended one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from photogram.words import Phrase, phrase
 FOOT = 0.3048  # Metres; the survey foot differs by two millionths
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 _HALF_TURN = np.pi / 2
-_BEYOND = 1e4  # Radians: no angle that was meant is larger after it was turned into degrees once more
+_BEYOND = 1e4  # Radians: no intended angle is larger after a second conversion to degrees
 
 TURNS: dict[str, list[list[float]]] = {
     "y down": [[1, 0], [0, -1]],
@@ -28,31 +28,31 @@ TURNS: dict[str, list[list[float]]] = {
     "kappa + 90": [[0, -1], [1, 0]],
     "kappa - 90": [[0, 1], [-1, 0]],
 }
-"""V, observed = V predicted, by the name of the mistake."""
+"""V, with observed = V predicted, by the name of the mistake."""
 
-PIXELS = 8.0  # Images so many times too large, or more, are in another unit; less is a principal distance
+PIXELS = 8.0  # Scale of image coordinates that indicates another unit; a smaller one, a principal distance
 _SCALED, _SHIFTED = 0.15, 0.25
-"""A scale further from 1, a shift of a larger part of half of the format are no matter of rough poses."""
+"""Deviations of the scale from 1, and of the shift (in half formats), that rough poses cannot cause."""
 _ALIKE = 0.05
-"""Scatter of the scale over photos, relative, and of the shift, in halves of the format, at the most."""
-_CORNER = 0.5  # The middle of all images is further from the origin than this part of half of their extent
+"""Largest scatter over photos: of the scale (relative), and of the shift (in half formats)."""
+_CORNER = 0.5  # Least distance of the centre of all observations from the origin, in half extents
 _WIDEST, _FINEST = 4.0, 10.0
-"""Half of the extent of images, in principal distances, beyond which they are wider than a camera's, and what
-its inverse may be at the most,"""
-_SCALES = 60  # with so many steps in between
-_EXPLAINED = 0.2  # e, what a regression leaves, at the most
+"""Largest half extent of image coordinates of a camera, in principal distances, and largest value of
+its inverse,"""
+_SCALES = 60  # number of steps in between
+_EXPLAINED = 0.2  # e, largest remainder of a regression
 
 
-Change = Callable[[Block], Block]  # Makes of a block as given the one that was meant
+Change = Callable[[Block], Block]  # Converts a given block to the intended one
 
 
 def turn_of(name: str) -> Floats:
-    """(2, 2) V of one of the turns."""
+    """(2, 2) matrix V of a reflection or rotation."""
     return np.array(TURNS[name], dtype=np.float64)
 
 
 def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
-    """Return a block with the images of (P,) some photos turned back: V' observed."""
+    """Return a block with V applied to the observations of (P,) photos: V' observed."""
     own = photos[block.image_photos][:, np.newaxis]
     return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
 
@@ -68,7 +68,7 @@ class Hypothesis:
 
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
-    """Propose mistakes for a block; `seen` compares its images with their predictions."""
+    """Yield possible mistakes of a block; `seen` compares its observations with predictions."""
     every = np.ones(len(block.photo_ids), dtype=bool)
     for name in TURNS:
         change = partial(images_turned, photos=every, turn=turn_of(name))
@@ -84,12 +84,12 @@ def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothe
 
 
 def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
-    """Return a block with images counted from another origin and in other axes."""
+    """Return a block with image coordinates relative to another origin and in other axes."""
     return block.replace(image_xy=(block.image_xy - shift) @ linear)
 
 
 def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
-    """Propose another unit, origin or sense of images, from what photos have in common; else None."""
+    """Return another unit, origin or sense of image coordinates that the photos share; None without."""
     half = np.ptp(block.image_xy, axis=0).max() / 2
     scale, shift = float(np.median(seen.scale)), np.median(seen.shift, axis=0)
     turn = np.round(np.median(seen.turn, axis=0))
@@ -124,7 +124,7 @@ def image_hypothesis(block: Block, seen: Regression) -> Hypothesis | None:
 
 
 def _of_format(block: Block) -> Iterator[Hypothesis]:
-    """Propose a corner for the origin, and pixels, from how far images reach: where few points are given."""
+    """Yield a corner as origin, and pixels as unit, derived from the extent of the observations."""
     lowest, highest = block.image_xy.min(axis=0), block.image_xy.max(axis=0)
     middle, half = (lowest + highest) / 2, float((highest - lowest).max() / 2)
     distance = float(block.camera_scales().max())
@@ -145,7 +145,7 @@ def _of_format(block: Block) -> Iterator[Hypothesis]:
 
 
 def attitude_readings(block: Block) -> dict[str, tuple[Phrase, Floats]]:
-    """(P, 3, 3) attitudes, photo to object, by other readings of the same numbers, with the mistakes."""
+    """Return (P, 3, 3) attitudes, photo to object, from other readings of the angles, with the mistakes."""
     angles = block.photo_attitudes
     ground: Representation = "omega_phi_kappa"
     photo: Representation = "omega_phi_kappa_photo_to_ground"
@@ -170,20 +170,20 @@ def attitude_readings(block: Block) -> dict[str, tuple[Phrase, Floats]]:
 
 
 def quaternion_readings(matrices: Floats) -> dict[str, tuple[Phrase, Floats]]:
-    """(P, 3, 3) attitudes by the numbers of their quaternions in other orders, with the mistakes."""
+    """Return (P, 3, 3) attitudes from quaternions in other orders, with the mistakes."""
     found = {}
     forms: tuple[Representation, ...] = ("quaternion", "quaternion_to_vision")
     for form in forms:
         known = Attitudes(matrices).values(form)
         for order, other, step in (("x, y, z, w", "w, x, y, z", -1), ("w, x, y, z", "x, y, z, w", 1)):
-            # The numbers as they were read, then as they were meant: both have length 1.
+            # The numbers as read, then as intended: both have length 1.
             message = phrase("mistake.quaternions", order=order, other=other)
             found[f"{form} {order}"] = message, Attitudes.of(form, np.roll(known, -step, axis=1)).matrices
     return found
 
 
 def read_as(block: Block, name: str) -> Block:
-    """Return a block whose attitudes are read in another way; see :func:`attitude_readings`."""
+    """Return a block whose attitudes use another reading; see :func:`attitude_readings`."""
     _, matrices = attitude_readings(block)[name]
     form: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return block.replace(photo_attitudes=Attitudes(matrices).values(form))
@@ -227,7 +227,7 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
     known = bool(given_points(block).any())
     geographic = block.spheroid is not None
     for what in ("photos", "points") if known else ("photos",):
-        # Several at once, then single axes.
+        # Several axes at once, then single axes.
         for part, axes in (("heights", (2,)), ("positions", (0, 1, 2)), ("X", (0,)), ("Y", (1,))):
             if not geographic or axes == (2,):
                 factors: Floats = np.where(np.isin(np.arange(3), axes), FOOT, 1.0)
@@ -240,7 +240,7 @@ def _positions(block: Block) -> Iterator[Hypothesis]:
                 yield _exchange(f"longitude and latitude of {what}", points=what == "points")
         return
     yield _exchange("X and Y of photos", points=False)
-    # R = F A' in the axes of computer vision, A' in those of the photo
+    # R = F A' in the axes of computer vision, A' in the axes of the photo
     for axes_of_t, matrix in (
         ("x right, y down, z forward", _TO_VISION),
         ("x right, y up, z back", np.eye(3)),

@@ -1,4 +1,4 @@
-"""The numbers by which the adjustment of a check is judged (Appendix H), and what that did without."""
+"""Key numbers of the adjustment of a check (Appendix H), and the observations excluded from it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from photogram.results.result import Result
 from photogram.statistics.evidence import WITHHELD, Evidence
 from photogram.words import phrase
 
-VARIANCE = (0.5, 2.0)  # Variance of unit weight between which the weights count as realistic
+VARIANCE = (0.5, 2.0)  # Variance of unit weight of realistic standard deviations
 
 
 def key_numbers(edited: Edited, words: Words) -> Section:
-    """Return the numbers by which a run is judged."""
+    """Return the section of key numbers."""
     section = Section(
         "Key numbers",
         "The variance of unit weight approaches 1 when residuals and standard deviations agree.",
@@ -93,7 +93,7 @@ def _weights(result: Result, words: Words, section: Section) -> None:
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
-    """Name points that the adjustment has left out because they spoil the others, unless they are named."""
+    """Return findings on excluded points that affect the others, unless they are named elsewhere."""
     block = result.block
     found = []
     for point, reason in result.dropped.items():
@@ -107,7 +107,7 @@ def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:
 
 
 def held_values(result: Result) -> list[Finding]:
-    """Name the held station or point that explains more of the residuals than any observation."""
+    """Return the finding on the fixed station or point that best explains the residuals."""
     tests = [each for each in result.verdict.tests if each.statistic in "wtTF"]
     if not tests:
         return []
@@ -121,7 +121,7 @@ def held_values(result: Result) -> list[Finding]:
 
 
 def disagreeing(result: Result) -> list[Finding]:
-    """Name check points that disagree with the adjustment, as its verdict does, where nothing explains it."""
+    """Return the finding on check points that disagree with the adjustment, as in its verdict."""
     evidence = Evidence(result._findings())
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:

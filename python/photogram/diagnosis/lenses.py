@@ -1,4 +1,4 @@
-"""Lenses that are given wrongly: radial terms with the wrong sign or of another unit, half a pixel."""
+"""Wrong lens parameters: radial terms with a wrong sign or unit, a principal point half a pixel off."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
-PITCH = (1e-3, 3e-2)  # Sizes of a pixel that cameras have, millimetres
+PITCH = (1e-3, 3e-2)  # Range of pixel sizes of cameras, millimetres
 HALF, NEARLY = 0.5, 0.1  # Pixels
 
 
 def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
-    """Return a block with the radial terms that were meant, where those given do not fit.
+    """Return a block with corrected radial terms, if the given terms do not fit.
 
-    Tried are the other sign, and terms of image coordinates in another unit: divided by the principal
-    distance, or pixels whose size is told by K1 as the block has it from zero. One that explains the
-    residuals is added to the findings.
+    Hypotheses are the opposite sign, and terms for image coordinates in another unit: divided by the
+    principal distance, or pixels. The estimated K1 defines the pixel size. An accepted hypothesis is added to
+    the findings.
     """
     if not any(_given_terms(camera) for camera in block.cameras):
         return block
@@ -48,9 +48,9 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
 
 
 def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:
-    """Return a block whose lenses are unknown, as they come out, where that explains the residuals.
+    """Return a block with estimated lens parameters, if these explain the residuals.
 
-    Good observations look gross where the lens is wrong, those of the positions of photos and control first.
+    A wrong lens makes good observations look like gross errors, positions of photos and control first.
     """
     can_be = any(calibration_words(camera) for camera in block.cameras)
     first = adjusted.converged(block) if can_be else None
@@ -70,7 +70,7 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
 
 
 def _given_terms(camera: Camera) -> dict[str, int]:
-    """Return the radial terms of a camera that are given and not free, with their numbers."""
+    """Return the given, not free, radial terms of a camera, with their numbers."""
     sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     return {
         name: int(match[1])
@@ -80,7 +80,6 @@ def _given_terms(camera: Camera) -> dict[str, int]:
 
 
 def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[Phrase, Block]]:
-    """Yield possible mistakes in the radial terms of all cameras, and the block without them."""
     scales = [camera.scale for camera in block.cameras]
     yield phrase("mistake.lens.sign"), _scaled(block, [-1.0] * len(scales), 0)
     yield phrase("mistake.lens.divided"), _scaled(block, [1 / scale for scale in scales], 2)
@@ -95,7 +94,7 @@ def _hypotheses(block: Block, adjusted: Adjuster) -> Iterator[tuple[Phrase, Bloc
 
 
 def _scaled(block: Block, factors: list[float], power: int) -> Block:
-    """Return a block whose radial terms are multiplied by factor^(power number); by the factor when 0."""
+    """Multiply radial terms by factor^(power number), or by the factor if `power` is 0."""
     cameras = []
     for camera, factor in zip(block.cameras, factors, strict=True):
         changed = dict(camera.parameters)
@@ -106,7 +105,7 @@ def _scaled(block: Block, factors: list[float], power: int) -> Block:
 
 
 def _free_ratio(block: Block, adjusted: Adjuster) -> float:
-    """Return the first radial term as the block has it from zero, in that given; 0 where it is not known."""
+    """Return the ratio of the estimated and the given first radial term; 0 if not significant."""
     row = next(row for row, camera in enumerate(block.cameras) if _given_terms(camera))
     camera, terms = block.cameras[row], _given_terms(block.cameras[row])
     name = min(terms, key=lambda each: terms[each])
@@ -124,7 +123,7 @@ def _free_ratio(block: Block, adjusted: Adjuster) -> float:
 
 
 def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
-    """Look for principal points that are given half a pixel off: pixels counted from their middle or edge."""
+    """Find principal points that are half a pixel off, because pixel centres or edges were counted."""
     block = result.block
     if block.image_unit != "px":
         return []

@@ -1,9 +1,9 @@
-"""Names that are probably exchanged on a photo, of a block whose adjustment shows gross errors.
+"""Names that are probably exchanged on a photo, in a block with gross errors.
 
-Names of two points that are exchanged bend an adjustment by hundreds of standard deviations, if it converges
-at all: where photos have ended tells nothing then. So some photos around the worst images are oriented by
-their images alone, by consensus, which no minority moves; and there the names of what is set aside are
-exchanged on trial (:mod:`photogram.results.exchanged_names`).
+Exchanged names of two points distort an adjustment by hundreds of standard deviations, or prevent
+convergence. The adjusted poses are then useless. So some photos around the worst observations are oriented by
+image observations alone, with a consensus that a minority cannot affect. Then names of the rejected
+observations are exchanged by trial (:mod:`photogram.results.exchanged_names`).
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
 
-CENTRES = 3  # Photos around which names are looked at
-AROUND, SHARED = 24, 3  # Photos around one, at the most; they share so many points with it, at the least
+CENTRES = 3  # Number of photos whose neighbourhood is examined
+AROUND, SHARED = 24, 3  # Maximum number of neighbours of a photo, and minimum number of shared points
 MOST_IMAGES, EACH = 4000, 40
-"""Images of these photos up to which all take part; of more, those of so many points of each photo with the
-worst images, and of as many with the most images: to orient them by all takes longer than the adjustment."""
-MEDIAN_OF_LARGER = 1.05  # Of the larger of two absolute normal variables
+"""Maximum number of observations of these photos, and number of points per photo if there are more.
+
+Half of the points have the worst observations, the other half the most. Orientation with all observations
+would take longer than the adjustment."""
+MEDIAN_OF_LARGER = 1.05  # Median of the larger of two absolute normal variables
 
 
 def with_exchanges(result: Result) -> Result:
-    """Return a result, with probable exchanges of names where it shows gross errors and no other mistake."""
+    """Add probable exchanges of names to a result with gross errors and no other mistake."""
     block = result.block
     doubtful = result.loss is None and not result.hints and not block.mounts and not block.timed
     if not doubtful:
@@ -39,7 +41,7 @@ def with_exchanges(result: Result) -> Result:
     found: dict[tuple[str, str], Exchange] = {}
     sizes = _sizes(result)
     for each in (pair for own in _around_worst(result, sizes) for pair in _among(result.block, own, sizes)):
-        # Photos around one may leave open what those around another tell.
+        # The photos around one may not decide, and the photos around another may.
         known = found.setdefault(each.points, each)
         if len(each.photos) < len(known.photos):
             found[each.points] = each
@@ -47,7 +49,7 @@ def with_exchanges(result: Result) -> Result:
 
 
 def _around_worst(result: Result, sizes: Floats) -> list[Indices]:
-    """Return groups of photos around those that have two images, or more, with gross errors."""
+    """Return groups of photos around photos with at least two gross errors."""
     block = result.block
     bad = np.flatnonzero(sizes > 0)
     bad = bad[np.lexsort((-sizes[bad], block.image_photos[bad]))]
@@ -63,10 +65,10 @@ def _around_worst(result: Result, sizes: Floats) -> list[Indices]:
 
 
 def _sizes(result: Result) -> Floats:
-    """(m,) how large the errors of images are; zero for those that fit beside a common factor.
+    """(m,) sizes of the errors of observations; zero for observations that fit after a common scaling.
 
-    Residuals without redundancy numbers, which an adjustment that has not converged lacks, are less than test
-    values. Images of points that were left out because one of these must be wrong are the worst.
+    Without convergence there are no redundancy numbers, and scaled residuals are used, which are smaller than
+    test values. Observations of points that were excluded as harmful are the worst.
     """
     block, test = result.block, result.global_test
     harmful = [name for name, reason in result.dropped.items() if reason in HARMFUL]
@@ -86,7 +88,6 @@ def _sizes(result: Result) -> Floats:
 
 
 def _neighbours(block: Block, photo: int) -> Indices:
-    """Return a photo and those that share most points with it."""
     seen = np.zeros(len(block.point_ids), dtype=bool)
     seen[block.image_points[block.image_photos == photo]] = True
     shared = np.bincount(block.image_photos[seen[block.image_points]], minlength=len(block.photo_ids))
@@ -96,7 +97,7 @@ def _neighbours(block: Block, photo: int) -> Indices:
 
 
 def _among(block: Block, photos: Indices, sizes: Floats) -> list[Exchange]:
-    """Return exchanged names on some photos, which are oriented by their images alone."""
+    """Return exchanged names on some photos, which are oriented by image observations alone."""
     kept = np.zeros(len(block.photo_ids), dtype=bool)
     kept[photos] = True
     try:
@@ -109,7 +110,7 @@ def _among(block: Block, photos: Indices, sizes: Floats) -> list[Exchange]:
 
 
 def _chosen(block: Block, photos: Indices, sizes: Floats) -> Bools:
-    """(m,) the images of some photos by which these are oriented: all, or those of some points."""
+    """(m,) the observations that orient some photos: all, or the ones of some points."""
     own = np.isin(block.image_photos, photos)
     if np.count_nonzero(own) <= MOST_IMAGES:
         return own
@@ -125,7 +126,6 @@ def _chosen(block: Block, photos: Indices, sizes: Floats) -> Bools:
 
 
 def _images_alone(block: Block, kept: Bools) -> Block:
-    """Return some photos of a block with their images, and nothing else that is known of them."""
     own = kept[block.image_photos]
     rays = np.bincount(block.image_points[own], minlength=len(block.point_ids))
     points = np.flatnonzero(rays > 1)

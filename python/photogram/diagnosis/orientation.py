@@ -1,4 +1,4 @@
-"""Photos the wrong way round: the sign of the principal distance, kappa (Appendix H), or mirrored plates."""
+"""Photos with a wrong sign of the principal distance, wrong kappa (Appendix H), or mirrored plates."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from photogram.network.rays import Intersection, Rays, frame_radius, meet
 from photogram.words import Phrase, phrase
 
 SUSPICIOUS = 0.25  # Cost of a doubtful orientation (0: rays meet, 1: rays miss)
-BETTER = 0.5  # An explanation must lower the cost to this part of what it was
+BETTER = 0.5  # Largest ratio of the costs after and before an accepted explanation
 UPRIGHT = 0.8  # Least vertical component of the z axis of a near-vertical photo
-AS_GOOD = 1.5  # Another explanation is as good when its cost is below so many times the least
-MOST = 20  # Photos that are turned one by one, at most
+AS_GOOD = 1.5  # Another explanation is as good if its cost is below this multiple of the least
+MOST = 20  # Maximum number of photos that are corrected one by one
 TURNS = (180, 90, -90)  # Degrees of kappa
 MIRRORS = {name: turn_of(name) for name in ("mirrored", "y down", "exchanged", "exchanged and turned")}
-"""The four reflections that keep a frame in place, by their cause."""
+"""Reflections that map a frame onto itself, by cause."""
 
 
 def orientation(block: Block, words: Words, unit: str = "mm") -> tuple[Section, Block]:
-    """Test whether photos fit when the sign of their principal distance is changed, turned, or mirrored.
+    """Test whether photos fit with the opposite principal distance, rotated, or mirrored.
 
-    Returns the section, and the block with the explanations that hold, so that other errors show.
+    Returns the section, and the block with the accepted explanations, so that other errors become visible.
     """
     section = Section(
         "Sides of the cameras (intersection from the initial stations)",
@@ -80,7 +80,6 @@ def _mean(values: Floats) -> float:
 
 
 def _above(rays: Rays, met: Intersection) -> list[Finding]:
-    """Name control points computed above a camera that looks down."""
     block = rays.block
     given = np.isfinite(block.point_sd).any(axis=1).take(block.image_points)
     looks_down = (rays.cameras[:, 2, 2] > UPRIGHT).take(block.image_photos)
@@ -100,9 +99,10 @@ def _above(rays: Rays, met: Intersection) -> list[Finding]:
 def _unexplained(
     above: list[Finding], explanations: list[Finding], whole: Block, last: Block
 ) -> list[Finding]:
-    """Leave out the points above a camera that mirrored plates, or the kappa of a single photo, explain.
+    """Remove the points above a camera that mirrored plates, or the kappa of a single photo, explain.
 
-    A wrong sign or kappa of many photos explains nearly all; there the guide asks for the points too.
+    A wrong sign or kappa of many photos explains nearly all. The guide requires the points in this case as
+    well.
     """
     if last is whole and not any(finding.kind == "mirrored" for finding in explanations):
         return above
@@ -116,7 +116,7 @@ def _unexplained(
 
 
 def spare_explained(section: Section, block: Block, photos: Bools) -> None:
-    """Take out of a section what some bad photos explain: points above a camera, rays that do not meet."""
+    """Remove findings of a section that bad photos explain: points above a camera, rays that do not meet."""
     rays = Rays.of(block).without(photos[block.image_photos])
     met = rays.intersect()
     above = {name for finding in _above(rays, met) for name in finding.points}
@@ -132,9 +132,10 @@ def spare_explained(section: Section, block: Block, photos: Bools) -> None:
 
 
 def _doubt(rays: Rays, met: Intersection) -> tuple[float, float]:
-    """Return how badly the rays of a block meet, and how far its images are from given control: 0 to 1.
+    """Return the misfit of the rays of a block, and of its observations to control: 0 to 1.
 
-    Within a strip the rays meet even if all photos are mirrored across the flight; only control shows it.
+    Within a strip the rays intersect even if all photos are mirrored across the flight. Only control reveals
+    it.
     """
     block = rays.block
     given = np.isfinite(block.point_sd[:, 0] + block.point_sd[:, 1])
@@ -149,14 +150,14 @@ def _doubt(rays: Rays, met: Intersection) -> tuple[float, float]:
 
 
 def _costs(rays: Rays, met: Intersection) -> Floats:
-    """(m,) how badly each image fits: its residual as a part of half the frame, 1 behind the camera."""
+    """(m,) cost of each observation: its residual as a part of half the frame, 1 behind the camera."""
     radius = frame_radius(rays.block) / 2
     costs = np.minimum(met.sizes / radius, 1)
     return np.where(np.isfinite(met.sizes) & ~met.in_front, 1.0, costs)
 
 
 def _photo_costs(block: Block, costs: Floats) -> Floats:
-    """(P,) mean cost of the images of each photo; NaN without any."""
+    """(P,) mean cost of the observations of each photo; NaN without any."""
     known = np.isfinite(costs)
     photos, count = block.image_photos[known], len(block.photo_ids)
     sums = np.bincount(photos, weights=costs[known], minlength=count)
@@ -165,14 +166,13 @@ def _photo_costs(block: Block, costs: Floats) -> Floats:
 
 
 def _turned(block: Block, photos: Bools, turn: int) -> Block:
-    """Return a block with kappa of some photos increased by degrees."""
     attitudes = block.photo_attitudes.copy()
     attitudes[photos, 2] += math.radians(turn)
     return block.replace(photo_attitudes=attitudes)
 
 
 def _whole_block(block: Block, before: float, words: Words, explanations: list[Finding]) -> Block:
-    """Look for one explanation for all photos, or for all of one principal distance."""
+    """Find one explanation for all photos, or for all with the same principal distance."""
     trials = _trials(block, words)
     tried = [Rays.of(trial.block) for trial in trials]
     costs = [sum(_doubt(rays, rays.intersect())) for rays in tried]
@@ -191,8 +191,6 @@ def _whole_block(block: Block, before: float, words: Words, explanations: list[F
 
 @dataclass(frozen=True)
 class _Trial:
-    """One explanation for many photos."""
-
     message: Phrase
     photos: list[str]
     block: Block
@@ -203,7 +201,7 @@ class _Trial:
 
 
 def _trials(block: Block, words: Words) -> list[_Trial]:
-    """Explanations to try; of equally good ones the first counts, and the sign is the most probable."""
+    """Return the explanations to try; among equally good ones the first counts."""
     groups = {phrase("group.all-photos"): np.ones(len(block.photo_ids), dtype=bool)}
     of_photos = block.known_distances("checks")
     distances = np.unique(of_photos).tolist()
@@ -228,7 +226,7 @@ def _trials(block: Block, words: Words) -> list[_Trial]:
 
 
 def _one_photo(block: Block, explanations: list[Finding]) -> Block | None:
-    """Turn or mirror the one photo that most clearly wants it, if there is one."""
+    """Rotate or mirror the photo with the clearest improvement, if any."""
     rays = Rays.of(block)
     met = rays.intersect()
     before = _photo_costs(block, _costs(rays, met))
@@ -273,7 +271,7 @@ def _photo_trials(block: Block) -> list[_PhotoTrial]:
 
 
 def _alone(rays: Rays, images: Bools, changed: Rays) -> Floats:
-    """(P,) cost of each photo when it alone is changed, over the given images."""
+    """(P,) cost of each photo if it alone is changed, over the given observations."""
     own, own_right = rays.equations()
     new, new_right = changed.equations()
     normal, constant, count = rays.totals()

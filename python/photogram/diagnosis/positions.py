@@ -1,13 +1,13 @@
-"""Observed positions of photos as a whole: what is wrong with all of them has a form of its own.
+"""Observed positions of photos as a set: each systematic mistake has a typical form.
 
-    feet for metres, exchanged axes                             the coordinates that were meant
-    heights above the ellipsoid for those above the geoid       C + A l + (0, 0, N)
+    feet for metres, exchanged axes                             the intended coordinates
+    heights above the ellipsoid instead of the geoid            C + A l + (0, 0, N)
     another datum                                               C + A l + s
     a wrong lever arm                                           C + A (l + d)
     positions of another time                                   C + A l + tau dC/dt
 
-Each is tried: the block is adjusted with the coordinates that were meant, or with N, s, l or tau unknown, and
-judged by its likelihood ratio; a parameter more must gain ln f more.
+For each hypothesis, the block is adjusted with the intended coordinates, or with N, s, l or tau free. The
+likelihood ratio decides; an additional parameter must gain ln f more.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from photogram.results.result import Result
 from photogram.statistics.likelihood import RIVAL, TESTED, judged, likelihood
 from photogram.words import Phrase, phrase
 
-FEWEST = 5  # Observed positions that can be judged as a whole
+FEWEST = 5  # Smallest number of observed positions
 EQUAL = 0.15  # Relative difference within which a lever arm is the given one with other signs or axes
-WORST = 1e6  # What cannot be adjusted as it is leaves so many times what the worst hypothesis does
+WORST = 1e6  # Assumed ratio to the worst hypothesis of a block that cannot be adjusted
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,14 @@ class _Trial:
 
     @property
     def left(self) -> float:
-        """Omega; infinite where it cannot be adjusted."""
+        """Omega; infinite if the adjustment failed."""
         return math.inf if self.result is None else self.result.sums_of_squares.total
 
 
 def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
-    """Return what explains why the observed positions of a block do not fit, if something does.
+    """Return the mistake that explains the misfit of the observed positions, if any.
 
-    Positions with shifts or drifts that are unknown are left to these.
+    Positions with free shifts or drifts are skipped.
     """
     given = _positions(block)
     if len(given) < FEWEST:
@@ -71,7 +71,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
         return None
     part = by_kind.get("geoid")
     for whole in (by_kind.get("shift"), by_kind.get("lever arm")):
-        # A height is a part of these: they must be better by far.
+        # These include a height offset: they must be better by far.
         if whole and part and likelihood(part.left, whole.left, freedom) < RIVAL + 2 * math.log(freedom):
             found.remove(whole)
     left = [each.left for each in found]
@@ -86,7 +86,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
 
 
 def _positions(block: Block) -> list[Position]:
-    """Return observed positions, weighted ones of photos among them."""
+    """Return observed positions, including weighted positions of photos."""
     found = [each for each in block.observations if isinstance(each, Position)]
     if any(each.shift is not None or each.drift is not None for each in found):
         return []
@@ -103,7 +103,6 @@ def _positions(block: Block) -> list[Position]:
 
 
 def _with(block: Block, positions: Sequence[Position]) -> Block:
-    """Return a block with these observed positions in place of its own."""
     sd = block.photo_position_sd
     weighted = (np.isfinite(sd) & (sd > 0)).all(axis=1, keepdims=True)
     others = [each for each in block.observations if not isinstance(each, Position)]
@@ -128,7 +127,6 @@ def _changed(
 
 
 def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
-    """Try other units and axes."""
     hypotheses = [("feet in heights", [0, 1, 2], 2)]
     if block.spheroid is None:
         hypotheses += [("feet", [0, 1, 2], 0), ("X and Y exchanged", [1, 0, 2], 3)]
@@ -142,7 +140,7 @@ def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> lis
 
 
 def _unknown(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
-    """Try what is unknown and common to all: a height, a shift, a lever arm."""
+    """Try a common free height offset, shift or lever arm."""
     unit = block.linear_unit
     arms = np.array([_arm(each) for each in given])
     trials = []
@@ -180,7 +178,6 @@ def _arm(position: Position) -> Floats:
 
 
 def _code_of_arm(given: Floats, meant: Floats) -> str:
-    """Return the kind of mistake in a lever arm."""
     size = float(np.linalg.norm(given))
     if not size:
         return "arm.none"
@@ -191,11 +188,11 @@ def _code_of_arm(given: Floats, meant: Floats) -> str:
 
 
 def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Trial]:
-    """Try positions of another time: Omega is a parabola of it, whose least value three adjustments give."""
+    """Try positions of another time; three adjustments determine the minimum of the parabola Omega."""
     axes = local_axes(block)
     number = {name: row for row, name in enumerate(block.photo_ids)}
     centres = axes.positions(block.photo_positions)[[number[each.photos[0]] for each in given]]
-    # Initial positions are coarse; differences of observed ones are not, whatever all of them are off by.
+    # Initial positions are coarse; differences of observed positions are not, despite common errors.
     flown = axes.positions(np.array([each.observed[:3] for each in given]))
     times = np.array([each.time for each in given])
     velocities = np.full(centres.shape, np.nan)

@@ -1,7 +1,7 @@
-"""Control against what the rest of the block says of it: leave-out predictions.
+"""Leave-out predictions: control compared with the prediction from the other observations.
 
-A prediction is the adjusted position of a point none of whose components is held, so that neither its own
-error nor those of others left out with it are in it.
+A prediction is the adjusted position of a free point. It contains neither the error of the point nor errors
+of other free points.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.statistics.likelihood import are_exchanged, judged
 
-FEWEST = 3  # Control points that tell which two of them are exchanged
+FEWEST = 3  # Control points needed to identify an exchanged pair
 
 
 def freed(block: Block, points: Indices) -> Block:
-    """Return a block in which nothing of some points is held."""
+    """Return a block in which some points are free."""
     point_sd = block.point_sd.copy()
     point_sd[points] = np.inf
     return block.replace(point_sd=point_sd)
 
 
 def exchange(block: Block, one: int, other: int) -> Block:
-    """Return a block in which two points have each other's coordinates and standard deviations."""
+    """Return a block in which two points have exchanged coordinates and standard deviations."""
     order = np.arange(len(block.point_ids))
     order[[one, other]] = other, one
     return block.replace(point_positions=block.point_positions[order], point_sd=block.point_sd[order])
@@ -37,10 +37,11 @@ def exchange(block: Block, one: int, other: int) -> Block:
 def tests_of_predictions(
     result: Result, given: Block, points: Indices, spread: float
 ) -> tuple[Floats, Floats]:
-    """Return (k, 3) given minus predicted coordinates of points, and these by their standard deviations.
+    """Return (k, 3) given minus predicted coordinates of points, and their standardized values.
 
-    `result` is an adjustment in which the points are free, `given` the block with their coordinates, `spread`
-    the robust standard deviation of its test values. NaN if a component is free or has no prediction.
+    `result` is an adjustment in which the points are free, and `given` is the block with their coordinates.
+    `spread` is the robust standard deviation of its test values. NaN if a component is free or cannot be
+    predicted.
     """
     held = np.isfinite(given.point_sd[points])
     errors = np.where(held, given.point_positions[points] - result.point_positions[points], np.nan)
@@ -49,10 +50,10 @@ def tests_of_predictions(
 
 
 def exchanged_pair(result: Result, given: Block, points: Indices, spread: float) -> tuple[int, int] | None:
-    """Return the two points that agree with each other's predictions, not with their own, if there are two.
+    """Return the two points that agree with each other's predictions but not with their own, if any.
 
-    By :func:`are_exchanged`; correlations between the predictions of two points are left out. Parameters are
-    those of :func:`tests_of_predictions`.
+    The test is :func:`are_exchanged`, without correlations between the predictions of two points. The
+    parameters are described at :func:`tests_of_predictions`.
     """
     pairs = list(combinations(points.tolist(), 2))
     best: tuple[float, int, int] | None = None
@@ -66,11 +67,11 @@ def exchanged_pair(result: Result, given: Block, points: Indices, spread: float)
 
 
 def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
-    """Return the two control points that are exchanged by what the initial stations say, if there are two.
+    """Return the two control points that are exchanged according to the initial stations, if any.
 
-    For blocks that do not converge and have too few control points for predictions. Coarse stations have no
-    covariances: exchanging the names must explain what control and intersections differ by, and exchanging
-    any other two must not (:func:`judged`); a common shift is allowed for.
+    This is for blocks that do not converge and have too few control points for predictions. Covariances of
+    coarse stations are unknown. So the exchange must explain the differences of control and intersections,
+    and no other exchange may do so (:func:`judged`). A common shift is allowed.
     """
     rays = Rays.of(View.of(block).seen)
     met = rays.intersect().positions
@@ -81,7 +82,7 @@ def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
     heights = rays.axes.from_local(met[points])[:, 2]
     given = block.point_positions[points].copy()
     given[:, 2] = np.where(np.isfinite(block.point_sd[points, 2]), given[:, 2], heights)
-    # What is left of each intersection (row) when it is given the coordinates of each point (column).
+    # Squared misfit of each intersection (row) with the coordinates of each point (column).
     left = met[points, np.newaxis, :2] - rays.axes.positions(given)[np.newaxis, :, :2]
     squares = ((left - left.mean(axis=(0, 1))) ** 2).sum(axis=2)
     own = np.diag(squares)
@@ -97,7 +98,7 @@ def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
 def _disagreement(
     result: Result, given: Block, coordinates: list[int], places: list[int], spread: float
 ) -> tuple[float, int]:
-    """Chi-square of given coordinates against predictions at some places, and how many components it sums."""
+    """Return chi-square of given coordinates against predictions of some points, and its dimension."""
     total, freedom = 0.0, 0
     for point, place in zip(coordinates, places, strict=True):
         held = np.flatnonzero(np.isfinite(given.point_sd[point]))

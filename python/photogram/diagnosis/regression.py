@@ -1,4 +1,4 @@
-"""Observed images against those predicted from the given poses, points and camera: what a mistake looks like.
+"""Observed image coordinates compared with predictions from the given poses, points and camera.
 
 (x, y) observed = R2 (x, y) predicted + t,     R2 = k V,  V orthogonal,  k = sqrt|det R2|
 m = rms(observed - predicted) / rms(observed - mean),     e = rms(residual of this) / rms(observed - mean)
@@ -13,15 +13,15 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 
-LEAST = 6  # Known or intersected points of a photo that is looked at
-MOST = 12  # Photos that are looked at closely,
-SCANNED = 200  # and those of a larger block among which one that does not fit is looked for
-UNKNOWN = 1e6  # The misfit of a photo of which nothing can be predicted
+LEAST = 6  # Known or intersected points that a photo needs
+MOST = 12  # Maximum number of examined photos,
+SCANNED = 200  # and of scanned photos of a larger block
+UNKNOWN = 1e6  # Misfit of a photo without predictions
 
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Observed on predicted images of k photos."""
+    """Regression of observed on predicted image coordinates of k photos."""
 
     misfit: Floats  # (k,) m
     scale: Floats  # (k,) k
@@ -31,9 +31,9 @@ class Regression:
 
 
 def view(block: Block, photos: Indices) -> Block:
-    """Return what it takes to compare some photos: their points with all images of those, nothing weighted.
+    """Return the part of a block needed to compare some photos: their points, nothing weighted.
 
-    Of points whose positions are given the images on other photos are left out.
+    It has all observations of these points, except observations of given points on other photos.
     """
     chosen = np.isin(block.image_photos, photos)
     seen = np.zeros(len(block.point_ids), dtype=bool)
@@ -56,14 +56,14 @@ def view(block: Block, photos: Indices) -> Block:
 
 
 def given_points(block: Block) -> Bools:
-    """(n,) whether the position of a point is given, held or not."""
+    """(n,) whether the position of a point is given, as control or not."""
     return np.asarray(np.isfinite(block.point_positions).all(axis=1))
 
 
 def predictions(block: Block) -> Floats:
-    """(m, 2) images in millimetres, predicted from given poses and points; NaN where a point has no place.
+    """(m, 2) predicted image coordinates, millimetres; NaN if a point has no position.
 
-    Points that are not given stand where the rays meet.
+    Points without given positions are intersected.
     """
     rays = Rays.of(block)
     positions = rays.axes.positions(block.point_positions)
@@ -76,13 +76,13 @@ def predictions(block: Block) -> Floats:
 
 
 def misfits(block: Block, photos: Indices) -> Floats:
-    """(k,) m of some photos; very large where too few of their points have a place."""
+    """(k,) m of some photos; very large with too few predicted points."""
     predicted = predictions(block)
     return np.array([_misfit(block, predicted, photo) for photo in photos])
 
 
 def control_misfit(block: Block) -> float:
-    """M of all images of given points together; very large where there are too few."""
+    """Return m of all observations of given points together; very large with too few."""
     rows = _control_rows(block)
     if len(rows) < LEAST:
         return UNKNOWN
@@ -91,7 +91,7 @@ def control_misfit(block: Block) -> float:
 
 
 def control_residuals(block: Block) -> Floats:
-    """(k,) how far images of given points are from their places, in their spread; infinite without one."""
+    """(k,) relative residuals of observations of given points; infinite without prediction."""
     rows = _control_rows(block)
     xy = block.image_xy[rows]
     spread = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
@@ -118,12 +118,12 @@ def _rows(block: Block, predicted: Floats, photo: int) -> Indices:
 
 
 def relative(residuals: Floats, observed: Floats) -> float:
-    """Return the rms of residuals in that of the observed about their mean; not finite without one."""
+    """Return the rms of residuals relative to the observed values about their mean; may not be finite."""
     return float(np.sqrt((residuals**2).sum() / ((observed - observed.mean(axis=0)) ** 2).sum()))
 
 
 def regressions(block: Block, photos: Indices) -> Regression:
-    """Regress the images of some photos, each of which has enough points."""
+    """Compute the regression for some photos with enough points."""
     predicted = predictions(block)
     rows = [_rows(block, predicted, photo) for photo in photos]
     each = [_regressed(block.image_xy[own], predicted[own]) for own in rows]
@@ -138,7 +138,6 @@ def regressions(block: Block, photos: Indices) -> Regression:
 
 
 def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floats, float]:
-    """Return k, V, t and e."""
     if len(observed) < LEAST:
         return np.nan, np.full((2, 2), np.nan), np.full(2, np.nan), UNKNOWN
     design = np.column_stack([predicted, np.ones(len(predicted))])
@@ -150,12 +149,12 @@ def _regressed(observed: Floats, predicted: Floats) -> tuple[float, Floats, Floa
 
 
 def spread(photos: Indices, most: int) -> Indices:
-    """Return so many of some photos at the most, evenly taken."""
+    """Return an evenly spaced selection of at most `most` photos."""
     return photos[np.unique(np.linspace(0, len(photos) - 1, min(most, len(photos))).round().astype(np.int64))]
 
 
 def eligible(block: Block) -> Indices:
-    """Return photos with enough points that are given or on two photos; of many, some."""
+    """Return a selection of photos with enough points that are given or on two photos."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     usable = (given_points(block) | (rays > 1))[block.image_points]
     counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))

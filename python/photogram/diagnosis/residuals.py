@@ -59,7 +59,6 @@ def _by_rays(result: Result, section: Section) -> None:
 
 
 def _sums(result: Result, section: Section) -> None:
-    """Look for points whose residuals do not balance."""
     block, used = result.block, result.used_images
     count = len(block.point_ids)
     points = block.image_points[used]
@@ -80,7 +79,7 @@ def _sums(result: Result, section: Section) -> None:
         return
     rms = factor * np.sqrt((sums[several] ** 2).mean())
     section.figure("rms of the sums of the residuals of a point", f"{rms:.2f} {unit} (3 and more rays)")
-    # A point whose residuals nothing checks has sums of rounding errors.
+    # The sums of points without redundancy are rounding errors.
     floor = (ROUNDING * float(block.image_sd.min())) ** 2
     sizes = np.abs(sums) / np.sqrt(np.maximum(variances, floor)) * several[:, np.newaxis]
     limit = critical(2 * int(several.sum()))
@@ -94,7 +93,7 @@ def _sums(result: Result, section: Section) -> None:
 
 
 def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
-    """Patterns over the frame that no position or attitude of the photo takes up, (k, terms, 2)."""
+    """Patterns over the frame that no pose absorbs: names, and (k, terms, 2) values."""
     x, y = (xy / size).T
     r2, zero = x**2 + y**2, np.zeros_like(x)
     patterns = {
@@ -110,7 +109,7 @@ def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
 
 
 def _frame_pattern(result: Result, plain: Block, spread: float, section: Section) -> None:
-    """Look for a pattern that all photos share: lens, film, or the reduction of the plates."""
+    """Find a pattern that all photos share: lens, film, or the reduction of the plates."""
     block, used = result.block, result.used_images
     size = frame_radius(plain)
     unit, factor = small_unit(block.image_unit)
@@ -138,7 +137,6 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
 
 
 def _photo_patterns(result: Result, plain: Block, spread: float, section: Section) -> None:
-    """Test the residuals of each photo for the mean and the same patterns."""
     block = result.block
     rows = np.flatnonzero(result.used_images)
     rows = rows[np.argsort(block.image_photos[rows], kind="stable")]
@@ -161,7 +159,7 @@ def _photo_patterns(result: Result, plain: Block, spread: float, section: Sectio
 
 
 def _own_pattern(result: Result, plain: Block, rows: Indices, size: float, spread: float) -> float:
-    """Return how significant mean and patterns of some images of a photo are, in standard deviations."""
+    """Return the significance of mean and patterns of a photo, in standard deviations."""
     block = result.block
     _, terms = _terms(plain.image_xy[rows], size)
     means = np.broadcast_to(np.eye(2), (len(rows), 2, 2))

@@ -1,4 +1,4 @@
-"""Robust statistics: what the bulk of the values says, whatever the outliers are."""
+"""Robust statistics, which outliers do not affect."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ import numpy as np
 from photogram.arguments.types import Floats
 
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
-ROUNDING = 1e-9  # Of the largest residual: a median below it is rounding
+ROUNDING = 1e-9  # Median below this part of the largest residual, which is rounding
 TUKEY = 4.685  # Tuning constant of Tukey's biweight: 95 % efficiency for normal errors
 
 
 def mad_sd(values: Floats) -> float:
-    """Return the standard deviation about zero by the median of absolute values; NaN without values."""
+    """Return the robust standard deviation about zero (MAD); NaN without values."""
     finite = np.abs(values[np.isfinite(values)])
     return MAD_TO_SD * float(np.median(finite)) if finite.size else float("nan")
 
 
 def critical(tests: int, chance: float = 0.01) -> float:
-    """Return what the largest of so many normal values exceeds with a given chance (Bonferroni)."""
+    """Return the critical value of the largest of several normal values (Bonferroni)."""
     return NormalDist().inv_cdf(1 - chance / 2 / max(tests, 1))
 
 
 def normal_of_chi_square(value: float, freedom: int) -> float:
-    """Turn chi-square into a normal value (Wilson and Hilferty, 1931)."""
+    """Convert chi-square to a normal value (Wilson and Hilferty, 1931)."""
     spread = 2 / (9 * freedom)
     return float(((value / freedom) ** (1 / 3) - (1 - spread)) / math.sqrt(spread))
 
 
 def fit(design: Floats, values: Floats, iterations: int = 10) -> Floats:
-    """Return (k, d) coefficients by Tukey's biweight after a start by least absolute deviations.
+    """Return (k, d) coefficients by Tukey's biweight, after initial least absolute deviations.
 
     `design` is (n, k), n > k; the rows of `values`, (n, d), are outliers as a whole. NaN if squares overflow.
     """

@@ -1,15 +1,15 @@
-"""Rolling shutters: whose readout is given wrongly, and which nobody has declared.
+"""Rolling shutters: wrong readout parameters, and shutters that were not declared.
 
-Given wrongly are its direction, its unit, rows for columns: each is tried. Frames of a shutter that was not
-declared leave residuals that grow with row times velocity. Row r of h is exposed r/h T after the first, when
-the photo has moved on. With a the partials of an image by the position of its photo, and d the way from one
-exposure to the next, the image moves by
+Wrong direction, unit, or rows instead of columns are tried. Photos of a shutter that was not declared leave
+residuals proportional to row times velocity. Row r of h is exposed r/h T after the first, after the photo has
+moved. Let a be the partials of an observation by the position of its photo, and d the displacement between
+two exposures. The observation moves by
 
     (a d) (r/h) tau,      tau = T / time between two exposures
 
-of which position, attitude and points take up a part. The score of tau tells what is left (Rao): its value,
-and by how much the sum of squares would fall. Its standard deviation is from how the photos differ: each of
-them turns meanwhile, its own way.
+Position, attitude and points absorb a part of this. The score of tau (Rao) gives its value, and the decrease
+of the sum of squares. Its standard deviation is derived from the differences between photos, because each
+rotates differently during the readout.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized
 from photogram.words import Phrase, phrase
 
-SIGNIFICANT = 5.0  # Standard deviations: of a readout time below zero, and of what a shutter explains
-LONGEST = 1.0  # Seconds: no shutter reads for longer; such a number is one of milliseconds
+SIGNIFICANT = 5.0  # Standard deviations: of a negative readout time, and of the effect of a shutter
+LONGEST = 1.0  # Seconds: longest readout; a larger number is in milliseconds
 MILLISECOND = 1e-3
 OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
 
 
 def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> list[Message]:
-    """Try other readouts of rolling shutters if the first adjustment failed or residuals are too large."""
+    """Try other readouts of rolling shutters if the adjustment failed or residuals are too large."""
     if not any(each.shutter is not None for each in block.timed):
         return []
     if first is not None and first.converged and (first.loss or not is_suspected(first)):
@@ -57,7 +57,7 @@ def shutter_hints(block: Block, first: Result | None, adjusted: Adjuster) -> lis
 
 
 def backward_readouts(result: Result) -> list[Message]:
-    """Name readout times that are negative: what fits, but is read the other way."""
+    """Report negative readout times, which fit but mean the opposite direction."""
     own = {id(each.shutter.readout) for each in result.block.timed if each.shutter is not None}
     return [
         Message(
@@ -74,7 +74,6 @@ def backward_readouts(result: Result) -> list[Message]:
 
 
 def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
-    """Yield possible mistakes in the shutters of a block, and the block without them."""
     ends = {True: _ends(block, 0), False: _ends(block, 1)}
 
     def opposite(own: Shutter) -> Shutter:
@@ -93,7 +92,7 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
     yield phrase(f"{code}.first"), _changed(block, across)
     readouts = [own.readout for own in block.timed if own.shutter is not None]
     if not all(each is not None and np.isinf(each.sd).all() for each in readouts):
-        # A free readout time has the sign that fits.
+        # A free readout time adopts the sign that fits.
         yield phrase(f"{code}.last"), _changed(block, across_back)
     if any(each is not None and abs(float(each.position[0])) > LONGEST for each in readouts):
         known: dict[int, Readout] = {}
@@ -111,7 +110,6 @@ def _tried(block: Block) -> Iterator[tuple[Phrase, Block]]:
 
 
 def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:
-    """Return a block with other shutters."""
     return block.replace(
         timed=[
             each if each.shutter is None else replace(each, shutter=change(each.shutter))
@@ -121,26 +119,25 @@ def _changed(block: Block, change: Callable[[Shutter], Shutter]) -> Block:
 
 
 def _ends(block: Block, axis: int) -> tuple[float, float]:
-    """Return the left and right edge, or the upper and lower one, as far as images reach."""
+    """Return the left and right, or upper and lower, limit of the observations."""
     low, high = float(block.image_xy[:, axis].min()), float(block.image_xy[:, axis].max())
     down = any(each.image_y == "down" for each in block.cameras)
     return (low, high) if axis == 0 or down else (high, low)
 
 
 EXPLAINED = 0.8
-"""Of what readout, lens and affinity explain together the readout explains this part alone, at least; and
-beside these it is significant."""
-FEWEST = 4  # Photos of a camera that move
-MOST = 3  # Cameras that are looked at, those with the most photos
+"""Least part of the joint effect of readout, lens and affinity that the readout explains alone."""
+FEWEST = 4  # Moving photos of a camera
+MOST = 3  # Maximum number of examined cameras, starting with the most photos
 READ = {(1, True): "down", (1, False): "up", (0, True): "right", (0, False): "left"}
 """Direction of the readout, by the axis of the coordinate and the sign of the readout time."""
 
 
 def rolling_hints(result: Result) -> list[Message]:
-    """Name cameras with the residuals of a rolling shutter, if the global test rejects the residuals.
+    """Report cameras with the residuals of a rolling shutter, if the global test rejects the residuals.
 
     Photos must be in the order of their exposures: along strips the distance between two photos is the
-    velocity. Photos on trajectories are left out.
+    velocity. Photos on trajectories are skipped.
     """
     block = result.block
     if result.loss or not result.WHOLE or block.mounts or not is_suspected(result):
@@ -152,14 +149,14 @@ def rolling_hints(result: Result) -> list[Message]:
     chosen = [each for each in np.argsort(-counts, kind="stable")[:MOST].tolist() if counts[each] >= FEWEST]
     if not chosen:
         return []
-    # Those of residuals, observed minus computed.
+    # Partials of residuals, observed minus computed.
     partials = -np.einsum("kmi,mk->mi", station_partials(result)[:3], ways[block.image_photos])
     found = (_of_camera(result, each, partials, moved & (cameras == each)) for each in chosen)
     return [Message(message) for message in found if message is not None]
 
 
 def _ways(result: Result) -> Floats:
-    """(P, 3) way of each photo from one exposure to the next, in metric axes; 0 where none is known."""
+    """(P, 3) displacement of each photo until the next exposure, in metric axes; 0 if unknown."""
     adjusted = as_adjusted(result)
     places = local_axes(adjusted).positions(adjusted.photo_positions)
     rest = np.flatnonzero(~timed_photos(adjusted))
@@ -173,7 +170,7 @@ def _ways(result: Result) -> Floats:
 def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Phrase | None:
     """Return the readout that explains the residuals of a camera.
 
-    `motion` are (m, 2) ways of images from one exposure to the next.
+    `motion` are (m, 2) displacements of observations from one exposure to the next.
     """
     block = result.block
     own = result.used_images & photos[block.image_photos] & np.isfinite(motion).all(axis=1)
@@ -205,7 +202,7 @@ def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> Ph
 
 
 def _column(block: Block, motion: Floats, own: Bools, axis: int, down: bool) -> Floats:
-    """(m, 2) partials by tau of a readout along an axis, over all that images reach, in their sd."""
+    """(m, 2) partials by tau of a readout along an axis over the extent of observations, in sd."""
     along = block.image_xy[own, axis] * (-1.0 if axis == 1 and not down else 1.0)
     shares = (along - along.min()) / max(float(np.ptp(along)), 1e-300)
     column = np.zeros_like(block.image_xy)
@@ -222,6 +219,6 @@ def _affinities(block: Block, own: Bools) -> Floats:
 
 
 def _significance(result: Result, fall: float) -> float:
-    """Return a fall of the sum of squares in standard deviations, with the unit weight that is left."""
+    """Return the significance of a decrease of the sum of squares, in sd of the remaining unit weight."""
     omega, freedom = result.sum_and_freedom
     return float(externally_studentized(math.sqrt(max(fall, 0.0)), omega, freedom))

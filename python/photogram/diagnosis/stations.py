@@ -18,23 +18,23 @@ from photogram.results.result import Result
 from photogram.words import phrase
 
 LOOK, GRAVE = 8.0, 20.0
-"""Departures from the path, in robust standard deviations of all departures of their kind."""
-FEW = 4  # So many free departures double what is allowed
-MOVED = 10.0  # The same for the change from the initial to the adjusted station
+"""Departures from the path, in robust standard deviations of all departures of their type."""
+FEW = 4  # Number of free departures for which limits are doubled
+MOVED = 10.0  # Limit of the change from the initial to the adjusted station, in the same unit
 TINY = 1e-9  # A spread below this is rounding: radians, or the linear unit
-UPRIGHT = 0.8  # Vertical component of the z axis of a photo that looks down, at least
-FEWEST = 5  # Photos of a strip whose path can be judged
-CURVED = 15  # Photos of a strip whose path may be curved
-SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3  # Departures that are never remarked on: of the base, and radians
+UPRIGHT = 0.8  # Least vertical component of the z axis of a photo that looks down
+FEWEST = 5  # Photos of a strip needed to fit a path
+CURVED = 15  # Photos of a strip needed to fit a curved path
+SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3  # Ignored departures: relative to the base, and radians
 QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
-"""The angles are those between the photo and its strip, ground-to-photo."""
+"""Angles are between the photo and its strip, ground-to-photo."""
 
 
 def stations(block: Block, result: Result | None, misleading: Collection[str] = ()) -> Section:
-    """Compare every station with the smooth path of its strip, and with its initial values.
+    """Compare every station with the smooth path of its strip and with its initial values.
 
-    `misleading` are photos on whose points good images seemed wrong from the initial stations: if one of them
-    has moved, its initial values are wrong.
+    `misleading` are photos that observe points whose good observations seemed wrong from the initial
+    stations. If one of them has moved, its initial values are wrong.
     """
     section = Section(
         "Stations",
@@ -66,15 +66,15 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
 
 
 def flown(block: Block) -> bool:
-    """Whether most photos look down, as from an aircraft: only then is there a path, and ground."""
+    """Whether most photos look down, as from an aircraft; otherwise path and ground are undefined."""
     return float(np.median(local_axes(block).cameras()[:, 2, 2])) > UPRIGHT
 
 
 @dataclass(frozen=True)
 class _Path:
-    """Departures (k, 5) of the photos of a strip from its path, and what its fit leaves free of their sizes.
+    """Departures (k, 5) of the photos of a strip from its path, and the independent sizes of its fit.
 
-    A robust fit passes through as many photos as it has coefficients; `free` are the other sizes (k - 2, 5),
+    A robust fit passes through as many photos as it has coefficients. `free` are the other sizes (k - 2, 5),
     or (k - 3, 5) of a curved path.
     """
 
@@ -96,7 +96,7 @@ def _path(positions: Floats, heights: Floats, cameras: Floats) -> _Path:
     t = (place[:, 0] - place[:, 0].mean()) / max(float(np.ptp(place[:, 0])), 1e-300)
     degree = 2 if len(t) >= CURVED else 1
     design = np.vander(t, degree + 1)
-    # Each quantity by itself: a wrong height says nothing about kappa.
+    # Each quantity is fitted separately: a wrong height does not affect kappa.
     columns = [values[:, [k]] - design @ fit(design, values[:, [k]]) for k in range(values.shape[1])]
     departures = np.hstack(columns)
     departures[:, 2:] = np.angle(np.exp(1j * departures[:, 2:]))
@@ -109,9 +109,9 @@ def _spread(sizes: Floats) -> Floats:
 
 
 def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str, section: Section) -> None:
-    """Name the photos that depart from the path far more than photos do on the whole."""
+    """Report the photos that depart from the path far more than photos usually do."""
     free = np.vstack([path.free for path in paths])
-    # The spread of few departures is itself uncertain.
+    # The spread of few departures is uncertain.
     usual, doubt = _spread(free), 1 + FEW / len(free)
     base = _base(block)
     floor = np.array([SMOOTH_POSITION * base] * 2 + [SMOOTH_ANGLE] * 3)
@@ -139,7 +139,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
 
 
 def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
-    """Name the stations that the adjustment moved far more than the others."""
+    """Report the stations that the adjustment moved far more than the others."""
     block = result.block
     if len(block.photo_ids) - len(block.mounts) < FEWEST:
         return
@@ -148,7 +148,7 @@ def _moved(result: Result, misleading: Collection[str], section: Section) -> Non
     turns = result.photo_attitudes - block.photo_attitudes
     turns = np.angle(np.exp(1j * turns))
     unit = block.linear_unit
-    # Photos on frames have no poses of their own.
+    # Photos on frames do not have poses of their own.
     mounted = np.isin(block.photo_ids, [each.photo for each in block.mounts])
     for what, changes, shown, factor in (
         ("position", shifts, unit, 1.0),
@@ -181,13 +181,13 @@ def _moved(result: Result, misleading: Collection[str], section: Section) -> Non
 
 
 def _base(block: Block) -> float:
-    """Return the usual distance of a photo from the next; 0 for a single photo."""
+    """Return the median distance between consecutive photos; 0 for a single photo."""
     positions = local_axes(block).positions(block.photo_positions)
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     return float(np.median(steps)) if steps.size else 0.0
 
 
-NEIGHBOURS = 8  # Points that a local plane rests on
+NEIGHBOURS = 8  # Points of a local plane
 DEPARTURE = 6.0  # Departures from the plane in robust standard deviations of all
 PER_CELL = 4  # Points of a cell of the search grid, on average
 
@@ -228,10 +228,10 @@ def two_ray_heights(result: Result) -> Section:
 
 
 def _above_planes(plan: Floats, heights: Floats, rows: Indices, near: Indices) -> tuple[Floats, Floats]:
-    """Heights above the planes of the neighbours, (k,), the neighbour that fits worst left out.
+    """Return (k,) heights above the planes of the neighbours, without the neighbour that fits worst.
 
-    With them (k,) how uncertain the plane is at the point: the root of 1 + its cofactor there, large outside
-    the neighbours.
+    Also returns (k,) the uncertainty of the plane at the point: the root of 1 + its cofactor, which is large
+    outside the neighbours.
     """
     offset = plan[near] - plan[rows][:, np.newaxis]
     scale = np.maximum(np.abs(offset).max(axis=(1, 2)), 1e-300)
@@ -247,9 +247,9 @@ def _above_planes(plan: Floats, heights: Floats, rows: Indices, near: Indices) -
 
 
 def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (n, 3) of the planes, and the cofactor (n,) of their height at the origin."""
+    """Return (n, 3) coefficients of the planes, and (n,) cofactors of their height at the origin."""
     normal = np.einsum("nki,nk,nkj->nij", design, weights, design)
-    # Neighbours in a row give no plane: a little weight on level ground gives the mean across the row.
+    # Neighbours in a row do not define a plane: a small weight on a level plane gives the mean.
     normal[:, 1:, 1:] += 1e-6 * np.eye(2)
     inverse = np.linalg.inv(normal)
     right = np.einsum("nki,nk,nk->ni", design, weights, z)
@@ -257,7 +257,7 @@ def _planes(design: Floats, z: Floats, weights: Floats) -> tuple[Floats, Floats]
 
 
 def neighbours(plan: Floats, rows: Indices, count: int) -> Indices:
-    """(k, count) the points nearest to each of some points in plan, themselves excepted.
+    """Return (k, count) nearest points in plan of each of some points, excluding the point itself.
 
     Points are sorted into square cells. The search visits rings of cells around a point, so that its work is
     proportional to the number of evenly distributed points.

@@ -14,7 +14,7 @@ from photogram.words import phrase
 
 
 def structure_section(block: Block, result: Result | None, words: Words) -> Section:
-    """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point."""
+    """Report rays, ties and bandwidth, photos with few ties, and separate parts."""
     section = Section(
         "Structure",
         "Points tie photos together"
@@ -64,7 +64,6 @@ def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
 
 
 def _parts(block: Block, section: Section) -> None:
-    """Name the parts of a block that share no point."""
     parts = parts_of(block)
     numbers, sizes = np.unique(parts, return_counts=True)
     section.figure("parts without a common point", len(numbers))
@@ -77,7 +76,7 @@ def _parts(block: Block, section: Section) -> None:
 
 
 def parts_of(block: Block) -> Indices:
-    """(P,) the first photo of the part of the block to which each photo belongs."""
+    """(P,) the first photo in the part of each photo."""
     photos, points = block.image_photos, block.image_points
     labels = np.arange(len(block.photo_ids))
     while True:
@@ -85,7 +84,7 @@ def parts_of(block: Block) -> Indices:
         np.minimum.at(by_point, points, labels[photos])
         fewer = labels.copy()
         np.minimum.at(fewer, photos, by_point[points])
-        # Follow the labels to where they lead: the number of passes grows with the logarithm of the length.
+        # Follow the labels of labels: the number of passes grows with the logarithm of the length.
         fewer = fewer[fewer]
         if (fewer == labels).all():
             return labels

@@ -1,7 +1,7 @@
-"""The check of a block with photos on trajectories: by its adjustment, and what snooping takes out of it.
+"""The check of a block with photos on trajectories: its adjustment and data snooping.
 
-What is tried otherwise takes photos for pictures with one pose each. A photo that moves is none: its images
-do not fit one pose, and every unit, axis or angle that is tried would be blamed for that.
+The other checks assume one pose per photo. Observations of a moving photo do not fit one pose, and any tried
+unit, axis or angle would be blamed for it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     structure = structure_section(block, None, words)
     timed = timed_photos(block)
     at_rest = {name for name, moves in zip(block.photo_ids, timed.tolist(), strict=True) if not moves}
-    # What ties a photo to a trajectory may be no point.
+    # Photos on a trajectory may be tied by other observations than points.
     structure.findings = [each for each in structure.findings if at_rest.issuperset(each.photos)]
     section = Section(
         "Adjustment",
@@ -63,7 +63,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
 
 
 def _snooped(block: Block, adjusted: Adjuster) -> Snooped | None:
-    """Return the block without gross errors; None where it cannot be tested."""
+    """Remove gross errors; None if the block cannot be tested."""
     try:
         return snoop(block, threads=adjusted.options.get("threads"))
     except (AdjustmentError, InputError):

@@ -1,12 +1,12 @@
-"""Mistakes in what photos on trajectories are given, found by trying: the rule is that of photos at rest.
+"""Mistakes in the data of photos on trajectories, found by trial with the rule for photos at rest.
 
-Images are predicted from tables, points and cameras as they are given; observed positions likewise: their
-misfit is that from the trajectory at their time, in their spread.
+Observations are predicted from given tables, points and cameras. The misfit of observed positions is their
+difference from the trajectory at their time, relative to their spread.
 
-m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.regression`)
+    m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.regression`)
 
-Samples and lines of scanners are image coordinates like others here: what their trajectory passes at a wrong
-time, or with a wrong attitude, is seen many lines away.
+Samples and lines of scanners are image coordinates as well. A wrong time or attitude of their trajectory
+shifts them by many lines.
 """
 
 from __future__ import annotations
@@ -57,7 +57,6 @@ def _of_images(block: Block) -> list[Verdict]:
 
 
 def _of_records(block: Block) -> list[Verdict]:
-    """Try other scales of time for observed positions."""
     given = _records_misfit(block)
     if not given[0] > SUSPICION:
         return []
@@ -70,7 +69,7 @@ def _of_records(block: Block) -> list[Verdict]:
 
 
 def _records_misfit(block: Block) -> Floats:
-    """(1,) m of all observed positions on trajectories; 0 without any, very large where most are beyond."""
+    """(1,) m of all observed positions on trajectories; 0 without any, very large if most are outside."""
     records: dict[int, list[tuple[Moment, Position]]] = {}
     for each in block.observations:
         if isinstance(each, Position) and (moment := each.moment) is not None:
@@ -104,7 +103,7 @@ KILOMETRE = 1000.0
 
 
 def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
-    """Propose mistakes for a block without observations; `photos` on trajectories are looked at."""
+    """Yield possible mistakes of a block without observations, for `photos` on trajectories."""
     if any(each.trajectory is not None for each in block.timed):
         yield from _of_tables()
         for message, seconds in shifts("images"):
@@ -147,7 +146,6 @@ def _scaled(table: Table, factor: float) -> Table:
 
 
 def _with_tables(block: Block, change: Callable[[Table], Table]) -> Block:
-    """Return a block without observations whose trajectories have other tables."""
     known: dict[int, Trajectory] = {}
 
     def meant(given: Trajectory) -> Trajectory:
@@ -161,7 +159,7 @@ def _with_tables(block: Block, change: Callable[[Table], Table]) -> Block:
 
 
 def _looking_back(block: Block) -> Block:
-    """Return a block whose principal distances have the other sign."""
+    """Return a block whose principal distances have the opposite sign."""
     if block.principal_distances is not None:
         return block.replace(principal_distances=-block.principal_distances)
     cameras = [
@@ -174,7 +172,7 @@ def _looking_back(block: Block) -> Block:
 
 
 def _shifted_images(block: Block, seconds: float) -> Block:
-    """Return a block whose photos on given trajectories were taken later."""
+    """Return a block with later times of its photos on given trajectories."""
 
     def later(own: Timed) -> Timed:
         if own.trajectory is None:
@@ -187,7 +185,7 @@ def _shifted_images(block: Block, seconds: float) -> Block:
 
 
 def shifted_records(block: Block, seconds: float) -> Block:
-    """Return a block whose observed positions on trajectories are of later times."""
+    """Return a block with later times of its observed positions on trajectories."""
     return block.replace(
         observations=[
             replace(each, time=each.time + seconds)
@@ -199,9 +197,9 @@ def shifted_records(block: Block, seconds: float) -> Block:
 
 
 def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
-    """Propose that lines, samples or both are counted from the other end.
+    """Yield the hypotheses that lines, samples or both are counted from the other end.
 
-    With l the observed and p the predicted lines, l = s - p where they are; s is the middle one of l + p.
+    With l the observed and p the predicted lines, l = s - p if they are; s is the median of l + p.
     """
     predicted = flown_predictions(block, photos)
     for name, axes in (("reversed", (1,)), ("turned", (0, 1)), ("mirrored samples", (0,))):
@@ -223,14 +221,14 @@ def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Blo
     return block.replace(image_xy=xy)
 
 
-LEAST = 4  # Points with a place that a photo which is looked at has
-MOST = 12  # Photos that are looked at
-POINTS = 300  # Points of each of them
-SEEN = 0.8  # Of the points of a photo its trajectory must pass more than this part
+LEAST = 4  # Predictable points that a photo needs
+MOST = 12  # Maximum number of examined photos
+POINTS = 300  # Points per photo
+SEEN = 0.8  # Least part of the points of a photo that its trajectory passes
 
 
 def flown_view(block: Block) -> tuple[Block, Indices]:
-    """Return what it takes to compare some photos on trajectories, nothing observed, and which these are."""
+    """Return the part of a block needed to compare some photos on trajectories, and these photos."""
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     usable = (given_points(block) | (rays > 1))[block.image_points]
     counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
@@ -244,9 +242,9 @@ def flown_view(block: Block) -> tuple[Block, Indices]:
 
 
 def flown_misfits(block: Block, photos: Indices) -> Floats:
-    """(k,) m of some photos, of all points or of given ones, whichever is larger.
+    """(k,) m of some photos, of all points or of given ones; the larger one.
 
-    Points that are not given fit whatever the scale is. Very large where many are not seen there at all.
+    Points without given positions fit any scale. Very large if many points are not visible.
     """
     predicted = flown_predictions(block, photos)
     apart = np.linalg.norm(block.image_xy - predicted, axis=1)
@@ -266,7 +264,7 @@ def flown_misfits(block: Block, photos: Indices) -> Floats:
 
 
 def flown_predictions(block: Block, photos: Indices) -> Floats:
-    """(m, 2) images of some photos as they are predicted; NaN of others, and where a point is not seen."""
+    """(m, 2) predicted image coordinates of some photos; NaN for others and invisible points."""
     places = _places(block)
     found = np.full(block.image_xy.shape, np.nan)
     wanted = set(photos.tolist())
@@ -277,14 +275,14 @@ def flown_predictions(block: Block, photos: Indices) -> Floats:
         try:
             seen = projected(own, trajectory, camera_of(block, row), places[block.image_points[images]])
         except InputError:
-            # A scanner of whose trajectory there is one record.
+            # A scanner whose trajectory has a single record.
             continue
         found[images] = seen
     return found
 
 
 def _places(block: Block) -> Floats:
-    """(n, 3) points in the axes of trajectories: as they are given, or where their rays meet."""
+    """(n, 3) given or intersected points, in the axes of trajectories."""
     places = block.point_positions
     if block.spheroid is not None:
         places = geographic_to_geocentric(places, block.spheroid)
@@ -298,7 +296,7 @@ def _places(block: Block) -> Floats:
 
 
 def _rays(block: Block) -> tuple[Floats, Floats]:
-    """(m, 3) where the rays of images come from, and their unit directions; NaN of photos at rest."""
+    """(m, 3) origins of the rays and unit directions; NaN of photos at rest."""
     seen = image_directions(block)
     centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
     for own, trajectory, _, images in timed_images(block):

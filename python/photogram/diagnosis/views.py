@@ -1,4 +1,4 @@
-"""A block as the first steps of a check see it: straight rays of cameras without distortion."""
+"""A block as the first steps of a check use it: straight rays of cameras without distortion."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _SHARED = (
     "point_positions",
     "point_sd",
 )
-"""What a block and its view have in common beside images."""
+"""Attributes that a block shares with its view, except image observations."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A block, and what its cameras would have seen without their lenses."""
+    """A block and its observations without lens distortion."""
 
-    block: Block  # What is adjusted: images that no camera can have seen are left out
-    # Without distortion, and without the images of photos on frames, which have no poses of their own.
-    # Photos and points are those of `block`
+    block: Block  # The block to adjust, without observations that no camera can have made
+    # Without distortion, and without photos on frames, which lack poses of their own. Photos and points are
+    # the same as in `block`
     seen: Block
-    rows: Indices  # (k,) rows of the images of `seen` among those of `block`
-    unseen: int = 0  # How many images no camera can have seen
+    rows: Indices  # (k,) rows in `block` of the observations of `seen`
+    unseen: int = 0  # Number of observations that no camera can have made
 
     @classmethod
     def of(cls, block: Block) -> Self:
@@ -51,24 +51,24 @@ class View:
 
     @property
     def unit(self) -> str:
-        """Of image coordinates."""
+        """Unit of image coordinates."""
         return self.block.image_unit
 
     def images(self, of_seen: Bools) -> Bools:
-        """(m,) which images of `block` are meant by (k,) those of `seen`."""
+        """(m,) mask of observations of `block` from a (k,) mask of `seen`."""
         found = np.zeros(len(self.block.image_xy), dtype=bool)
         found[self.rows] = of_seen
         return found
 
     def changed(self, change: Change) -> Self:
-        """Return the view of the block that was meant."""
+        """Return the view of the corrected block."""
         return self.of_seen(change(self.seen))
 
     def of_seen(self, meant: Block) -> Self:
-        """Return the view of the block that was meant, `seen` put right.
+        """Return the view of the corrected block, given the corrected `seen`.
 
-        Where its images are others than those of cameras with lenses, the block has no lenses any more: they
-        could have distorted anything else.
+        If image coordinates change for cameras with lenses, the new block has no lenses, because distortions
+        would not fit.
         """
         if meant is self.seen:
             return self

@@ -1,4 +1,4 @@
-"""Standard deviations that an adjustment contradicts, kind by kind: one step of variance components."""
+"""Standard deviations that an adjustment contradicts, by type: one step of variance components."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from photogram.results.result import Result
 from photogram.statistics import global_test
 from photogram.words import Phrase, phrase
 
-LEAST_REDUNDANCY = 10.0  # Of a kind whose standard deviations are judged
-NOTABLE = 1.5  # Standard deviations that are wrong by this factor, in the mean and in the median
+LEAST_REDUNDANCY = 10.0  # Of a type whose standard deviations are tested
+NOTABLE = 1.5  # Least reported factor of standard deviations, of the mean and of the median
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +28,10 @@ class _Kind:
 
 
 def weight_hints(result: Result) -> list[Message]:
-    """Name kinds of observations whose standard deviations are too small or too large.
+    """Report observation types whose standard deviations are too small or too large.
 
-    With v'Pv the sum of squares of a kind and r the sum of its redundancy numbers, the factor is the root of
-    v'Pv / r. A kind is named if v'Pv and the median of the standardized residuals exceed their limits.
+    With v'Pv the sum of squares of a type and r the sum of its redundancy numbers, the factor is the root of
+    v'Pv / r. A type is reported if v'Pv and the median of the standardized residuals exceed their limits.
     """
     found = []
     for kind in _kinds(result):
