@@ -1,4 +1,4 @@
-"""Statistics of an adjustment: tests, critical values, reliability, degrees of freedom, radii of errors."""
+"""Statistics of an adjustment: tests, critical values, reliability, degrees of freedom, error radii."""
 
 import lazy_loader
 

@@ -1,9 +1,9 @@
-"""Whether known values that took no part in an adjustment agree with it: check points.
+"""Agreement of known values with an adjustment that did not use them: check points.
 
-Differences d (adjusted minus given) of n points have the covariance C = s^2 Q + S: Q the joint cofactors of
-the adjusted points, which share the errors of the block, cross blocks included, and S the covariance of the
-given values. T = d' C^-1 d is chi-square with as many degrees of freedom as values (Baarda 1968); T / m is
-F(m, f) where s^2 is estimated with f degrees of freedom and s^2 Q is most of C.
+Differences d (adjusted minus given) of n points have the covariance C = s^2 Q + S. Q are the joint cofactors
+of the adjusted points, including cross blocks, because these share the errors of the block. S is the
+covariance of the given values. T = d' C^-1 d is chi-square with as many degrees of freedom as values (Baarda
+1968). T / m is F(m, f) if s^2 is estimated with f degrees of freedom and s^2 Q is most of C.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ def agreement(
     """Test known values against an adjustment.
 
     `differences` (n, k) are adjusted minus known values, NaN if unknown; `given` (n, k, k) are covariances of
-    the known values. `cofactors` are joint (n k, n k); with those of each point, (n, k, k), there is no test
-    of all points together. `scale` is the variance of unit weight with `second` degrees of freedom. `apart`
-    returns the fields of the difference of a point by its (k,) standard deviations, C included.
+    the known values. `cofactors` are joint (n k, n k); with the cofactors of each point, (n, k, k), all
+    points together are not tested. `scale` is the variance of unit weight with `second` degrees of freedom.
+    `apart` returns the fields of the difference of a point by its (k,) standard deviations, C included.
     """
     count, width = differences.shape
     rows = np.isfinite(differences)
@@ -75,12 +75,12 @@ def _blocks(matrix: Floats, width: int) -> Floats:
 
 
 def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
-    """Return d' C^+ d and the rank of C: (NaN, NaN) where C is not known, (NaN, 0) where all are exact."""
+    """Return d' C^+ d and the rank of C: (NaN, NaN) if C is unknown, (NaN, 0) if all are exact."""
     if not np.isfinite(covariance).all():
         return math.nan, math.nan
     scale = scale_of(covariance)
     scaled, y = covariance / np.outer(scale, scale), d / scale
-    # The last row of the factor of C bordered by d is L^-1 d: no second elimination.
+    # The last row of the factor of C bordered by d is L^-1 d; a second elimination is unnecessary.
     bordered = np.block([[scaled, y[:, np.newaxis]], [y, np.array([[BORDER * (1.0 + y @ y)]])]])
     root = root_of(bordered)
     if root is not None:
@@ -94,13 +94,13 @@ def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:
 
 
 def scale_of(covariance: Floats) -> Floats:
-    """Return (m,) standard deviations; 1 for what has none."""
+    """Return (m,) standard deviations, with zeros replaced by 1."""
     sd = np.sqrt(np.diag(covariance))
     return np.where(sd > 0, sd, 1.0)
 
 
 def root_of(scaled: Floats) -> Floats | None:
-    """Return the Cholesky factor of a matrix whose diagonal is ones, perhaps bordered; None if singular."""
+    """Return the Cholesky factor of a matrix with unit diagonal, possibly bordered; None if singular."""
     try:
         root = np.asarray(np.linalg.cholesky(scaled), dtype=np.float64)
     except np.linalg.LinAlgError:

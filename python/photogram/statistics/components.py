@@ -1,18 +1,18 @@
-"""Variance components: by which factors the variances of groups of observations are wrong, all at once.
+"""Variance components: joint estimation of variance factors of groups of observations.
 
-Observations fall into groups g with the variances theta_g sd^2. An adjustment with some theta leaves of every
-group the weighted sum of squares q_g and the sum r_g of redundancy numbers. With R taking errors to
-residuals, both in standard deviations, and the Helmert matrix H_gh = sum of R_ij^2 over i in g, j in h (its
-rows sum to r_g),
+Observations belong to groups g with the variances theta_g sd^2. For given theta, an adjustment results in the
+weighted sum of squares q_g and the sum r_g of redundancy numbers of each group. R maps errors to residuals,
+both in standard deviations. The Helmert matrix is H_gh = sum of R_ij^2 over i in g, j in h; its rows sum to
+r_g. Then
 
     E q_g = sum_h H_gh theta_h (true) / theta_h (present),    Cov q = 2 H at the truth.
 
 * Helmert (1907): solve H f = q, and multiply theta by f.
-* Foerstner (1979): multiply theta_g by q_g / r_g. The fixed point is the same, q_g = r_g, that of the largest
-  restricted likelihood (Patterson and Thompson 1971); components stay positive, and H is not needed.
+* Foerstner (1979): multiply theta_g by q_g / r_g. The fixed point q_g = r_g is the same, and maximises the
+  restricted likelihood (Patterson and Thompson 1971). Components remain positive, and H is not needed.
 
-The covariance of the logarithms is 2 H^-1. Nothing here knows a photograph: `estimate` is told by a function
-what an adjustment with given factors leaves.
+The covariance of the logarithms is 2 H^-1. The module is independent of photographs: a function passed to
+`estimate` adjusts with given factors.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.words import Phrase
 
 LEAST_REDUNDANCY = 5.0  # Smallest redundancy of a group with an estimated variance
-LEAST_SHARE = 0.01  # Smallest ratio of its redundancy and its number of observations
+LEAST_SHARE = 0.01  # Smallest ratio of the redundancy of a group and its number of observations
 REFUSED = 1.0  # Smallest redundancy for any estimate of a variance
 MOST_CONDITION = 100.0  # Of the Helmert matrix with unit diagonal
 LIMIT_OF_STEP = 10.0  # Largest ratio of factors in a step
@@ -41,7 +41,7 @@ NODES = 4  # Nodes of the integral of the likelihood ratio
 
 
 class Weighted(Protocol):
-    """What an adjustment leaves of G groups with given components."""
+    """Result of an adjustment for G groups with given components."""
 
     @property
     def counts(self) -> Indices:
@@ -64,11 +64,11 @@ class GroupsOf:
     """Groups of observations, by name."""
 
     names: tuple[str, ...]  # (G,) of the groups
-    # (G,) the larger group that each is merged into, with all others of the same name, where its own
-    # component cannot be estimated; empty for none
+    # (G,) larger group that replaces a group whose component cannot be estimated, merged with all others of
+    # the same name; empty for none
     parents: tuple[str, ...] = ()
     images: tuple[bool, ...] = ()  # (G,) whether they are of image coordinates
-    # Why the component of a group is not estimated, by its number
+    # Reason for not estimating the component of a group, by its number
     held: dict[int, str] = field(default_factory=dict)
 
 
@@ -76,31 +76,31 @@ class GroupsOf:
 class Component:
     """The variance component of a group."""
 
-    name: str  # The group; where several were merged, the larger one
+    name: str  # Name of the group; of the larger group after merging
     members: tuple[str, ...]
     count: int  # observations; q and r with the last weights
     squares: float
     redundancy: float
     factor: float  # theta: the ratio of estimated and given variance
-    # sd, least_sd: Of the factor; the second from the redundancy alone, which is less. NaN where held
+    # sd, least_sd: of the factor; the second from the redundancy alone, and smaller. NaN if fixed
     sd: float
     least_sd: float
-    interval: tuple[float, float]  # In which the factor lies with 95 percent, from the logarithm
-    # ln(theta) / its standard deviation, and the probability of a value as large
+    interval: tuple[float, float]  # 95 percent interval of the factor, derived from the logarithm
+    # ln(theta) / its standard deviation, and the probability of a value at least as large
     test_value: float
     probability: float
-    significant: bool  # Whether that is below the level divided by the number of components (Bonferroni)
+    significant: bool  # Whether the probability is below the level over the number of components (Bonferroni)
     images: bool
-    held: str  # why it is not estimated; empty if it is
+    held: str  # reason for not estimating it; empty if estimated
 
     @property
     def factor_of_sd(self) -> float:
-        """By which standard deviations are to be multiplied."""
+        """Factor of the standard deviations."""
         return math.sqrt(self.factor)
 
     @property
     def worth_changing(self) -> bool:
-        """Whether it is significant and far enough from 1 for other weights to matter."""
+        """Whether it is significant and far enough from 1 to affect weights."""
         low, high = WORTH_CHANGING
         return self.significant and not low <= self.factor <= high
 
@@ -109,21 +109,21 @@ class Component:
 class Estimate:
     """Variance components of groups."""
 
-    components: tuple[Component, ...]  # Estimated and held ones
-    factors: Floats  # (G,) theta of every group that was given
+    components: tuple[Component, ...]  # Estimated and fixed ones
+    factors: Floats  # (G,) theta of every given group
     matrix: Floats  # (k, k) Helmert matrix of the components at the end
     converged: bool  # Whether q_g = r_g was reached
-    # Of every step the factors it was made from, q and r, (G,) each
+    # For every step, the initial factors, q and r, (G,) each
     steps: list[tuple[Floats, Floats, Floats]]
     messages: list[Phrase]  # merged, fixed and negative components, with reasons
-    # Likelihood ratio of all estimated components being equal, its degrees of freedom and probability; None
-    # for less than two, or where it was not asked for
+    # Likelihood ratio of equality of all estimated components, its degrees of freedom and probability; None
+    # for less than two, or if not requested
     equality: tuple[float, int, float] | None
     level: float  # of all tests together
 
     @property
     def limit(self) -> float:
-        """What the size of a test value of a component exceeds where it is significant."""
+        """Critical value of the absolute test value of a component."""
         free = sum(not each.held for each in self.components)
         return critical_normal(bonferroni(self.level, free))
 
@@ -136,7 +136,7 @@ class Estimate:
 
 
 def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
-    """Return the factors of Helmert's equations for the free components; others do not change."""
+    """Return Helmert factors for the free components, with the others fixed."""
     rows = np.array(free, dtype=np.int64)
     held = np.setdiff1d(np.arange(len(squares)), rows)
     right = squares[rows] - matrix[np.ix_(rows, held)].sum(axis=1)
@@ -144,16 +144,16 @@ def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
 
 
 def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Floats:
-    """Return a Helmert matrix that is symmetric, with rows that sum to the redundancy.
+    """Return a symmetric Helmert matrix whose rows sum to the redundancy.
 
     Parameters
     ----------
     matrix
-        (G, G) columns that are exact or were found with random signs.
+        (G, G) matrix; its columns are exact or were estimated with random signs.
     redundancy
         (G,) r.
     exact
-        (G,) which columns are exact: those stay as they are.
+        (G,) True for exact columns, which are not changed.
     """
     sure = np.asarray(exact, dtype=bool)
     found = np.where(sure[:, np.newaxis] & ~sure, matrix.T, matrix)
@@ -186,21 +186,21 @@ def estimate(
     Parameters
     ----------
     adjust
-        Tells what an adjustment with (G,) components leaves; called first with ones.
+        Function that adjusts with (G,) components; called first with ones.
     groups
         The groups.
     tolerance
-        Stop when no component changes by more than this part of it, or by more than a hundredth of its
-        standard deviation (and a hundred times the tolerance). A last step of Helmert's must then change none
-        by more than a hundred times the tolerance.
+        Relative tolerance. The iteration stops if no component changes by more than it, or by more than a
+        hundredth of its standard deviation (and a hundred times the tolerance). A last Helmert step must then
+        change none by more than a hundred times the tolerance.
     max_steps
-        At the most.
+        Maximum number of steps.
     least_redundancy
-        Of a group whose component is estimated.
+        Least redundancy of a group to be estimated.
     level
-        Of the tests against 1, all together.
+        Joint significance level of the tests against 1.
     equality
-        Whether to test that all are equal, which takes some more adjustments.
+        True to test that all are equal, with some additional adjustments.
     """
     run = _Run(adjust, groups, tolerance, max_steps)
     run.judge(least_redundancy)
@@ -229,7 +229,7 @@ class _Run:
         self.least = LEAST_REDUNDANCY
 
     def judge(self, least: float) -> None:
-        """Merge groups whose component cannot be estimated, and hold what still cannot be."""
+        """Merge groups that cannot be estimated, and fix the remaining weak components."""
         self.least = least
         parents = self.groups.parents or ("",) * len(self.groups.names)
         pools: dict[int, tuple[str, list[int]]] = {}
@@ -254,7 +254,7 @@ class _Run:
         self.units, self.held = units, held
 
     def _pool(self, siblings: list[int], least: float) -> list[int]:
-        """Return those of some groups that are weak, with as many others as they need; none where none is."""
+        """Return the weak groups and as many others as they need; empty without weak groups."""
         pool = [g for g in siblings if self._why([g], least)]
         others = sorted(set(siblings) - set(pool), key=lambda g: float(self.state.redundancy[g]))
         while pool and others and self._why(pool, least):
@@ -262,7 +262,7 @@ class _Run:
         return sorted(pool) if len(pool) > 1 else []
 
     def _why(self, members: list[int], least: float) -> Phrase | None:
-        """Return why a component of some groups cannot be estimated; None if it can."""
+        """Return the reason for not estimating a joint component of groups; None if it can be estimated."""
         r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
         if r < min(REFUSED, least):
             return Phrase("held.unchecked", {"redundancy": r})
@@ -280,7 +280,7 @@ class _Run:
         return np.array([values[members].sum() for _, members in self.units])
 
     def _helmert(self) -> tuple[Floats, Floats]:
-        """Return the matrix of the units and what Helmert's step makes of the free ones."""
+        """Return the matrix of the units and the Helmert factors of the free units."""
         whole = self.state.matrix()
         matrix = np.array(
             [[whole[np.ix_(a, b)].sum() for _, b in self.units] for _, a in self.units]
@@ -294,7 +294,7 @@ class _Run:
         self.state = self.adjust(self.factors)
 
     def iterate(self) -> bool:
-        """Go on until nothing changes; False if a component had to be held on the way."""
+        """Iterate until nothing changes; return False if a component had to be fixed."""
         while True:
             free = self.free
             squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)
@@ -328,7 +328,7 @@ class _Run:
                 return False
 
     def _vanished(self) -> bool:
-        """Hold components that run to zero, and say so."""
+        """Fix components that converge to zero, and report them."""
         low = [unit for unit in self.free if self.factors[self.units[unit][1][0]] < LOWER_BOUND]
         if not low:
             return False
@@ -343,7 +343,7 @@ class _Run:
             fields = {"component": float(component), "sd": float(deviation), "bound": LOWER_BOUND}
             said[unit] = Phrase("components.low", {"name": name, **fields})
             self.factors[members] = 1.0
-        # With its own variance, and the weights that the others have by now, it may hardly be checked at all.
+        # With its own variance, and the current weights of the others, its redundancy may be too small.
         self.state = self.adjust(self.factors)
         for unit in low:
             members = self.units[unit][1]
@@ -356,7 +356,7 @@ class _Run:
         return True
 
     def _inseparable(self) -> int | None:
-        """Return the component that is to be held because the matrix is nearly singular."""
+        """Return the component to fix because the matrix is nearly singular."""
         free = self.free
         block = self.matrix[np.ix_(free, free)]
         scale = np.sqrt(np.diag(block))
@@ -368,16 +368,15 @@ class _Run:
         return min((free[k] for k in rows), key=lambda unit: float(self.matrix[unit].sum()))
 
     def _back(self, unit: int) -> None:
-        """Give a unit its own variance again."""
+        """Restore the given variance of a unit."""
         self.factors[self.units[unit][1]] = 1.0
         self.state = self.adjust(self.factors)
 
     def equality(self) -> tuple[float, int, float] | None:
         """Test whether all free components are equal.
 
-        The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2: twice its
-        difference between the equal components and the estimated ones is the integral of q_g - r_g along
-        the line.
+        The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2. Twice its
+        difference between equal and estimated components is the integral of q_g - r_g along the line.
         """
         free = self.free
         if len(free) < 2 or not self.converged:
@@ -396,7 +395,7 @@ class _Run:
         return ratio, freedom, _photocore.chi_square(ratio, freedom)
 
     def _common(self, members: list[int], factors: Floats) -> float:
-        """Return the logarithm of the component that they have when they have one."""
+        """Return the logarithm of the joint component of some groups."""
         factors = factors.copy()
         factors[members] = 1.0
         for _ in range(self.max_steps):
@@ -408,7 +407,7 @@ class _Run:
         return math.log(factors[members[0]])
 
     def finished(self, level: float, equality: tuple[float, int, float] | None) -> Estimate:
-        """Return what was found."""
+        """Return the estimate."""
         free = self.free
         deviations = np.full(len(self.units), np.nan)
         if free:

@@ -1,18 +1,18 @@
 """Critical values and probabilities of the tests of an adjustment, in one place.
 
-Tests of observations with known standard deviations are chi-square (Baarda 1968); where the unit weight is
-estimated from the same residuals they are F, t or tau (Pope 1976). Probabilities of huge values are handled
-as logarithms: 1e-5000 is still ordered against 1e-4000.
+Tests of observations with known standard deviations are chi-square (Baarda 1968). If the unit weight is
+estimated from the same residuals, they are F, t or tau (Pope 1976). Probabilities of huge values are handled
+as logarithms, so that 1e-5000 is less than 1e-4000.
 
 * tau = w / s of an observation never exceeds the root of the f degrees of freedom: (tau / sqrt f)^2 is Beta
-  (1/2, (f - 1)/2), so its limits follow exactly from those of Student's t with f - 1
-  (Thompson, Ann. Math. Statist. 6, 1935).
+  (1/2, (f - 1)/2), so its limits follow exactly from Student's t with f - 1 (Thompson, Ann. Math. Statist. 6,
+  1935).
 * lambda0 is the noncentrality at which a test of a level is significant with a given power. The B-method
   chooses the levels of tests of several dimensions so that all find the same error with the same power
   (Baarda 1968).
-* Of many tests together: Bonferroni holds the probability that any good observation is rejected whatever the
-  correlations; Benjamini and Hochberg (J. Roy. Statist. Soc. B 57, 1995) hold the share of good ones among
-  those rejected, with tests that are independent.
+* For multiple tests, Bonferroni limits the probability of rejecting any good observation, for any
+  correlations. Benjamini and Hochberg (J. Roy. Statist. Soc. B 57, 1995) limit the share of good observations
+  among the rejected ones, for independent tests.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from photogram.arguments.arrays import probability
 from photogram.errors import InputError
 from photogram.words import phrase
 
-LEVEL = 0.05  # Of the global test, and of all single tests together
+LEVEL = 0.05  # Level of the global test, and of all single tests together
 
 
 def critical_normal(level: float) -> float:
@@ -40,7 +40,7 @@ def critical_normal(level: float) -> float:
 def critical_student(level: float, dof: float) -> float:
     """Return the value that the absolute value of Student's variable exceeds with the level.
 
-    That of the normal distribution where `dof` is infinite; infinite where `dof` is not positive.
+    The normal distribution is used if `dof` is infinite. Infinite if `dof` is not positive.
     """
     if not dof > 0:
         return math.inf
@@ -52,19 +52,19 @@ def critical_student(level: float, dof: float) -> float:
 
 
 def critical_tau(level: float, dof: float) -> float:
-    """Return the value that an internally studentized residual w / s exceeds with the level, on either side.
+    """Return the critical value of an internally studentized residual w / s (two-sided).
 
     Parameters
     ----------
     level
-        Probability.
+        Significance level.
     dof
-        f of the adjustment. Below two there is no test: every |tau| is the root of f.
+        f of the adjustment. Less than two allow no test, because every |tau| is the root of f.
 
     Returns
     -------
-    sqrt(f) t / sqrt(f - 1 + t^2), t that of Student with f - 1; less than the root of f. Infinite below two
-    degrees of freedom.
+    sqrt(f) t / sqrt(f - 1 + t^2), with Student's t for f - 1 degrees of freedom; less than the root of f.
+    Infinite below two degrees of freedom.
     """
     if not dof >= 2:
         return math.inf
@@ -80,7 +80,7 @@ def critical_chi_square(level: float, dof: float) -> float:
 def critical_fisher(level: float, first: float, second: float) -> float:
     """Return the value that Fisher's variable exceeds with the level.
 
-    Chi-square over `first` where `second` is infinite; infinite where `second` is not positive.
+    Chi-square over `first` if `second` is infinite. Infinite if `second` is not positive.
     """
     if not second > 0:
         return math.inf
@@ -95,12 +95,12 @@ def log_chi_square(x: ArrayLike, dof: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     x, dof
-        Values and degrees of freedom, any shapes that go together.
+        Values and degrees of freedom, in shapes that can be broadcast.
 
     Returns
     -------
-    Natural logarithms, finite also where the probability is no number; NaN if there is no degree of
-    freedom, or a value is negative or NaN.
+    Natural logarithms, finite even if the probability underflows; NaN without degrees of freedom, or if a
+    value is negative or NaN.
     """
     both = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(dof, dtype=np.float64))
     return _photocore.log_chi_square(*(np.ravel(each) for each in both)).reshape(both[0].shape)
@@ -122,23 +122,23 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
     Parameters
     ----------
     level
-        Of the test (alpha0).
+        Significance level of the test (alpha0).
     power
         Probability that the error is found (beta0); more than the level.
     dimension
         Degrees of freedom of the tested group.
     dof
-        f of the adjustment where the unit weight is estimated from it: the test is F with `dimension` and
-        f - `dimension`. Infinite if the unit weight is known.
+        f of the adjustment if the unit weight is estimated from it. The test is then F with `dimension` and f
+        - `dimension`. Infinite if the unit weight is known.
 
     Returns
     -------
-    17.0746 for Baarda's choice, the default; infinite if f is no more than the dimension.
+    17.0746 for Baarda's choice, the default; infinite if f does not exceed the dimension.
 
     Raises
     ------
     InputError
-        Level and power are not in their ranges.
+        If level and power are not in their ranges.
     """
     if not 0 < level < power < 1:
         raise InputError(phrase("error.power", level=level, power=power))
@@ -148,27 +148,27 @@ def lambda0(level: float = 0.001, power: float = 0.80, dimension: float = 1, dof
 
 
 def b_method(dimension: float, level: float = 0.001, power: float = 0.80) -> tuple[float, float]:
-    """Return level and chi-square limit of a test that finds what the test of one observation finds.
+    """Return level and chi-square limit of a test that finds the same error as the test of one observation.
 
     Parameters
     ----------
     dimension
-        Degrees of freedom of the test: of a group, or of the global test.
+        Degrees of freedom of the test of a group, or of the global test.
     level, power
-        Of the test of one observation; see :func:`lambda0`.
+        Level and power of the test of one observation; see :func:`lambda0`.
     """
     return _photocore.level_of_equal_power(lambda0(level, power), power, dimension)
 
 
 def bonferroni(level: float, tests: int) -> float:
-    """Return the level of each of so many tests, so that any of them rejects by chance with the level."""
+    """Return the level of each of several tests that limits the probability of any false rejection."""
     return probability("level", level) / max(tests, 1)
 
 
 def benjamini_hochberg(
     probabilities: ArrayLike, level: float = LEVEL, *, dependent: bool = False
 ) -> NDArray[np.bool_]:
-    """Return which tests are rejected so that among them the expected share of good ones is the level.
+    """Return the rejected tests with a limited expected share of good ones (false discovery rate).
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def benjamini_hochberg(
     level
         False discovery rate.
     dependent
-        Hold it under any dependence between the tests, too (Benjamini and Yekutieli 2001).
+        True to limit it under any dependence between the tests (Benjamini and Yekutieli 2001).
     """
     p = np.asarray(probabilities, dtype=np.float64)
     order = np.argsort(p, kind="stable")  # NaN last

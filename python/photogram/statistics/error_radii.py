@@ -1,20 +1,18 @@
-"""Radii within which errors lie with a probability: linear (LE), circular (CE) and spherical (SE).
+"""Radii that errors do not exceed with a probability: linear (LE), circular (CE) and spherical (SE).
 
-*From a covariance* they follow by integrals of the normal distribution; *from a sample* they are order
-statistics. A bias is part of the matrix of mean products, `sum d d' / n`, of which a radius is one *from
-moments*; that of the covariances that an adjustment predicts holds for the mean of their points.
+*From a covariance*, radii are integrals of the normal distribution; *from a sample*, they are order
+statistics. A radius *from moments* uses the matrix of mean products, `sum d d' / n`, which includes a bias. A
+radius from predicted covariances refers to the mean of their points.
 
+An error with the principal standard deviations a >= b and the mean m does not exceed R with the probability
 
-An error with the principal standard deviations a >= b and the mean m is no longer than R with the probability
+    P(R) = integral of n(y; m2, b) [Phi((w - m1)/a) + Phi((w + m1)/a) - 1] dy over |y| < R,  w^2 = R^2 - y^2.
 
-    P(R) = integral of n(y; m2, b) [Phi((w - m1)/a) + Phi((w + m1)/a) - 1] dy over |y| < R,  w^2 = R^2 - y^2,
-
-and in space with that of the circle of radius w in place of the bracket, y being along the least of the axes.
-With y = R sin t the integrand is smooth up to its end. Where w is beyond the reach of the bracket that is 1;
-what is left goes over a few standard deviations of y whatever the ratio of the axes, so that few nodes of
-Gauss and Legendre do, also for axes without error, and for means of many standard deviations. dP/dR is the
-same integral, over t, of R n(y; m2, b) and the derivative of the bracket by w. P(R) = p is solved for all
-points at once, by Newton's method between bounds.
+In space, the probability of the circle of radius w replaces the bracket, with y along the shortest axis. With
+y = R sin t the integrand is smooth up to its end. The bracket is 1 for large w. The remaining interval has a
+few standard deviations of y for any ratio of the axes. So few Gauss-Legendre nodes suffice, also for axes
+without error and for large means. dP/dR is the same integral, over t, of R n(y; m2, b) and the derivative of
+the bracket by w. P(R) = p is solved for all points together, by Newton's method between bounds.
 """
 
 from __future__ import annotations
@@ -37,12 +35,12 @@ INDEFINITE = 1e-9  # Largest negative variance or asymmetry by rounding, as a pa
 
 
 def linear_error(sd: ArrayLike, probability: float) -> Floats:
-    """Return what the size of a normal error does not exceed with a probability: LE90 is 1.6449 sd.
+    """Return the bound of the absolute value of a normal error for a probability: LE90 is 1.6449 sd.
 
     Parameters
     ----------
     sd
-        (n,) standard deviations, in any unit; NaN where one is not known.
+        (n,) standard deviations, in any unit; NaN if unknown.
     probability
         Between 0 and 1.
 
@@ -53,22 +51,22 @@ def linear_error(sd: ArrayLike, probability: float) -> Floats:
     Raises
     ------
     InputError
-        What is no such array, a negative standard deviation, another probability.
+        If `sd` is not such an array, a standard deviation is negative, or the probability is invalid.
     """
     return critical_normal(1 - checked_probability("probability", probability)) * _deviations(sd)
 
 
 def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLike | None = None) -> Floats:
-    """Return the radii of the circles that hold errors in the plane with a probability (CE90, CE95).
+    """Return the radii of the circles that contain errors in the plane with a probability (CE90, CE95).
 
     Parameters
     ----------
     covariances
-        (n, 2, 2), possibly singular; an error that is not known is NaN.
+        (n, 2, 2), possibly singular; NaN if unknown.
     probability
         Between 0 and 1.
     offsets
-        (n, 2) means of the errors; zero if it is not given.
+        (n, 2) means of the errors; default zero.
 
     Returns
     -------
@@ -77,85 +75,85 @@ def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLik
     Raises
     ------
     InputError
-        Arrays of other shapes, a matrix that is no covariance (with its row), another probability.
+        If shapes differ, a matrix is not a covariance (named with its row), or the probability is invalid.
     """
     return _radii(*_principal(covariances, offsets, 2), checked_probability("probability", probability))
 
 
 def spherical_error(covariances: ArrayLike, probability: float) -> Floats:
-    """Return the radii of the spheres that hold errors in space with a probability (SE90).
+    """Return the radii of the spheres that contain errors in space with a probability (SE90).
 
     Parameters
     ----------
     covariances
-        (n, 3, 3), as those of :func:`circular_error`.
+        (n, 3, 3), as in :func:`circular_error`.
     probability
         Between 0 and 1.
 
     Returns
     -------
     (n,)
-        As those of :func:`circular_error`.
+        As in :func:`circular_error`.
 
     Raises
     ------
     InputError
-        As of :func:`circular_error`.
+        As in :func:`circular_error`.
     """
     return _radii(*_principal(covariances, None, 3), checked_probability("probability", probability))
 
 
 def mixture_circular(covariances: ArrayLike, probability: float) -> float:
-    """Return the radius that holds the error of a point taken at random among some, in the plane.
+    """Return the radius that contains the error in the plane of a point drawn at random.
 
     Parameters
     ----------
     covariances
         (n, 2, 2) of the points.
     probability
-        The mean of those of the points.
+        Mean of the probabilities of the points.
 
     Returns
     -------
-    In the unit of the standard deviations; NaN where one is not known, or there is no point.
+    In the unit of the standard deviations; NaN if one is unknown, or without points.
 
     Raises
     ------
     InputError
-        As of :func:`circular_error`.
+        As in :func:`circular_error`.
     """
     return _mixture(_principal(covariances, None, 2)[0], checked_probability("probability", probability))
 
 
 def mixture_linear(sd: ArrayLike, probability: float) -> float:
-    """Return what the size of the error of a point taken at random does not exceed with a probability.
+    """Return the bound of the absolute error of a point drawn at random for a probability.
 
     Parameters
     ----------
     sd
         (n,) standard deviations of the points.
     probability
-        The mean of those of the points.
+        Mean of the probabilities of the points.
 
     Returns
     -------
-    In the unit of the standard deviations; NaN where one is not known, or there is no point.
+    In the unit of the standard deviations; NaN if one is unknown, or without points.
 
     Raises
     ------
     InputError
-        As of :func:`linear_error`.
+        As in :func:`linear_error`.
     """
     return _mixture(_deviations(sd)[:, np.newaxis], checked_probability("probability", probability))
 
 
 def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
-    """Return the order statistic that holds a share of the sizes of errors, without interpolation.
+    """Return the order statistic that bounds a share of the sizes of errors, without interpolation.
 
     Parameters
     ----------
     values
-        (n,) errors or their lengths: their sizes count.
+        (n,) errors or their lengths; absolute values are used.
     probability
         p, between 0 and 1.
 
@@ -166,20 +164,20 @@ def sample_radius(values: ArrayLike, probability: float) -> tuple[int, float]:
     Raises
     ------
     InputError
-        No values, one that is not finite, another probability.
+        If `values` is empty, a value is not finite, or the probability is invalid.
     """
     sizes = np.abs(numbers("values", values))
     if sizes.ndim != 1 or not sizes.size or not np.isfinite(sizes).all():
         raise argument_error("values", "kind", kind="a list of finite numbers", value=value_field(values))
-    # The product of decimal fractions may be larger than a whole number by rounding: 0.07 of 100.
+    # The product of decimal fractions may exceed a whole number by rounding: 0.07 of 100.
     order = max(math.ceil(checked_probability("probability", probability) * sizes.size - 1e-9), 1)
     return order, float(np.partition(sizes, order - 1)[order - 1])
 
 
 def upper_order(count: int, probability: float, confidence: float = 0.95) -> int | None:
-    """Return the order statistic that is not less than a quantile with a confidence.
+    """Return the order statistic that is an upper bound of a quantile with a confidence.
 
-    The values are taken as independent.
+    The values are assumed to be independent.
 
     Parameters
     ----------
@@ -188,16 +186,16 @@ def upper_order(count: int, probability: float, confidence: float = 0.95) -> int
     probability
         p of the quantile.
     confidence
-        That of the bound.
+        Confidence of the bound.
 
     Returns
     -------
-    The smallest k, from 1, with BinomialCDF(k - 1; n, p) at least the confidence; None where n is too small.
+    The smallest k, from 1, with BinomialCDF(k - 1; n, p) at least the confidence; None if n is too small.
 
     Raises
     ------
     InputError
-        A negative count, or what is no probability.
+        If the count is negative, or a probability is invalid.
     """
     p = checked_probability("probability", probability)
     if count < 0:
@@ -210,7 +208,6 @@ def upper_order(count: int, probability: float, confidence: float = 0.95) -> int
 
 
 def _deviations(sd: ArrayLike) -> Floats:
-    """Return (n,) standard deviations."""
     found = numbers("sd", sd, missing=True)
     if found.ndim != 1:
         raise argument_error("sd", "shape", shape="(n,)", actual=found.shape)
@@ -221,7 +218,7 @@ def _deviations(sd: ArrayLike) -> Floats:
 
 
 def _principal(covariances: ArrayLike, offsets: ArrayLike | None, size: int) -> tuple[Floats, Floats]:
-    """Return (n, k) standard deviations along the principal axes, the largest first, and means along them."""
+    """Return (n, k) standard deviations along the principal axes, largest first, and means along them."""
     given = numbers("covariances", covariances, missing=True)
     if given.ndim != 3 or given.shape[1:] != (size, size):
         raise argument_error("covariances", "shape", shape=f"(n, {size}, {size})", actual=given.shape)
@@ -244,15 +241,16 @@ REACH = 8.6  # In standard deviations; the probability beyond is less than the r
 CENTRED_NODES = 24  # For an integral over at most `REACH` standard deviations, accurate to 1e-12
 NODES = 40  # For an integral over twice as many
 LEAST_RATIO = 1e-7
-"""Of an axis to the largest. One without error counts as that long: from a probability of 0.01 no radius
-changes by 1e-10 of it."""
+"""Least ratio of an axis to the largest; shorter axes are lengthened.
+
+For probabilities above 0.01, this changes radii by less than 1e-10 of them."""
 STEPS = 100
 CONVERGED = 1e-11  # Largest relative size of the last step of a radius
 
 
 def _radii(sds: Floats, means: Floats, probability: float) -> Floats:
-    """Solve for the radii of errors with (n, k) principal standard deviations and means."""
-    # That of an error that is the same each time.
+    """Return the radii of errors with (n, k) principal standard deviations and means."""
+    # Radius of a constant error.
     found: Floats = np.linalg.norm(means, axis=1) + 0 * sds[:, 0]
     some = sds[:, 0] > 0
     scale = sds[some, :1]
@@ -264,11 +262,11 @@ def _radii(sds: Floats, means: Floats, probability: float) -> Floats:
 
 
 def _mixture(sds: Floats, probability: float) -> float:
-    """Solve for the radius that has the probability in the mean of points: (n, k) standard deviations."""
+    """Return the radius with a mean probability over points: (n, k) standard deviations."""
     if not len(sds) or not np.isfinite(sds).all():
         return math.nan
     moving = sds[:, 0] > 0
-    needed = probability * len(sds) - np.count_nonzero(~moving)  # those without error are within any circle
+    needed = probability * len(sds) - np.count_nonzero(~moving)  # points without error are inside any circle
     if needed <= 0:
         return 0.0
     scale = sds[moving, 0]
@@ -284,14 +282,14 @@ def _mixture(sds: Floats, probability: float) -> float:
 
 
 def _widest(probability: float, size: int) -> float:
-    """Return the radius for axes that all are 1: none is larger where the largest is."""
+    """Return the radius if all axes are 1, which is an upper bound if the largest axis is 1."""
     return math.sqrt(_photocore.chi_square_quantile(probability, size, upper=False))
 
 
 def _approximate(sds: Floats, means: Floats, probability: float) -> Floats:
     """Return (n,) radii as if their squares were chi-square of the same mean and variance (Satterthwaite).
 
-    Its quantile is that of Wilson and Hilferty.
+    The quantile is approximated by Wilson and Hilferty.
     """
     size = (sds**2 + means**2).sum(axis=1)
     spread = 2 / 9 * (sds**4 + 2 * (sds * means) ** 2).sum(axis=1) / size**2
@@ -302,7 +300,7 @@ def _approximate(sds: Floats, means: Floats, probability: float) -> Floats:
 def _solved(
     function: Callable[[Floats], tuple[Floats, Floats]], starts: Floats, bounds: Floats, probability: float
 ) -> Floats:
-    """Return where growing functions, each told with its derivative, have a value, between 0 and bounds."""
+    """Solve increasing functions, each returned with its derivative, between 0 and bounds."""
     low, high, trial = np.zeros_like(bounds), bounds, starts
     for _ in range(STEPS if bounds.size else 0):
         inside, density = function(trial)
@@ -318,9 +316,9 @@ def _solved(
 
 
 def _within(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats]:
-    """Return the probabilities of errors that are no longer than lengths, and their derivatives by these.
+    """Return the probabilities of errors not exceeding lengths, and their derivatives.
 
-    Arrays go together: (...) lengths, (..., k) standard deviations, the largest first, and means.
+    Arrays are broadcast: (...) lengths, (..., k) standard deviations, largest first, and means.
     """
     if sds.shape[-1] == 1:
         low, high = (lengths - means[..., 0]) / sds[..., 0], (lengths + means[..., 0]) / sds[..., 0]
@@ -339,7 +337,7 @@ def _within(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats
 
 
 def _window(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the y up to which the bracket is 1, and where t starts, and how far it goes, beyond."""
+    """Return the y up to which the bracket is 1, and beyond it the start and length of t."""
     a, b, mean = sds[..., 0], sds[..., -1], np.abs(means[..., -1])
     rest = np.linalg.norm(means[..., :-1], axis=-1)
     whole = _leg(lengths, rest + REACH * a)
@@ -352,13 +350,12 @@ def _window(lengths: Floats, sds: Floats, means: Floats) -> tuple[Floats, Floats
 
 @cache
 def _rule(count: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights of Gauss and Legendre between 0 and 1."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return (nodes + 1) / 2, weights / 2
 
 
 def _leg(hypotenuse: Floats, other: Floats) -> Floats:
-    """Return the other leg of right triangles; 0 if there is none."""
+    """Return the other leg of right triangles; 0 if imaginary."""
     return np.asarray(np.sqrt(np.maximum((hypotenuse - other) * (hypotenuse + other), 0.0)))
 
 

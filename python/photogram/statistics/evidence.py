@@ -1,4 +1,4 @@
-"""What the conditions of a verdict ask of the findings: limits, what lies beyond them, and by how much."""
+"""Quantities for the conditions of a verdict: critical values, exceedances and their sizes."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ FEW = 5  # With fewer degrees of freedom tests detect large disagreement only
 ENOUGH = 20  # Smallest number of test values for a median
 
 EXPLAINED, SINGLE = 0.8, 0.2
-"""Of what residuals are too large by: what a lens explains at least, and one observation at most."""
+"""Parts of the excess of the sum of squares: least part of a lens, largest part of one observation."""
 
-WITHHELD = 0.001  # Significance level of check points that forbid the use
+WITHHELD = 0.001  # Significance level of check points that forbid the use of the result
 
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
 GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
-"""Logarithm of the probability, kind, and place of an observation whose test rejects."""
+"""Logarithm of the probability, observation type, and index of a rejected test."""
 
 
 @dataclass(frozen=True)
@@ -44,33 +44,33 @@ class Test:
 
     kind: Text  # type of the tested observations
     subject: Text
-    statistic: str  # What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
+    statistic: str  # Its symbol: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
     distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
-    # What it may be at least and at most; None if there is no such side
+    # Lower and upper limit; None without such a limit
     limits: tuple[float | None, float | None]
-    # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
+    # p-value; `log10_p` for values that underflow
     p: float
     log10_p: float  # Its decimal logarithm
-    level: float  # What p is compared with
-    tests: int  # Among so many tests: the level is a share of that of all together (Bonferroni)
+    level: float  # Level that p is compared with
+    tests: int  # Number of tests: the level is a part of their joint level (Bonferroni)
     accepted: bool  # Whether p is no less than the level
 
     @property
     def name(self) -> str:
-        """What is tested, in English."""
+        """Name of the tested observations, in English."""
         return f"{self.kind}: {self.subject}" if self.subject else str(self.kind)
 
     def document(self) -> dict[str, Any]:
-        """Return the test as JSON documents have it."""
+        """Return the members of the test in JSON documents."""
         own = asdict(self)
         del own["kind"], own["subject"]
         return {"name": self.name, **own}
 
 
 class Evidence:
-    """What the conditions ask of the findings."""
+    """Conditions of the rules, evaluated from the findings."""
 
     def __init__(self, found: Findings) -> None:
         self.found = found
@@ -79,7 +79,7 @@ class Evidence:
 
     @cached_property
     def number(self) -> int:
-        """How many single tests there are."""
+        """Number of single tests."""
         return sum(self._count(each) for each in self.found.observations)
 
     @staticmethod
@@ -88,7 +88,7 @@ class Evidence:
 
     @cached_property
     def level(self) -> float:
-        """Of each single test."""
+        """Level of each single test."""
         return bonferroni(self.found.level, self.number)
 
     @cached_property
@@ -108,13 +108,13 @@ class Evidence:
 
     @cached_property
     def robust(self) -> float | None:
-        """The factor of the median test value, unharmed by a quarter of gross errors; None of few."""
+        """The factor of the median test value, not affected by a quarter of gross errors; None for few."""
         values = [_relative(each) for each in self.found.observations if each.statistic in "wT"]
         together = np.concatenate(values) if values else np.zeros(0)
         return float(np.median(together)) if together.size >= ENOUGH else None
 
     def beyond(self, factor: float = 1.0) -> list[Beyond]:
-        """Return tests beyond their limit, had all standard deviations been larger by the factor, by p."""
+        """Return rejected tests for standard deviations multiplied by a factor, in the order of p."""
         found: list[tuple[float, int, tuple[int, ...], Tested]] = []
         for order, each in enumerate(self.found.observations):
             found += [(log_p, order, place, each) for log_p, place in each.beyond(self.level, factor)]
@@ -123,19 +123,20 @@ class Evidence:
 
     @cached_property
     def single(self) -> list[Beyond]:
-        """Tests beyond their limit as the standard deviations are given."""
+        """Rejected tests for the given standard deviations."""
         return self.beyond()
 
     @property
     def outlying(self) -> list[Beyond]:
-        """The outliers of the judgement: tests beyond their limits.
+        """Outliers of the assessment: tests beyond their critical values.
 
-        Limits consider a common factor of all standard deviations if it matters or gross errors are named.
+        Critical values include a common factor of all standard deviations if it is notable or gross errors
+        are named.
         """
         return self.gross if self.high or "gross-errors" in self.codes else self.single
 
     def places(self) -> dict[Text, list[tuple[int, ...]]]:
-        """Return the places of the outliers by kind: rows of observations, and components of single ones."""
+        """Return the indices of the outliers by type: rows of observations, and components of single ones."""
         found: dict[Text, list[tuple[int, ...]]] = {}
         for _, each, place in self.outlying:
             own = place if each.rows is None else (int(each.rows[place[0]]),)
@@ -143,7 +144,7 @@ class Evidence:
         return found
 
     def outliers(self) -> list[Phrase]:
-        """Return for each kind of observations with outliers how many these are, and the worst."""
+        """Return for each observation type with outliers their number and the worst."""
         factor = self.factor_of_limits if self.outlying is self.gross else 1.0
         counts = {kind: len(places) for kind, places in self.places().items()}
         worst = {each.kind: (each, place) for _, each, place in reversed(self.outlying)}
@@ -167,14 +168,14 @@ class Evidence:
 
     @cached_property
     def factor_of_limits(self) -> float:
-        """The common factor of all standard deviations beside which gross errors are tested."""
+        """The common factor of all standard deviations in tests of gross errors."""
         return self._common(self.robust) if self.rejected and self.single and self.robust is not None else 1.0
 
     @cached_property
     def gross(self) -> list[Beyond]:
-        """Tests beyond their limit beside a common factor of all standard deviations.
+        """Rejected tests after a common scaling of all standard deviations.
 
-        Of few observations the factor is that of the others: the externally studentized test.
+        With few observations, the factor is estimated from the others (externally studentized test).
         """
         if not self.rejected or not self.single:
             return self.single
@@ -187,16 +188,16 @@ class Evidence:
         return Evidence(replace(self.found, observations=studentized)).beyond()
 
     def _common(self, robust: float) -> float:
-        """Return the common factor of all standard deviations beside which observations are tested.
+        """Return the common factor of all standard deviations for the tests of observations.
 
-        Where the median says that there is one, and all residuals together say about the same, these decide:
-        the median of a few hundred may be off by a tenth.
+        If the median indicates a factor, and all residuals indicate nearly the same, the factor of all
+        residuals is used. The median of a few hundred may be wrong by a tenth.
         """
         alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
         return self.factor if alike else max(robust, 1.0)
 
     def disagreement(self, level: float) -> list[Phrase]:
-        """Return check points that disagree at a level, or all together; empty if none does."""
+        """Return check points that disagree at a level, singly or together; empty without disagreement."""
         checks = self.found.checks
         if checks is None:
             return []
@@ -215,10 +216,10 @@ class Evidence:
 
     @cached_property
     def lens(self) -> bool:
-        """Whether a lens explains nearly all that is too much, and no single observation much of it.
+        """Whether a lens explains nearly all of the excess, and no single observation much of it.
 
-        Then no gross error is seen, but what a wrong lens does to good observations. Huge errors of a few
-        bend all residuals, and what they leave looks like a lens, too.
+        Then the residuals are caused by a wrong lens, not by gross errors. But a few huge errors distort all
+        residuals, and the distortion resembles a lens as well.
         """
         fall, single = self._falls
         if not fall or not self.high or self.test is None or self.found.exchanged:
@@ -228,13 +229,13 @@ class Evidence:
 
     @property
     def lens_first(self) -> bool:
-        """Whether a lens explains more of what is too much than any single observation."""
+        """Whether a lens explains more of the excess than any single observation."""
         fall, single = self._falls
         return fall > single and not self.found.exchanged
 
     @cached_property
     def _falls(self) -> tuple[float, float]:
-        """By how much the weighted sum of squares would fall with a lens, and without one observation."""
+        """Decreases of the weighted sum of squares with a lens, and without one observation."""
         return (
             max(
                 (each.fall for each in self.found.systematic if each.significant and each.large), default=0.0
@@ -244,7 +245,7 @@ class Evidence:
 
     @cached_property
     def factor(self) -> float:
-        """By how much residuals are larger than expected; NaN if that is not known."""
+        """The factor of residuals relative to the expected ones; NaN if unknown."""
         return self.test.factor if self.test is not None else math.nan
 
     def interval(self) -> Phrase:
@@ -253,13 +254,13 @@ class Evidence:
         return factor_of(self.test)
 
     def named(self, tests: list[Beyond]) -> list[Phrase]:
-        """Name tests, with their values."""
+        """Return the names of tests with their values."""
         return [
             part_of(each.name(place), each.statistic, float(each.values[place])) for _, each, place in tests
         ]
 
     def remarks(self) -> list[Text]:
-        """Return lines on every adjustment: size of the factor, few degrees of freedom, no test."""
+        """Return remarks: size of the factor, few degrees of freedom, missing tests."""
         lines: list[Text] = self._statistics()
         test = self.test
         rejected = test is not None and (test.rejected_low or (test.rejected_high and not self.gross))
@@ -274,7 +275,7 @@ class Evidence:
         return lines
 
     def _statistics(self) -> list[Text]:
-        """Return the tests that decide on single observations."""
+        """Return the tests that decide about single observations."""
         if not self.found.computed:
             return [Phrase("line.no-redundancy")]
         if not self.number or self.found.degrees_of_freedom < 1:
@@ -289,7 +290,7 @@ class Evidence:
         return [Phrase("line.tests", fields)]
 
     def tests(self) -> list[Test]:
-        """Return the global test, the largest of every kind of observations, and those of patterns."""
+        """Return the global test, the largest of every observation type, and tests of patterns."""
         whole = [] if self.test is None else [_whole(self.test)]
         largest = [_largest(each, self.level, self.number) for each in self.found.observations]
         if (checks := self.found.checks) is not None:
@@ -304,7 +305,7 @@ class Evidence:
 
 
 def part_of(name: Text, statistic: str, value: float) -> Phrase:
-    """Return a test in a sentence."""
+    """Return the message on a test."""
     return Phrase("part.test", {"name": name, "statistic": statistic, "value": value})
 
 
@@ -315,13 +316,13 @@ def factor_of(test: GlobalTest) -> Phrase:
 
 
 def _as_fall(tested: Tested, place: tuple[int, ...]) -> float:
-    """Return by how much the weighted sum of squares would fall without an observation; 0 of t and F."""
+    """Return the decrease of the weighted sum of squares without an observation; 0 of t and F."""
     value = float(tested.values[place])
     return {"w": value**2, "T": value}.get(tested.statistic, 0.0)
 
 
 def _relative(tested: Tested) -> Floats:
-    """Return test values over the median of their distribution, as factors of standard deviations."""
+    """Return test values divided by the median of their distribution, as factors of standard deviations."""
     values = tested.values[~np.isnan(tested.values)]
     if tested.statistic == "w":
         return np.asarray(np.abs(values) / MEDIAN)
@@ -386,13 +387,12 @@ def _log10(p: float) -> float:
 
 
 def _largest(tested: Tested, level: float, number: int) -> Test | None:
-    """Return the test of the kind with the least probability; None if nothing is tested."""
+    """Return the least probable test of a type; None if nothing is tested."""
     place = tested.largest()
     return None if place is None else _test_at(tested, place, level, number)
 
 
 def _test_at(tested: Tested, place: tuple[int, ...], level: float, number: int) -> Test:
-    """Return the test at a place of a kind."""
     one = tested.at(place)
     dimension, second = float(np.asarray(one.dimension)[0]), float(np.asarray(one.second)[0])
     least = float(one.log_probability()[0])

@@ -1,6 +1,6 @@
-"""What the verdict on an adjustment rests on: tests of observations, kind by kind, and what else is known.
+"""Findings for the verdict on an adjustment: tests of observations by type, and other information.
 
-Every program fills in the same :class:`Findings`; :func:`photogram.statistics.verdict.verdict` judges them.
+Every program provides the same :class:`Findings`; :func:`photogram.statistics.verdict.verdict` assesses them.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.words import Phrase
 
 Text = str | Phrase
-"""A message or a name: a code with fields, or a text of a user or of a program that has no code for it."""
+"""A message or a name: a code with fields, or a text without code."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tested:
     """Tests of the observations of one type: of single components, or of groups that may err together."""
 
-    kind: Text  # What they are, in the plural
+    kind: Text  # Observation type, in the plural
     values: Floats  # Test values in any shape; NaN if nothing is tested
     name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
     # `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with `dimension`)
@@ -54,7 +54,7 @@ class Tested:
         )
 
     def largest(self) -> tuple[int, ...] | None:
-        """Return the place of the least probable value, the first of equal ones; None without values."""
+        """Return the index of the least probable value, the first of equal ones; None without values."""
         sizes = np.abs(self.values) if self._alike else -self.log_probability()
         sizes = np.where(np.isnan(sizes), -math.inf, sizes)
         if not sizes.size or sizes.max() == -math.inf:
@@ -62,9 +62,9 @@ class Tested:
         return tuple(int(each) for each in np.unravel_index(int(sizes.argmax()), sizes.shape))
 
     def beyond(self, level: float, factor: float = 1.0) -> list[tuple[float, tuple[int, ...]]]:
-        """Return logarithms of p-values below the level, and where they are; see :meth:`log_probability`."""
+        """Return logarithms of p-values below the level with their indices; see :meth:`log_probability`."""
         if self._alike:
-            # All have one limit: only what is beyond it needs its probability.
+            # All have one limit: only values beyond it need a probability.
             dimension, second = float(np.asarray(self.dimension)), float(np.asarray(self.second))
             limit = math.sqrt(critical_fisher(level, dimension, second) * dimension)
             scale = factor if math.isinf(second) else 1.0
@@ -83,9 +83,9 @@ class Tested:
         return self.statistic in "wt" and np.ndim(self.dimension) == 0 and np.ndim(self.second) == 0
 
     def log_probability(self, factor: float = 1.0) -> Floats:
-        """Return logarithms of p-values, had all standard deviations been larger by the factor.
+        """Return logarithms of p-values for standard deviations multiplied by a factor.
 
-        The factor takes no part in t and F, which have their unit weight from the residuals.
+        The factor does not affect t and F, whose unit weight is estimated from the residuals.
         """
         return self._as_given if factor == 1.0 else self._log_probability(factor)
 
@@ -119,17 +119,17 @@ class Tested:
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """How n points with known values agree with an adjustment that they took no part in."""
+    """Agreement of n points of known values with an adjustment that did not use them."""
 
-    points: Tested  # The test of each point by itself, T_i = d_i' C_ii^-1 d_i
-    # The test of all with their cross covariances; None without these, or without points
+    points: Tested  # Separate test of each point, T_i = d_i' C_ii^-1 d_i
+    # Joint test of all points with cross covariances; None without these, or without points
     together: GlobalTest | None
     sd: Floats  # (n, k) standard deviations of the differences: roots of C_ii
-    # Fields of how far the point at a place is off, given its (k,) standard deviations
+    # Fields of the difference of the point at an index, given its (k,) standard deviations
     apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
-        """Return the name of the point at a place, and how far it is off."""
+        """Return the name of the point at an index, and its difference."""
         fields = self.apart(place, self.sd[place[0]])
         return Phrase("part.check", {"name": self.points.name(place), **fields})
 
@@ -138,8 +138,8 @@ class Agreement:
 class Systematic:
     """A test of the pattern of residuals."""
 
-    kind: Text  # what is tested
-    sentence: Text  # result of the test: what, how large, effect
+    kind: Text  # observation type
+    sentence: Text  # result of the test: pattern, size, effect
     statistic: str
     distribution: str
     dof: tuple[float, ...]
@@ -148,7 +148,7 @@ class Systematic:
     level: float
     # Whether the pattern is large enough to matter: with a small probability the model is likely wrong
     large: bool = False
-    # By how much the weighted sum of squares would fall without it, where that was asked for
+    # Decrease of the weighted sum of squares with the pattern, if requested
     fall: float = 0.0
     subject: Text = ""
 
@@ -163,49 +163,49 @@ class GroupFactor:
     """The estimated variance component of a group of observations."""
 
     group: Text
-    factor: float  # By which its standard deviations are too small: the root of the component
+    factor: float  # Required factor of the standard deviations: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
-    significant: bool  # Whether it differs from 1, and by enough to change weights
+    significant: bool  # Whether it differs significantly from 1, and by enough to affect weights
 
 
 @dataclass(frozen=True)
 class Removed:
-    """What data snooping has taken out."""
+    """Result of data snooping."""
 
     # Removed observations in order: name and other members of the log
     removed: Sequence[Mapping[str, Any]]
-    images: float = 0.0  # shares of removed images and control
+    images: float = 0.0  # shares of removed image observations and control
     control: float = 0.0
-    rivals: Sequence[Text] = ()  # observations that cannot be distinguished from these
+    rivals: Sequence[Text] = ()  # observations that are inseparable from these
     exchanged: Sequence[Text] = ()  # exchanged names among them
     kept: Sequence[Text] = ()  # suspects that were not removed, with the reason
 
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """All that the verdict on an adjustment rests on."""
+    """Information for the verdict on an adjustment."""
 
-    status: str  # `converged`, or what else came of the iteration
-    observations: Sequence[Tested]  # Tests of single observations or groups of every kind
+    status: str  # `converged`, or another end of the iteration
+    observations: Sequence[Tested]  # Tests of single observations or groups of every type
     degrees_of_freedom: float  # f
-    global_test: GlobalTest | None = None  # Of all residuals; None if there is none
-    untested: Text = Phrase("untested.weight")  # Why there is no global test
+    global_test: GlobalTest | None = None  # Test of all residuals; None if not possible
+    untested: Text = Phrase("untested.weight")  # Reason for a missing global test
     undetermined: Sequence[Text] = ()  # Unknowns that the observations do not determine, or hardly
     duplicates: Sequence[Text] = ()  # Photos and points that were entered twice
     hints: Sequence[Text] = ()  # Accepted hypotheses on mistakes in the data
     exchanged: Sequence[Text] = ()  # Names that are probably exchanged
     shortfall: Phrase | None = None  # A required accuracy that the result misses
-    spoiled: Text = ""  # Why gross errors make the result unusable, if the program has found that itself
+    spoiled: Text = ""  # Reason why gross errors make the result unusable, if the program determined it
     doubtful: Sequence[Text] = ()  # Stars: exposures whose identification is doubtful or rejected
-    # How known values that took no part agree with the result; None if there are none, or untested
+    # Agreement of independent known values with the result; None if missing or untested
     checks: Agreement | None = None
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
-    # Errors that would remain undetected and move many points, the worst first
+    # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None
-    # What a start has taken out and does not fit the adjusted network either; None for nothing
+    # Observations rejected by initial orientation that do not fit the adjusted network; None without any
     set_aside: Removed | None = None
     # Whether all photos are fixed, so that their errors are in all residuals
     intersected: bool = False

@@ -1,4 +1,4 @@
-"""Small linear fits with any covariance: whitened, by QR on scaled columns; never by normal equations.
+"""Small linear fits with any covariance: whitened, by QR on scaled columns, without normal equations.
 
 Values x with the covariance S = L L' are fitted by x = A p + v. With A~ = L^-1 A = B U, B'B = I,
 
@@ -34,9 +34,9 @@ class Fit:
         Raises
         ------
         InputError
-            The covariance is not positive definite.
+            If the covariance is not positive definite.
         numpy.linalg.LinAlgError
-            The columns depend on each other.
+            If the columns are linearly dependent.
         """
         scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         try:
@@ -68,7 +68,7 @@ class Fit:
 
     @property
     def standardized(self) -> Floats:
-        """(n,) (W v)_i / sqrt((W Q_vv W)_ii), W = S^-1: Baarda's w; NaN of what nothing checks."""
+        """(n,) Baarda's w, (W v)_i / sqrt((W Q_vv W)_ii), W = S^-1; NaN without redundancy."""
         back = np.linalg.inv(self.root).T
         left = back - (back @ self.basis) @ self.basis.T
         variances = (left**2).sum(axis=1)
@@ -77,7 +77,7 @@ class Fit:
         return np.asarray(back @ self.whitened / np.sqrt(variances))
 
     def tested(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Return sizes of more columns, one at a time, and their standard deviations; NaN of blind ones."""
+        """Return estimates of additional columns, one at a time, with sd; NaN if inestimable."""
         z = np.linalg.solve(self.root, columns)
         left = z - self.basis @ (self.basis.T @ z)
         squares = (left**2).sum(axis=0)

@@ -1,9 +1,9 @@
-"""Degrees of freedom of what is made of several variances, and the intervals and factors that follow.
+"""Degrees of freedom of combined variances, and the resulting intervals and factors.
 
-A sum of squares of correlated errors with the covariance C has the mean tr C and the variance 2 tr C^2: near
-enough it is chi-square with k = (tr C)^2 / tr C^2 degrees of freedom, fewer than there are errors
-(Satterthwaite 1946, Welch 1947). The variance u^2 of a quantity is a sum of parts of groups of observations,
-of which some were given and others estimated, with components of variance that have a covariance.
+A sum of squares of correlated errors with the covariance C has the mean tr C and the variance 2 tr C^2. It is
+approximately chi-square with k = (tr C)^2 / tr C^2 degrees of freedom, fewer than the number of errors
+(Satterthwaite 1946, Welch 1947). The variance u^2 of a quantity is the sum of contributions of observation
+groups. Some of these are given; others are estimated with variance components that have a covariance.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from photogram.statistics.distributions import LEVEL, critical_student
 from photogram.words import phrase
 
 ROUNDING = 1e-9
-"""Of a number of degrees of freedom that is whole but for rounding, and of traces, in their size."""
+"""Rounding tolerance of integer degrees of freedom, and relative tolerance of traces."""
 
 
 def effective_freedom(covariance: ArrayLike) -> float:
@@ -31,16 +31,16 @@ def effective_freedom(covariance: ArrayLike) -> float:
     Parameters
     ----------
     covariance
-        (m, m) of the errors, of one unit; possibly singular.
+        (m, m) of errors in the same unit; possibly singular.
 
     Returns
     -------
-    Between 1 and m; NaN if there is no error, or one is not known.
+    Between 1 and m; NaN without error, or if one is unknown.
 
     Raises
     ------
     InputError
-        No square matrix of numbers, or one that is no covariance.
+        If `covariance` is not a square matrix of numbers, or not a covariance.
     """
     matrix = numbers("covariance", covariance, missing=True)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
@@ -55,14 +55,14 @@ def effective_freedom(covariance: ArrayLike) -> float:
 
 
 def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[float, float]:
-    """Return the interval of the expected root mean square error behind one that was found.
+    """Return the confidence interval of the expected root mean square error of a sample.
 
-    Section 2.1 of the specification of the statement: found sqrt(k / chi2), both sides.
+    The formula is rmse sqrt(k / chi2), two-sided (section 2.1 of the specification of the statement).
 
     Parameters
     ----------
     rmse
-        Found, in any unit.
+        Root mean square error of the sample, in any unit.
     freedom
         Its degrees of freedom k; see :func:`effective_freedom`.
     level
@@ -75,7 +75,7 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
     Raises
     ------
     InputError
-        A negative error, degrees of freedom that are not positive, a level that is no probability.
+        If the error is negative, the degrees of freedom are not positive, or the level is not a probability.
     """
     checked_probability("level", level)
     if rmse < 0:
@@ -91,14 +91,14 @@ def rmse_interval(rmse: float, freedom: float, level: float = LEVEL) -> tuple[fl
 
 
 def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
-    """Return the degrees of freedom of a combined uncertainty: u^4 / sum(u_k^4 / nu_k) (JCGM 100:2008, G.4).
+    """Return the degrees of freedom of a combined uncertainty, u^4 / sum(u_k^4 / nu_k) (JCGM 100, G.4).
 
     Parameters
     ----------
     u
-        (k,) standard uncertainties of the contributions, of one unit, independent of each other.
+        (k,) standard uncertainties of the contributions, in the same unit and independent.
     freedom
-        (k,) their degrees of freedom; infinite for what was given.
+        (k,) their degrees of freedom; infinite for given uncertainties.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
     Raises
     ------
     InputError
-        Arrays of other shapes, negative uncertainties, degrees of freedom that are not positive.
+        If shapes differ, an uncertainty is negative, or degrees of freedom are not positive.
     """
     own, dof = _contributions("u", u), numbers("freedom", freedom)
     if dof.shape != own.shape:
@@ -121,17 +121,17 @@ def welch_satterthwaite(u: ArrayLike, freedom: ArrayLike) -> float:
 def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike, given: float = 0.0) -> float:
     """Return the degrees of freedom of a variance whose groups have estimated components.
 
-    nu = 2 u^4 / (c' cov c), section 3 of the specification of the statement: unlike that of Welch and
-    Satterthwaite it knows that components are correlated.
+    nu = 2 u^4 / (c' cov c), section 3 of the specification of the statement. Unlike the formula of Welch and
+    Satterthwaite, it includes correlations of the components.
 
     Parameters
     ----------
     contributions
-        (k,) c = u_k^2, the parts of u^2 of the groups whose components were estimated.
+        (k,) c = u_k^2, the parts of u^2 of the groups with estimated components.
     covariance_of_components
-        (k, k) of their components, relative to those with which the contributions were computed.
+        (k, k) of their components, relative to the components used to compute the contributions.
     given
-        The part of u^2 of all groups that were given.
+        The part of u^2 of all groups with given variances.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
     Raises
     ------
     InputError
-        Arrays of other shapes, negative contributions, a matrix that is no covariance.
+        If shapes differ, a contribution is negative, or the matrix is not a covariance.
     """
     c = _contributions("contributions", contributions)
     matrix = numbers("covariance_of_components", covariance_of_components)
@@ -159,20 +159,20 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
     Parameters
     ----------
     probability
-        Of the interval: 0.95 gives 1.96 where u is known.
+        Probability of the interval: 0.95 gives 1.96 if u is known.
     freedom
         Degrees of freedom of u, infinite if it is known.
     truncated
-        Whether they are truncated to a whole number first, as the GUM does.
+        True to truncate the degrees of freedom to an integer first, as in the GUM.
 
     Returns
     -------
-    The quantile of Student's distribution, both sides; infinite below one degree of freedom if truncated.
+    The two-sided quantile of Student's distribution; infinite below one degree of freedom if truncated.
 
     Raises
     ------
     InputError
-        What is no probability, degrees of freedom that are not positive.
+        If the probability is invalid, or the degrees of freedom are not positive.
     """
     checked_probability("probability", probability)
     if not freedom > 0:
@@ -182,7 +182,6 @@ def coverage_factor(probability: float, freedom: float, truncated: bool = True) 
 
 
 def _contributions(name: str, values: ArrayLike) -> Floats:
-    """Return (k,) finite values that are not negative."""
     found = numbers(name, values)
     if found.ndim != 1:
         raise argument_error(name, "shape", shape="(k,)", actual=found.shape)

@@ -1,16 +1,16 @@
-"""Tests of groups of observations that err together: the two coordinates of an image, a control point.
+"""Tests of groups of observations that may err together: x and y of an image point, a control point.
 
-With standardized residuals v = (observed - computed) / sd and R = I - A Q A', the block R_g of the m rows
-of a group, and its pseudo-inverse, an error of the group that nobody suspects has (Cook and Weisberg 1982;
+Standardized residuals are v = (observed - computed) / sd, and R = I - A Q A'. R_g is the block of the m rows
+of a group, and R^- its pseudo-inverse. An error of an unsuspected group has (Cook and Weisberg 1982;
 Teunissen 2000)
 
     T = v' R^- v                                chi-square with m' = rank R, unit weight known
     F = (T / m') / ((Omega - T) / (f - m'))     F(m', f - m'), unit weight estimated from the others
     d = R^- v                                   the error itself, in standard deviations, cofactor R^-
 
-Leaving the group out lowers Omega by T. The eigenvalues of R_g are redundancy numbers of directions: along a
-direction with none an error is invisible. The two coordinates of a point on two photographs have one visible
-direction, across the base: there m' is 1, and both have the same test value.
+Removing the group decreases Omega by T. The eigenvalues of R_g are redundancy numbers of directions. An error
+along a direction without redundancy is invisible. The two coordinates of a point on two photographs have one
+visible direction, across the base. There m' is 1, and both have the same test value.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
-INVISIBLE = 1e-6  # Eigenvalue: a direction with less redundancy is invisible
+INVISIBLE = 1e-6  # Least eigenvalue of a visible direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +35,20 @@ class GroupTests:
     Attributes
     ----------
     dimension
-        (n,) m', the number of directions in which an error shows; 0 if nothing is tested.
+        (n,) m', the number of directions in which an error is visible; 0 if nothing is tested.
     statistic
-        (n,) T; 0 without a direction.
+        (n,) T; 0 without visible direction.
     fisher
-        (n,) F; NaN if the unit weight is known, or f is no more than m'.
+        (n,) F; NaN if the unit weight is known, or f does not exceed m'.
     log_probability
-        (n,) logarithms of the probability that a good group has a value as large, by the test that decides:
-        chi-square with a known unit weight, else F. NaN if nothing is tested.
+        (n,) logarithms of the p-values of the deciding test: chi-square if the unit weight is known,
+        otherwise F. NaN if nothing is tested.
     error
         (n, m) estimated errors in standard deviations.
     cofactors
-        (n, m, m) of these.
+        (n, m, m) cofactors of these.
     eigenvalues
-        (n, m) redundancy numbers of directions, ascending; those of rows that do not exist are 0.
+        (n, m) redundancy numbers of directions, ascending; 0 for missing rows.
     """
 
     dimension: Indices
@@ -61,16 +61,16 @@ class GroupTests:
 
     @property
     def weakest(self) -> Floats:
-        """(n,) the least redundancy of a direction in which an error shows; NaN without one."""
+        """(n,) the least redundancy of a visible direction; NaN without one."""
         visible = np.where(self.eigenvalues > INVISIBLE, self.eigenvalues, math.inf)
         least = visible.min(axis=1)
         return np.asarray(np.where(np.isfinite(least), least, math.nan))
 
     def guilty(self, group: int) -> list[int]:
-        """Return the row of a group that most likely errs alone, and those not to be told apart from it.
+        """Return the most probable erroneous row of a group, and the rows that are inseparable from it.
 
-        The largest |d| over its own standard deviation; rows whose estimates are correlated with it by more
-        than 0.9 stand beside it.
+        The first row has the largest ratio of |d| and its standard deviation. The others have estimates that
+        are correlated with it by more than 0.9.
         """
         cofactors = self.cofactors[group]
         sd = np.sqrt(np.diagonal(cofactors))
@@ -97,12 +97,11 @@ def group_tests(
     blocks
         (n, m, m) blocks of R = I - A Q A', rows divided by standard deviations.
     residuals
-        (n, m) observed minus computed over standard deviation; NaN if a group has no such row.
+        (n, m) observed minus computed over standard deviation; NaN for missing rows of a group.
     weighted_sum_of_squares, degrees_of_freedom
-        Omega and f of the adjustment, of all or of each group (n,); not needed where the unit weight is
-        known.
+        Omega and f of the adjustment, of all or of each group (n,); not needed if the unit weight is known.
     known
-        Whether the unit weight is known: chi-square decides, else F.
+        True if the unit weight is known: chi-square decides; otherwise F.
     """
     r = np.asarray(blocks, dtype=np.float64)
     v = np.asarray(residuals, dtype=np.float64)
@@ -137,7 +136,8 @@ def parts_tests(
 ) -> Floats:
     """Return log-probabilities of parts of one group, each tested as if the other rows were good.
 
-    Of a control point: plan and height, `parts=((0, 1), (2,), (0, 1, 2))`; the smallest tells what to blame.
+    For a control point, use plan and height, `parts=((0, 1), (2,), (0, 1, 2))`. The smallest value indicates
+    the erroneous part.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _probabilities(
     omega = np.broadcast_to(np.asarray(omega, dtype=np.float64), statistic.shape)
     tested &= second > 0
     first, others = dimension[tested], second[tested]
-    # Zero but for rounding where a group makes up all of Omega.
+    # Zero within rounding if a group makes up all of Omega.
     left = np.maximum(omega[tested] - statistic[tested], 1e-12 * omega[tested])
     with np.errstate(divide="ignore", invalid="ignore"):
         fisher[tested] = (statistic[tested] / first) / (left / others)

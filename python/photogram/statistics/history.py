@@ -1,19 +1,19 @@
-"""Values with covariances that were determined on several occasions: whether they changed, and how.
+"""Comparison of values with covariances that were determined on several occasions.
 
-x(i) of the occasions i = 1 ... k have the covariance C. Where nothing changes they have one mean, and
-Omega = r' C^-1 r of the residuals about its estimate is chi-square with (k - 1) m degrees of freedom. For
-each of the m quantities alone, with the block of C that is its own, hypotheses add a column z to the mean:
+x(i) of the occasions i = 1 ... k have the covariance C. Without changes they have one mean, and Omega = r'
+C^-1 r of the residuals about its estimate is chi-square with (k - 1) m degrees of freedom. For each of the m
+quantities separately, with its own block of C, hypotheses add a column z to the mean:
 
 * drift: z(i) = t(i) - mean t;
 * a step between two occasions: z(i) = 0 before, 1 after;
 * a single occasion that is off: z(i) = 1 there;
 * a regressor, such as the temperature: z(i) = u(i) - mean u.
 
-With R = C^-1 - C^-1 A (A' C^-1 A)^-1 A' C^-1, A the columns that are in the model, the size of a hypothesis
-is s = z' R x / z' R z, its variance 1 / z' R z, and t = z' R x / sqrt(z' R z) standard normal where it does
-not hold (Student with the degrees of freedom from which C was estimated). The largest |t| of a quantity is
-accepted where its probability is below the level over the number of all tests (Bonferroni); it then stays in
-the model, and the others are tested anew. Nothing here knows what the values are of.
+Let R = C^-1 - C^-1 A (A' C^-1 A)^-1 A' C^-1, with the columns A of the model. The size of a hypothesis is s =
+z' R x / z' R z, and its variance 1 / z' R z. t = z' R x / sqrt(z' R z) is standard normal if it is false
+(Student with the degrees of freedom of an estimated C). The largest |t| of a quantity is accepted if its
+probability is below the level over the number of all tests (Bonferroni). It then remains in the model, and
+the others are tested again. The method is independent of the type of values.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ class Change:
     """An accepted hypothesis on one quantity."""
 
     kind: str  # `drift`, `step`, `single`, or the name of a regressor
-    # size, sd: In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor
+    # size, sd: per unit of time, after minus before, off, or per unit of the regressor
     size: float
     sd: float
     statistic: float  # t
     log10_p: float
-    at: int | None  # The first occasion after a step, or the single one; None of others
+    at: int | None  # First occasion after a step, or the single one; None for others
     sentence: str
 
 
@@ -63,7 +63,7 @@ class Series:
     sd: Floats
     mean: float  # weighted mean over all occasions
     mean_sd: float
-    model: Floats  # (k,) what the accepted changes make of the mean
+    model: Floats  # (k,) mean with the accepted changes
     off: Floats  # (k,) value minus mean of the others, for a control chart
     off_sd: Floats
     drift: float  # per unit of time; NaN if all times are equal
@@ -81,7 +81,7 @@ class History:
     occasions: tuple[str, ...]
     times: Floats
     series: tuple[Series, ...]  # The quantities
-    constancy: GlobalTest  # Test of all together, with all covariances: nothing changes
+    constancy: GlobalTest  # Joint test of all changes, with all covariances
     # Number of single tests, their level together, and the largest accepted |t|
     tests: int
     level: float
@@ -89,7 +89,7 @@ class History:
 
     @property
     def sentences(self) -> list[str]:
-        """What changes, the most certain first."""
+        """Sentences on the changes, the most certain first."""
         changes = [change for own in self.series for change in own.changes]
         return [each.sentence for each in sorted(changes, key=lambda each: each.log10_p)]
 
@@ -99,7 +99,7 @@ class History:
         return bool(self.sentences) or self.constancy.problem() is not None
 
     def systematic(self, whose: str) -> Systematic:
-        """Return the test of constancy as it stands in a verdict."""
+        """Return the test of constancy for a verdict."""
         test = self.constancy
         known = math.isinf(test.reference_dof)
         return Systematic(
@@ -117,14 +117,14 @@ class History:
 
 @dataclass(frozen=True)
 class Dates:
-    """When k occasions were, in years, and what they are called."""
+    """Years and names of k occasions."""
 
     years: list[float]
     names: list[str]
 
 
 def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
-    """Return the dates of occasions: days, with the names of their files where two are of one day."""
+    """Return the dates of occasions: days, with file names if two are on one day."""
     written = [day.isoformat() for day in days]
     called = [
         day if written.count(day) == 1 else f"{day} ({name})"
@@ -134,7 +134,7 @@ def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
 
 
 def changed_of(histories: Mapping[str, History]) -> list[Phrase | str]:
-    """Return messages on the changes, or that no single one is certain, each thing by its name."""
+    """Return messages on the changes, or on an unexplained change, by name."""
     found: list[Phrase | str] = []
     for whose, own in histories.items():
         found += [f"{whose}: {text}" for text in own.sentences]
@@ -157,7 +157,7 @@ def unchanged_of(histories: Mapping[str, History]) -> list[Phrase]:
 
 @dataclass(frozen=True, eq=False)
 class _Hypotheses:
-    """Columns of what may change (k, c), and what each is."""
+    """Columns of the possible changes (k, c), and their types."""
 
     columns: Floats
     kinds: tuple[tuple[str, int | None], ...]
@@ -179,10 +179,10 @@ def history(
 ) -> History:
     """Compare values that were determined on several occasions: constancy, drift, steps, single ones.
 
-    `values` (k, m) are m quantities on k occasions in ascending order of `times`. `covariance` is that of one
-    occasion (k, m, m), or of all values (k, m, k, m), estimated with `freedom` degrees of freedom.
-    `regressors` are other causes by name: (k,) values and their unit. `level` is the probability of a false
-    alarm of the test of constancy, and of all single tests together.
+    `values` (k, m) are m quantities on k occasions in ascending order of `times`. `covariance` is the
+    covariance of one occasion (k, m, m), or of all values (k, m, k, m), estimated with `freedom` degrees of
+    freedom. `regressors` are other causes by name: (k,) values and their unit. `level` is the probability of
+    a false alarm of the test of constancy, and of all single tests together.
     """
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
@@ -214,7 +214,6 @@ def history(
 
 
 def _together(covariance: Floats, k: int, m: int) -> Floats:
-    """Return the covariance of all values (k, m, k, m)."""
     whole = covariance
     if covariance.shape == (k, m, m):
         whole = np.zeros((k, m, k, m))
@@ -227,7 +226,7 @@ def _together(covariance: Floats, k: int, m: int) -> Floats:
 def _hypotheses(
     t: Floats, named: Sequence[str], unit: str, regressors: Mapping[str, tuple[ArrayLike, str]]
 ) -> _Hypotheses:
-    """Return what is tested; with two occasions a drift, a step and a single one are the same: a step."""
+    """Return the hypotheses; with two occasions, only a step."""
     k = len(t)
     found: list[tuple[Floats, tuple[str, int | None], str]] = []
     for i in range(1, k):
@@ -236,7 +235,7 @@ def _hypotheses(
             found.append(((np.arange(k) >= i).astype(float), ("step", i), words))
     if k > 2 and t[-1] > t[0]:
         found.append((t - t.mean(), ("drift", None), f"drifts by {{}} a {unit}"))
-        # The first and the last alone are steps.
+        # The first or the last occasion alone is a step.
         found += [(np.eye(k)[i], ("single", i), f"of {named[i]} is off by {{}}") for i in range(1, k - 1)]
     for name, (given, of_what) in regressors.items():
         u = np.asarray(given, dtype=np.float64)
@@ -261,7 +260,7 @@ def _log10_p(t: float, freedom: float) -> float:
 def _series(
     x: Floats, covariance: Floats, hypotheses: _Hypotheses, name: str, unit: str, freedom: float, level: float
 ) -> Series:
-    """Test one quantity, accept what is found, the most certain first, and fit all of it together."""
+    """Test one quantity, accept changes in the order of certainty, and fit them together."""
     k = len(x)
     with np.errstate(invalid="raise", divide="raise"):
         first = fit = Fit.of(x, covariance, np.ones((k, 1)))

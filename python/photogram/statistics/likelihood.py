@@ -1,20 +1,20 @@
-"""Which of several mistakes explains the residuals: a likelihood ratio against the data as given.
+"""Selection among possible mistakes by a likelihood ratio against the given data.
 
-A hypothesis h changes the data; the model is fitted anew and leaves a weighted sum of squares Omega_h with f
-degrees of freedom. With an unknown unit weight the logarithm of the likelihood ratio, twice, is
+A hypothesis h changes the data. The adjustment of the changed data results in a weighted sum of squares
+Omega_h with f degrees of freedom. With an unknown unit weight, twice the logarithm of the likelihood ratio is
 
     Lambda = f ln(Omega_0 / Omega_h)
 
-A mistake is made out by trying it and improving much: Omega_h passes its global test or is 25 times smaller
-than Omega_0, Lambda exceeds 2 ln(n / 1e-4) for n hypotheses tried, and the next best is behind by 10. A
-parameter that is fitted besides costs ln f.
+A mistake is accepted if it improves the fit sufficiently. Omega_h must pass its global test or be 25 times
+smaller than Omega_0. Lambda must exceed 2 ln(n / 1e-4) for n hypotheses, and the next best by 10. An
+additional parameter costs ln f.
 
-With chi-square of two named things, and with their names exchanged, in a variance s^2 of unit weight, names
+With chi-square of two named objects, and with their names exchanged, in a variance s^2 of unit weight, names
 are exchanged if
 
     named - exchanged > 2 s^2 ln(k / 0.0001),    exchanged < u s^2 chi2(0.999; m)
 
-for k examined pairs and m degrees of freedom; u is the uncertainty of the compared values beyond their
+for k examined pairs and m degrees of freedom. u is the uncertainty of the compared values beyond their
 covariances.
 """
 
@@ -40,7 +40,7 @@ TESTED = 4.0  # Smallest degrees of freedom of an accepted hypothesis
 class Judged:
     """The hypotheses that explain the residuals best."""
 
-    # Their places among those tried, the best first; more than one where these cannot be told apart
+    # Indices of the accepted hypotheses, best first; several if inseparable
     best: tuple[int, ...]
     likelihood: float  # lambda of the first
     fall: float  # factor by which residuals would be smaller
@@ -48,12 +48,12 @@ class Judged:
 
     @property
     def accepted(self) -> bool:
-        """Whether the first can be taken for sure: it explains the residuals, and none of the others does."""
+        """Whether the first is accepted: it explains the residuals, and no other does."""
         return self.explained and len(self.best) == 1
 
 
 def likelihood(given: float, changed: float, degrees_of_freedom: float) -> float:
-    """Return Lambda of a hypothesis that leaves `changed` in place of `given`."""
+    """Return Lambda of a hypothesis that changes Omega from `given` to `changed`."""
     least = sys.float_info.min
     return degrees_of_freedom * (math.log(max(given, least)) - math.log(max(changed, least)))
 
@@ -66,20 +66,20 @@ def judged(
     parameters: Sequence[int] | None = None,
     known_weight: bool = False,
 ) -> Judged | None:
-    """Judge hypotheses by the sums of squares that they leave.
+    """Assess hypotheses by their sums of squares.
 
     Parameters
     ----------
     given
-        Omega of the data as given, positive.
+        Omega of the given data, positive.
     changed
         Omega of each hypothesis, positive; infinite if it cannot be fitted.
     degrees_of_freedom
         f.
     parameters
-        How many parameters each fits besides; one more must gain ln f. None if they fit none.
+        Numbers of additional parameters of each hypothesis; one more must gain ln f. Default: zero.
     known_weight
-        Whether Omega has the unit weight of given standard deviations, so that it can pass its global test.
+        True if Omega refers to given standard deviations, so that the global test is possible.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def are_exchanged(
     variance: float = 1.0,
     uncertain: float = 1.0,
 ) -> bool:
-    """Return whether two things are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
+    """Test whether two objects are exchanged by the formula above; `uncertain` is u, `pairs` is k."""
     if not (math.isfinite(exchanged) and dimension > 0):
         return False
     fits = exchanged < uncertain * variance * critical_chi_square(EXCHANGE_LEVEL, dimension)

@@ -1,15 +1,15 @@
 """Tests of an adjustment as a whole, and of its observations: the same limits for every program.
 
-Observations l with standard deviations sd leave residuals v; Omega is the sum of (v / sd)^2, f the degrees of
-freedom, r the redundancy number of an observation, and w = v / (sd sqrt(r)) its standardized residual.
+Observations l with standard deviations sd have residuals v. Omega is the sum of (v / sd)^2, f the degrees of
+freedom, and r the redundancy number of an observation. w = v / (sd sqrt(r)) is its standardized residual.
 
-* Global test: where the standard deviations are right, Omega is chi-square with f degrees of freedom.
+* Global test: if the standard deviations are correct, Omega is chi-square with f degrees of freedom.
 * A single residual, unit weight known: w is standard normal (Baarda 1968).
-* A single residual, unit weight estimated from the same residuals: the internally studentized tau = w / s,
-  s^2 = Omega / f, never exceeds the root of f, so no fixed limit serves. The externally studentized
-  t = w / s(i), with the unit weight s(i)^2 = (Omega - w^2) / (f - 1) of the other observations, has Student's
-  distribution with f - 1 degrees of freedom; testing it is Pope's test of tau (NOAA Technical Report NOS 65
-  NGS 1, 1976).
+* A single residual, unit weight estimated from the same residuals. The internally studentized tau = w / s,
+  s^2 = Omega / f, never exceeds the root of f, so a fixed limit is unsuitable. The externally studentized t =
+  w / s(i) uses the unit weight s(i)^2 = (Omega - w^2) / (f - 1) of the other observations. It has Student's
+  distribution with f - 1 degrees of freedom. Its test is Pope's test of tau (NOAA Technical Report NOS 65 NGS
+  1, 1976).
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ from photogram.statistics.distributions import (
 from photogram.words import phrase
 
 NOTABLE_FACTOR = 1.25
-"""With many degrees of freedom the test finds disagreements that harm nobody: residuals larger than the
-standard deviations allow by less than this are no problem."""
+"""Least notable factor of residuals relative to their standard deviations.
+
+With many degrees of freedom, the global test detects smaller factors, which are harmless."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,14 @@ class GlobalTest:
     weighted_sum_of_squares, degrees_of_freedom
         Omega and f.
     level
-        Probability that right standard deviations are rejected, half of it on each side.
+        Probability that correct standard deviations are rejected, half of it on each side.
     limits
         Lower and upper limit of the variance of unit weight, Omega / f.
     probability_below, probability_above
-        Of a sum as small as this, and of one as large, where the standard deviations are right.
+        Probabilities of a sum at most and at least as large, if the standard deviations are correct.
     reference_dof
-        Degrees of freedom of the unit weight that it is compared with; infinite if that is known. The test
-        is then chi-square, else F.
+        Degrees of freedom of the reference unit weight; infinite if known. The test is then chi-square,
+        otherwise F.
     """
 
     weighted_sum_of_squares: float
@@ -66,7 +67,7 @@ class GlobalTest:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The interval that holds the true factor with the probability 1 - level; see :attr:`factor`."""
+        """Confidence interval of the true factor with the probability 1 - level; see :attr:`factor`."""
         low, high = self.limits
         return math.sqrt(self.variance / high), math.sqrt(self.variance / low) if low > 0 else math.inf
 
@@ -77,12 +78,12 @@ class GlobalTest:
 
     @property
     def factor(self) -> float:
-        """By how much residuals are larger than expected: the root of the variance."""
+        """Factor of residuals relative to the expected ones: the root of the variance."""
         return math.sqrt(self.variance)
 
     @property
     def rejected_high(self) -> bool:
-        """Whether residuals are larger than the standard deviations allow, or no numbers."""
+        """Whether residuals are larger than the standard deviations allow, or NaN."""
         return not self.probability_above >= self.level / 2
 
     @property
@@ -92,12 +93,12 @@ class GlobalTest:
 
     @property
     def probability(self) -> float:
-        """Of a sum as far out as this, on either side, where the standard deviations are right."""
+        """Two-sided p-value, if the standard deviations are correct."""
         return min(1.0, 2 * min(self.probability_below, self.probability_above))
 
     @property
     def log10_probability(self) -> float:
-        """Decimal logarithm of :attr:`probability`, also where that is less than the smallest number."""
+        """Decimal logarithm of :attr:`probability`, also if the probability underflows."""
         if self.probability > 0:
             return math.log10(self.probability)
         if math.isinf(self.reference_dof):
@@ -107,7 +108,7 @@ class GlobalTest:
         return (float(log_p) + math.log(2)) / math.log(10)
 
     def problem(self) -> str | None:
-        """Return a sentence for the report if residuals are too large by a factor that matters."""
+        """Return a sentence for the report if residuals are too large by a notable factor."""
         if not self.rejected_high or self.factor <= NOTABLE_FACTOR:
             return None
         limits = {"low": self.limits[0], "high": self.limits[1], "level": 100 * self.level}
@@ -127,12 +128,12 @@ def global_test(
     weighted_sum_of_squares
         Omega, with the standard deviations a priori.
     degrees_of_freedom
-        f; need not be whole.
+        f; may be fractional.
     level
-        Probability that right standard deviations are rejected, half of it on each side.
+        Probability that correct standard deviations are rejected, half of it on each side.
     reference_dof
-        Degrees of freedom with which the unit weight was estimated from other data, where it was: the
-        standard deviations are those scaled by it.
+        Degrees of freedom of a unit weight that was estimated from other data and has scaled the standard
+        deviations. Default: infinite (known).
 
     Returns
     -------
@@ -161,44 +162,44 @@ def global_test(
 def externally_studentized(
     standardized: ArrayLike, weighted_sum_of_squares: float, degrees_of_freedom: float
 ) -> NDArray[np.float64]:
-    """Return residuals over their standard deviations, the unit weight taken from the other observations.
+    """Return residuals over their standard deviations, with the unit weight of the other observations.
 
     Parameters
     ----------
     standardized
         w = v / (sd sqrt(r)), a priori unit weight, any shape.
     weighted_sum_of_squares, degrees_of_freedom
-        Omega and f of the adjustment that left these residuals.
+        Omega and f of the adjustment with these residuals.
 
     Returns
     -------
-    t of the same shape: Student with f - 1 degrees of freedom. Unbounded: where an observation makes up all
-    of Omega, it is very large. NaN if w is, and everywhere with less than two degrees of freedom.
+    t of the same shape: Student with f - 1 degrees of freedom. Unbounded: very large if an observation makes
+    up all of Omega. NaN if w is, and always with less than two degrees of freedom.
     """
     w = np.asarray(standardized, dtype=np.float64)
     omega, f = float(weighted_sum_of_squares), float(degrees_of_freedom)
     if not (f >= 2 and omega > 0):
         return np.full(w.shape, math.nan)
-    # The difference is zero but for rounding where an observation makes up all of Omega.
+    # The difference is zero within rounding if an observation makes up all of Omega.
     others = np.maximum(omega - w**2, 1e-12 * omega)
     return np.asarray(w / np.sqrt(others / (f - 1)))
 
 
 def studentized_limit(degrees_of_freedom: float, tests: int, level: float = LEVEL) -> float:
-    """Return the limit that externally studentized residuals of good observations rarely exceed.
+    """Return the critical value of externally studentized residuals.
 
     Parameters
     ----------
     degrees_of_freedom
         f of the adjustment; the distribution is Student's with f - 1.
     tests
-        Number of residuals that are tested.
+        Number of tested residuals.
     level
-        Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
+        Probability that any good observation exceeds it (Bonferroni: `level / tests` for each, two-sided).
 
     Returns
     -------
-    Infinite with less than two degrees of freedom: nothing can be tested then.
+    Infinite with less than two degrees of freedom, which allow no test.
     """
     if degrees_of_freedom < 2:
         return math.inf
@@ -206,13 +207,13 @@ def studentized_limit(degrees_of_freedom: float, tests: int, level: float = LEVE
 
 
 def normal_limit(tests: int, level: float = LEVEL) -> float:
-    """Return the limit that standardized residuals of good observations rarely exceed, unit weight known.
+    """Return the critical value of standardized residuals, unit weight known.
 
     Parameters
     ----------
     tests
-        Number of residuals that are tested.
+        Number of tested residuals.
     level
-        Probability that any of them exceeds it (Bonferroni: `level / tests` for each, both sides).
+        Probability that any good observation exceeds it (Bonferroni: `level / tests` for each, two-sided).
     """
     return critical_normal(bonferroni(level, tests))

@@ -1,9 +1,9 @@
-"""What residuals should not show: tails, a pattern over the frame, a trend, a bend.
+"""Tests for patterns of residuals: tails, a pattern over the frame, a trend, a bend.
 
-All take standardized residuals ~v = (observed - computed) / sd and their redundancy numbers r. The residuals
-of an adjustment are correlated, ~v = R ~e: a sum over a group has the variance sum R_ij, of which sum r_i is
-the part on the diagonal. The other part is mostly negative, since a common shift of a group goes into the
-unknowns; tests that take the sum of r for the variance are conservative: they find less than they might.
+All use standardized residuals ~v = (observed - computed) / sd and their redundancy numbers r. The residuals
+of an adjustment are correlated, ~v = R ~e. A sum over a group has the variance sum R_ij, of which sum r_i is
+the diagonal part. The other part is mostly negative, because the unknowns absorb a common shift of a group.
+So tests with the variance sum r_i are conservative.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ SINGULAR = 1e-6  # Smallest determinant of a regular matrix, as a part of the pr
 
 SPEAKING = 1e-3  # Smallest maximum of standardized residuals that are tested
 
-CELLS = 10  # Cells of the frame in each direction; images in one cell are neighbours
+CELLS = 10  # Cells of the frame in each direction; observations in one cell are neighbours
 
 
 @dataclass(frozen=True)
 class Normality:
-    """How residuals are distributed."""
+    """Distribution of residuals."""
 
-    values: int  # How many
+    values: int  # Number of values
     excess: float  # Excess kurtosis; 0 of the normal distribution
-    # Shares of values beyond 2 and 3 standard deviations: normal are 0.0455 and 0.0027
+    # Shares of values beyond 2 and 3 standard deviations; 0.0455 and 0.0027 if normal
     beyond: tuple[float, float]
     # Anderson and Darling's A^2 with mean and variance estimated, corrected for the number (Stephens
     # 1974)
     statistic: float
-    probability: float  # Of a value as large, of normal ones
+    probability: float  # p-value of the statistic for normal values
 
 
 def normality(values: Floats) -> Normality | None:
-    """Test whether values are normal, of whatever mean and variance (Anderson and Darling 1954).
+    """Test whether values are normal, with any mean and variance (Anderson and Darling 1954).
 
-    Residuals are mixtures of the errors of many observations and look more normal than these: acceptance
-    proves little where redundancy is low. None of less than 20 values, or equal ones.
+    Residuals combine the errors of many observations and look more normal than these. So acceptance proves
+    little if redundancy is low. None of less than 20 values, or equal ones.
     """
     z = np.sort(values[np.isfinite(values)])
     z = z[:: max(1, -(-z.size // MOST))]
@@ -126,7 +126,7 @@ def frame_pattern(
 
 
 def _cells(xy: Floats, count: int) -> Indices:
-    """Return (m,) the cell of each image, of so many in each direction over all that they reach."""
+    """Return (m,) the cell of each observation, with `count` cells per direction over their extent."""
     low, high = xy.min(axis=0), xy.max(axis=0)
     width = np.where(high > low, high - low, 1.0)
     places = np.minimum((count * (xy - low) / width).astype(np.int64), count - 1)
@@ -143,11 +143,11 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # Upper triangle of a
 def group_patterns(
     groups: Indices, count: int, xy: Floats, residuals: Floats, redundancy: Floats
 ) -> tuple[Floats, Floats]:
-    """Test of each group whether its residuals follow a shift and a linear form of the coordinates.
+    """Test for each group whether its residuals follow a shift and a linear form of the coordinates.
 
-    Of a photo: film or scanner, an axis that is not as assumed. With b = (1, x, y) centred and scaled it is
-    the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes: chi-square with six degrees of
-    freedom.
+    For a photo, this indicates film or scanner errors, or a wrong axis. With b = (1, x, y) centred and
+    scaled, it is the score test c' C^-1 c, c = sum b ~v, C = sum r b b', in both axes. It is chi-square with
+    six degrees of freedom.
     """
     numbers = np.bincount(groups, minlength=count)
     means = np.stack([np.bincount(groups, weights=each, minlength=count) for each in xy.T], axis=1)
@@ -172,7 +172,7 @@ def group_patterns(
 
 
 def _quadratic(matrices: Floats, vectors: Floats) -> Floats:
-    """Return c' C^+ c of (n, k, k) and (n, k), by pseudo-inverses where C may be singular."""
+    """Return c' C^+ c of (n, k, k) and (n, k), with pseudo-inverses if C may be singular."""
     scale = np.sqrt(np.einsum("gii->gi", matrices))
     sound = np.linalg.det(matrices) > SINGULAR * scale.prod(axis=1) ** 2
     found = np.empty(len(vectors))
@@ -185,7 +185,7 @@ def _quadratic(matrices: Floats, vectors: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Fit:
-    """A regression of test values on other figures."""
+    """A regression of test values on other quantities."""
 
     statistic: float  # F, and its degrees of freedom
     dof: tuple[float, float]
@@ -194,7 +194,7 @@ class Fit:
 
 
 def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit | None:
-    """Test whether values depend on the k columns of a design: F with k and n - k degrees of freedom.
+    """Test whether values depend on k columns of a design, by F with k and n - k degrees of freedom.
 
     None with fewer than k + 5 values.
     """
@@ -217,13 +217,13 @@ def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit
 
 
 def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
-    """Return Moran's I of residuals over the frame: how alike those of neighbours are (Moran 1950).
+    """Return Moran's I, the spatial correlation of residuals over the frame (Moran 1950).
 
         I = (n / S0) sum w_ij z_i z_j / sum z_i^2,     S0 = sum w_ij
 
-    summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
-    since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
-    0 without a pattern; NaN if nothing has a neighbour.
+    The sums include x and y. Neighbours are observations in one of 10 x 10 cells of the frame but on
+    different photos, because errors in object space correlate observations of one photo. w_ij is 1 / (number
+    of neighbours of i). About 0 without a pattern; NaN without neighbours.
     """
     if not len(xy):
         return math.nan
@@ -242,7 +242,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
 
 
 def moran_index(values: Floats, lagged: Floats, total: float) -> float:
-    """Return Moran's I of values whose neighbours, weighted, sum to `lagged`; `total` of all weights.
+    """Return Moran's I of values whose weighted neighbours sum to `lagged`; `total` is the sum of weights.
 
     I = (n / total) sum z_i lagged_i / sum z_i^2 of (n, ...) values that are about zero on average.
     """
@@ -254,8 +254,8 @@ def durbin_watson(photos: Indices, count: int, residuals: Floats, redundancy: Fl
 
         d = sum (m_(p+1) - m_p)^2 / sum m_p^2,     m_p = sum ~v / root of sum r
 
-    summed over x and y; about 2 where the residuals of one photo say nothing of the next, towards 0 where
-    they drift. NaN of fewer than three photos.
+    The sums include x and y. d is about 2 if the residuals of consecutive photos are independent, and towards
+    0 with a drift. NaN of fewer than three photos.
     """
     steps = squares = 0.0
     for v, r in zip(residuals.T, redundancy.T, strict=True):

@@ -1,18 +1,17 @@
-"""Reliability: how large a gross error must be to be found, and what it does when it is not (Baarda 1968).
+"""Reliability: the size of detectable gross errors, and the effect of undetected ones (Baarda 1968).
 
-An observation with the standard deviation sd and the redundancy number r has a standardized residual
-w = v / (sd sqrt(r)), standard normal. A gross error e moves its expectation by e sqrt(r) / sd. The *minimal
-detectable error* is the one that moves it by delta0, so that the test |w| > critical value finds it with the
-chosen power:
+An observation with the standard deviation sd and the redundancy number r has a standardized residual w = v /
+(sd sqrt(r)), which is standard normal. A gross error e shifts its expectation by e sqrt(r) / sd. The *minimal
+detectable error* shifts it by delta0, so that the test |w| > critical value finds it with the chosen power:
 
     e0 = delta0 sd / sqrt(r)
 
-and left in the data it changes no unknown, nor any function of them, by more than this multiple of its
+If it is not removed, no unknown, nor any function of the unknowns, changes by more than this multiple of its
 standard deviation (external reliability):
 
     delta0 sqrt((1 - r) / r)
 
-Both hold for the a priori unit weight, and need no measurements: planned networks have them too.
+Both refer to the a priori unit weight. They do not need measurements and are available for planned networks.
 """
 
 from __future__ import annotations
@@ -26,7 +25,9 @@ from photogram.arguments.types import Floats
 from photogram.statistics.distributions import lambda0
 
 TESTABLE = 0.01
-"""With less redundancy a gross error hides in the unknowns, and the test value repeats that of another
+"""Least redundancy number of a testable observation.
+
+With less redundancy, the unknowns absorb a gross error, and the test value repeats the one of another
 observation."""
 
 ROUNDING = 1e-10  # Redundancy numbers below this are rounding errors of zero
@@ -35,7 +36,7 @@ ROUNDING = 1e-10  # Redundancy numbers below this are rounding errors of zero
 def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
     """Return residuals over their own standard deviations, unit weight a priori (Baarda's w).
 
-    NaN for what is no observation (sd infinite or zero), and where rounding is all there is of redundancy.
+    NaN if sd is infinite or zero, or if redundancy is rounding only.
     """
     tested = np.isfinite(sd) & (sd > 0) & (redundancy > ROUNDING)
     values = np.full(residuals.shape, np.nan)
@@ -44,14 +45,14 @@ def standardized(residuals: Floats, sd: Floats, redundancy: Floats) -> Floats:
 
 
 def noncentrality(significance: float = 0.001, power: float = 0.80) -> float:
-    """Return delta0: how far a gross error must move a standardized residual to be found.
+    """Return delta0, the shift of a standardized residual by a detectable gross error.
 
     Parameters
     ----------
     significance
-        Chance that a good observation is rejected (two-sided).
+        Probability that a good observation is rejected (two-sided).
     power
-        Chance that a bad one is.
+        Probability that a wrong observation is rejected.
 
     Returns
     -------
@@ -75,11 +76,11 @@ def minimal_detectable_error(sd: ArrayLike, redundancy: ArrayLike, delta0: float
     redundancy
         Their redundancy numbers, of the same shape.
     delta0
-        Noncentrality; that of Baarda's choice when None.
+        Noncentrality; Baarda's choice if None.
 
     Returns
     -------
-    In the unit of sd: infinite without redundancy, NaN for what is no observation (sd infinite or zero).
+    In the unit of sd; infinite without redundancy, NaN if sd is infinite or zero.
     """
     sd, r = np.broadcast_arrays(np.asarray(sd, dtype=np.float64), np.asarray(redundancy, dtype=np.float64))
     observed = np.isfinite(sd) & (sd > 0)
@@ -89,18 +90,18 @@ def minimal_detectable_error(sd: ArrayLike, redundancy: ArrayLike, delta0: float
 
 
 def largest_effect(redundancy: ArrayLike, delta0: float | None = None) -> Floats:
-    """Return the external reliability: how far minimal detectable errors move unknowns when they stay in.
+    """Return the external reliability: bounds of the effect of undetected errors on the unknowns.
 
     Parameters
     ----------
     redundancy
         Redundancy numbers, any shape.
     delta0
-        Noncentrality; that of Baarda's choice when None.
+        Noncentrality; Baarda's choice if None.
 
     Returns
     -------
-    Bounds in standard deviations of whatever is computed from the unknowns; infinite without redundancy.
+    Bounds in standard deviations of any function of the unknowns; infinite without redundancy.
     """
     r = _without_rounding(np.asarray(redundancy, dtype=np.float64))
     with np.errstate(divide="ignore"):

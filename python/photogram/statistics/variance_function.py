@@ -1,15 +1,15 @@
-"""Variances that depend on something: on the distance from the principal point, say.
+"""Variances as functions of a quantity, for example of the distance from the principal point.
 
-Within a group the variance is sd^2 theta_i with theta_i = x_i^T beta, x_i = (1, u_i, ...) and u_i the square
-of the radius over the largest: sigma^2 = a^2 + b^2 r^2. With the residuals ~v in standard deviations and the
-redundancy numbers r_i of an adjustment with the present theta, ~v_i^2 is regressed on r_i x_i / theta_i with
-the weights 1 / r_i, beta not negative; then the network is adjusted anew, until beta stands. The fixed point
-solves
+Within a group the variance is sd^2 theta_i with theta_i = x_i^T beta and x_i = (1, u_i, ...). u_i is the
+square of the radius over the largest: sigma^2 = a^2 + b^2 r^2. Let ~v be the residuals in standard deviations
+and r_i the redundancy numbers of an adjustment with the current theta. ~v_i^2 is regressed on r_i x_i /
+theta_i with the weights 1 / r_i and nonnegative beta. Then the network is adjusted again, until beta
+converges. The fixed point solves
 
     sum_i (~v_i^2 - r_i) x_i / theta_i = 0,
 
-the derivative of the restricted likelihood; its information is 1/2 sum_ij R_ij^2 x_i x_j^T over
-theta_i theta_j. The first regression alone is badly biased, because neighbours share their errors.
+the derivative of the restricted likelihood. Its information is 1/2 sum_ij R_ij^2 x_i x_j^T over theta_i
+theta_j. The first regression alone is strongly biased, because neighbours share their errors.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 
-LEAST = 1e-6  # Smallest redundancy number of a coordinate that takes part
+LEAST = 1e-6  # Smallest redundancy number of a coordinate that is used
 CLOSE = 0.01  # Largest change of a coefficient in the last step, in standard deviations
 
 
 class Residuals(Protocol):
-    """What an adjustment leaves of k observations with given variances."""
+    """Result of an adjustment for k observations with given variances."""
 
     @property
     def squares(self) -> Floats:
@@ -39,7 +39,7 @@ class Residuals(Protocol):
         """(k,) redundancy numbers."""
 
     def information(self, terms: Floats) -> Floats:
-        """Return (t, t) sums of R_ij^2 c_i c_j^T over the (k, t) terms c, none of them negative."""
+        """Return (t, t) sums of R_ij^2 c_i c_j^T over the (k, t) nonnegative terms c."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +50,14 @@ class FunctionEstimate:
     coefficients: Floats
     sd: Floats
     covariance: Floats  # (t, t)
-    first: Floats  # (t,) those of the first regression, which are biased
+    first: Floats  # (t,) coefficients of the first regression, which are biased
     factors: Floats  # (k,) theta of every observation
     converged: bool  # Whether the fixed point was reached
     steps: int  # number of adjustments
 
 
 def nonnegative(normal: Floats, right: Floats) -> Floats:
-    """Solve normal equations of few unknowns, none of which may be negative (least squares)."""
+    """Solve normal equations of few unknowns, with nonnegative unknowns (least squares)."""
     count = len(right)
     best, lowest = np.zeros(count), math.inf
     for chosen in range(1, 1 << count):
@@ -86,7 +86,7 @@ def estimate_function(
         scale = 1.0 / np.sqrt(np.diag(normal))
         found = scale * nonnegative(normal * np.outer(scale, scale), scale * (c.T @ state.squares[used]))
         first = found if first is None else first
-        # Twice the sum of R_ij^2 on the diagonal alone would be this: steps end by less than the deviation.
+        # Corresponds to R_ij^2 on the diagonal only: the steps end below the actual standard deviation.
         deviations = np.sqrt(2.0) * scale
         moved = np.abs(found - beta)
         beta, factors = found, terms @ found

@@ -1,8 +1,8 @@
-"""The verdict on an adjustment: whether its result can be used, and if not, what is wrong.
+"""The verdict on an adjustment: whether its result can be used, and if not, the reason.
 
-One ordered list of rules (:data:`RULES`): the first that fits gives the headline, the exit code and the
-advice, all others that fit follow as lines. Every test is in the verdict with its distribution, probability,
-level and number of tests.
+The first applicable rule of an ordered list (:data:`RULES`) defines the headline, the exit code and the next
+steps. The other applicable rules follow as lines. The verdict contains every test with its distribution,
+probability, level and number of tests.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.words import Phrase
 
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
-"""How a command ends: figures that are no results; results that must not be used as they are."""
+"""Exit codes of a command: values that are not results; results that must not be used."""
 
 WRONG_ALIKE = 1.5
-"""Where the median is larger than expected by more, and the mean square by no more than this beside it, all
-residuals are too large, not a few."""
+"""Limit of the median factor, and of the ratio of the mean-square and the median factor.
+
+If the median factor is larger and the ratio smaller, all residuals are too large, not a few."""
 
 MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3  # Largest shares of removed images and control
 
@@ -40,17 +41,17 @@ _LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdi
 class Verdict:
     """Whether a result can be used."""
 
-    code: str  # Name of the rule that fits first: the table is in `docs/command-line.md`
+    code: str  # Code of the first applicable rule; listed in `docs/command-line.md`
     message: Phrase  # Its message: a code with fields
     exit: int  # Exit code of the command: 0, 3 or 4
     warning: bool  # Whether a user should look although the exit code is 0; `--strict` makes it 4
     lines: tuple[Phrase, ...]  # Messages of the other rules, and remarks
     next: tuple[Phrase, ...]  # Messages on the next steps
-    # The global test, the largest test value of every kind of observation, tests of patterns
+    # The global test, the largest test value of every observation type, tests of patterns
     tests: tuple[Test, ...]
-    # A message for each type of observation with outliers: their number, and the worst
+    # One message per observation type with outliers: their number, and the worst
     outliers: tuple[Phrase, ...] = ()
-    # Observations that snooping removed, those that are inseparable from them, accepted hypotheses
+    # Removed observations, observations that are inseparable from them, accepted hypotheses
     removed: tuple[Any, ...] = ()
     rivals: tuple[Text, ...] = ()
     hints: tuple[Text, ...] = ()
@@ -62,12 +63,12 @@ class Verdict:
 
     @property
     def headline(self) -> str:
-        """The message of the rule that fits first, as a sentence."""
+        """Message of the first applicable rule, as a sentence."""
         return str(self.message)
 
     @property
     def is_tested_as_a_whole(self) -> bool:
-        """Whether there is a test of all residuals together."""
+        """Whether all residuals are tested together."""
         return any(test.kind == GLOBAL for test in self.tests)
 
     @property
@@ -76,18 +77,18 @@ class Verdict:
         return self.exit == 0
 
     def marks(self, kind: Text, shape: tuple[int, ...]) -> Bools:
-        """Return which observations of one type (of the shape of their test values) are outliers."""
+        """Return a mask of the outliers of one type, in the shape of their test values."""
         marks = np.zeros(shape, dtype=bool)
         for place in self.outlying.get(kind, ()):
             marks[place] = True
         return marks
 
     def exit_code(self, *, strict: bool = False) -> int:
-        """Return the exit code of a command; `strict` lets warnings count."""
+        """Return the exit code of a command; `strict` includes warnings."""
         return EXIT_NOT_USABLE if strict and self.warning and self.exit == 0 else self.exit
 
     def document(self) -> dict[str, Any]:
-        """Return the verdict as JSON documents have it: sentences, and `messages` with codes and fields."""
+        """Return the verdict for JSON documents: sentences, and `messages` with codes and fields."""
         listed: dict[str, tuple[Text, ...]] = {name: getattr(self, name) for name in _LISTED}
         return {
             "code": self.code,
@@ -111,9 +112,9 @@ class Rule:
     """A rule of verdicts."""
 
     code: str
-    message: Callable[[Any], Phrase | None]  # On the evidence; None if the rule does not fit
-    exit: int  # Exit code, if `grave` holds of the evidence
-    advice: tuple[str, ...]  # Codes of the next steps, if it gives the headline
+    message: Callable[[Any], Phrase | None]  # Message on the evidence; None if the rule is not applicable
+    exit: int  # Exit code, if `grave` applies to the evidence
+    advice: tuple[str, ...]  # Codes of the next steps, if it defines the headline
     warning: bool = False  # Whether a user should look although the exit code is 0
     grave: Callable[[Any], bool] = lambda _: True  # Whether it forbids the use
     also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
@@ -122,9 +123,9 @@ class Rule:
 def fitting_rules(
     rules: Iterable[Rule], evidence: Any, codes: list[str] | None = None
 ) -> list[tuple[Rule, Phrase, int]]:
-    """Return the rules that fit, with messages and exit codes; rules that forbid the use are first.
+    """Return the applicable rules with messages and exit codes; rules that forbid the use are first.
 
-    `codes` receives the codes of these rules, for the conditions of those that follow.
+    `codes` receives the codes of these rules, for the conditions of later rules.
     """
     fitting: list[tuple[Rule, Phrase, int]] = []
     for rule in rules:
@@ -136,7 +137,7 @@ def fitting_rules(
 
 
 def verdict(found: Findings) -> Verdict:
-    """Judge an adjustment by all that was found about it."""
+    """Return the verdict on an adjustment from its findings."""
     evidence = Evidence(found)
     fitting = fitting_rules(RULES, evidence, evidence.codes)
     usable = not fitting[0][2]
@@ -168,19 +169,19 @@ def verdict(found: Findings) -> Verdict:
 
 
 def as_phrase(text: Text) -> Phrase:
-    """Return a message; a text without a code as one."""
+    """Return a message; convert a text without code."""
     return text if isinstance(text, Phrase) else Phrase("part.text", {"text": text})
 
 
 def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
-    """Return the exit code of a command with several results: that of the worst."""
+    """Return the worst exit code of several results."""
     return max((each.exit_code(strict=strict) for each in verdicts), key=_GRAVITY.index, default=0)
 
 
 def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
-    """Return the advice of a rule, and that of the program."""
+    """Return the next steps of a rule, and of the program."""
     found = e.found
-    # Fixed values are no observations, and a second snooping finds nothing more.
+    # Fixed values are not observations, and a second snooping finds nothing more.
     snooping = found.snooped is None and not (e.gross and e.gross[0][1].held)
     calibrate = found.calibrate and replace(
         found.calibrate, code=found.calibrate.code.replace("how", "advice")
@@ -203,7 +204,7 @@ def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
 
 
 def _listing(code: str, name: str, attribute: str) -> Callable[[Evidence], Phrase | None]:
-    """Return what makes a message that lists findings, if there are any."""
+    """Return the function that creates a message with a list of findings, if any."""
 
     def message(e: Evidence) -> Phrase | None:
         listed = list(getattr(e.found, attribute))
@@ -229,7 +230,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
         )
     if not e.rejected or e.found.snooped or not e.gross or e.lens:
         return None
-    # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.
+    # A few gross errors increase s but not the median; a wrong model increases all residuals.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     suspects = [*e.found.exchanged, Phrase("part.tests", {"tests": e.named(e.gross)})]
@@ -237,7 +238,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
 
 
 def _remedy(e: Evidence) -> Phrase | str:
-    """Return how to remove the observations that look gross."""
+    """Return the method to remove probable gross errors."""
     _, first, place = e.gross[0]
     if first.held:
         name = first.name(place)
@@ -266,7 +267,7 @@ def _removed(e: Evidence) -> Phrase | None:
 
 
 def _set_aside(much: bool, e: Evidence) -> Phrase | None:
-    """Return the observations that a start has set aside: of too many images, or of few."""
+    """Return the observations rejected by the initial orientation, for many or few of them."""
     found = e.found.set_aside
     if found is None or (found.images > MOST_IMAGES) is not much:
         return None
@@ -294,7 +295,7 @@ def _intersected(e: Evidence) -> Phrase | None:
 
 
 def _common_factor(far: bool, e: Evidence) -> Phrase | None:
-    """Return the common factor of all standard deviations: one that no weights explain, or a smaller one."""
+    """Return the common factor of all standard deviations: an implausible one (`far`), or a smaller one."""
     if not e.high or e.gross or e.pattern or e.found.intersected or _is_far(e) is not far:
         return None
     if any(each.significant for each in e.found.components):
@@ -306,7 +307,7 @@ def _common_factor(far: bool, e: Evidence) -> Phrase | None:
 
 
 def _is_far(e: Evidence) -> bool:
-    """Return whether standard deviations are wrong by so much that no weights explain it."""
+    """Whether the factor of standard deviations is implausibly large."""
     return e.factor > LARGEST_FACTOR
 
 
@@ -473,4 +474,4 @@ RULES = (
     Rule("accepted", _accepted, 0, ()),
     Rule("not-tested", _not_tested, 0, ("compare",)),
 )
-"""The first that fits gives the headline; rules that forbid the use are before all others."""
+"""The first applicable rule defines the headline; rules that forbid the use precede all others."""

@@ -1,1 +1,1 @@
-"""Data snooping: gross errors found one after the other and taken out, whatever the observations are of."""
+"""Iterative data snooping: detection and removal of gross errors, for any observations."""

@@ -1,11 +1,13 @@
-"""What goes in a round: exactly where R of all rows can be had, else by a bound of what others do to it.
+"""Selection of groups to remove in a round: exact if R of all rows is available, else by a bound.
 
-Where R of all rows is too large, groups go in one round when no chosen one is on their point and
+If R of all rows is too large, several groups are removed in one round. No other removed group may be on the
+same point, and each must satisfy
 
     sqrt T_j - sum over the chosen i of sqrt(h_i h_j T_i)  >  sqrt of the limit
 
-with h of the sharp bound of correlations (`Tests.shared`): what is left of j is significant whatever the
-chosen do to it. Only what shares a photo counts. Groups of one point are conditioned exactly.
+with h of the sharp bound of correlations (`Tests.shared`). Then the remainder of j is significant for any
+effect of the chosen groups. Only groups that share a photo count. Groups of one point are conditioned
+exactly.
 """
 
 from __future__ import annotations
@@ -29,16 +31,16 @@ AHEAD = 10  # Largest number of trial removals that search for masked errors
 
 @dataclass(frozen=True)
 class Level:
-    """Which probabilities are too small.
+    """Significance level of the groups.
 
     Attributes
     ----------
     family
-        For all tests together (Bonferroni), or the false discovery rate.
+        Joint level of all tests (Bonferroni), or the false discovery rate.
     tests
-        Their number at the start: it is kept.
+        Number of tests at the start, which is not changed.
     stepping
-        Whether the limit rises with what is out: that of step k is k times that of the first.
+        True if the limit increases with the removals: step k has k times the limit of the first.
     """
 
     family: float
@@ -46,23 +48,23 @@ class Level:
     stepping: bool = False
 
     def limit(self, out: int) -> float:
-        """Return the limit for the next group when so many are out."""
+        """Return the limit for the next group after `out` removals."""
         steps = out + 1 if self.stepping else 1
         return min(self.family * steps / max(self.tests, 1), 0.5)
 
 
 @dataclass(frozen=True, eq=False)
 class Choosing:
-    """What a round chooses from, and how."""
+    """Candidates and criteria of a round."""
 
     trial: Trial  # The network
-    tests: Tests  # Of all groups, nothing of this round being out
-    unit: UnitWeight  # Of all that takes part
+    tests: Tests  # Tests of all groups at the start of the round
+    unit: UnitWeight  # Unit weight of all included observations
     scales: Floats  # (G,) k^2 of each group
-    allowed: Bools  # (G,) which may go
-    level: Level  # Which probabilities are too small
-    out: int  # How many groups are out already
-    ahead: bool  # Whether to look for groups that hide each other where none is significant
+    allowed: Bools  # (G,) groups that may be removed
+    level: Level  # Significance level
+    out: int  # Number of removed groups
+    ahead: bool  # Whether to search for masked groups if none is significant
 
     @property
     def suspects(self) -> Suspects:
@@ -70,7 +72,7 @@ class Choosing:
         return self.trial.suspects
 
     def choose(self) -> list[Chosen]:
-        """Choose what goes in a round, in the order in which it goes."""
+        """Return the groups to remove in a round, in the order of removal."""
         if not self.trial.whole:
             return self._bounded()
         residuals, response = self.trial.response()
@@ -82,10 +84,10 @@ class Choosing:
         return self._sequences(conditional, np.array([groups]))[0]
 
     def on_gone_points(self, points: Sequence[int]) -> tuple[list[Chosen], set[int]]:
-        """Choose on points that are out with all that was observed of them.
+        """Select groups on points that are excluded with all their observations.
 
-        Each is tested against the photos as the others determine them. Returns what goes, and the points that
-        could be judged so.
+        Each is tested against the photos as determined by the others. Returns the selection, and the points
+        that could be tested.
         """
         blocks = [own for own in self.trial.gone_blocks(points) if own[0]]
         units = [self._with_own(residuals, response) for _, residuals, response in blocks]
@@ -93,7 +95,7 @@ class Choosing:
         return self._on_blocks(blocks, units), judged
 
     def _with_own(self, residuals: Floats, response: Floats) -> UnitWeight:
-        """Return the unit weight with a point that takes no part in it yet."""
+        """Return the unit weight including an excluded point."""
         unit, own = self.unit, float(residuals @ np.linalg.pinv(response, hermitian=True) @ residuals)
         return UnitWeight(
             unit.known,
@@ -104,9 +106,9 @@ class Choosing:
     def _sequences(
         self, conditional: Conditional, groups: Indices, most: float = math.inf
     ) -> list[list[Chosen]]:
-        """Take groups out of each block while the next is significant, or hides one that is.
+        """Select groups of each block while the next is significant, or masks a significant one.
 
-        `groups`: (n, K) the numbers of the groups of each block.
+        `groups` are (n, K) numbers of the groups of each block.
         """
         found: list[list[Chosen]] = [[] for _ in groups]
         sure = np.zeros(len(groups), dtype=np.int64)
@@ -161,7 +163,7 @@ class Choosing:
         return kept
 
     def _on_points(self, candidates: Indices) -> list[Chosen]:
-        """Choose on the point of each candidate; of a candidate without a point, itself."""
+        """Select on the point of each candidate, or a candidate without a point itself."""
         first: dict[int, int] = {}
         for group in candidates.tolist():
             point = int(self.suspects.points[group])
@@ -175,7 +177,7 @@ class Choosing:
         units: Sequence[UnitWeight],
         most: float = math.inf,
     ) -> list[Chosen]:
-        """Choose in blocks of groups whose R is known, those with groups of the same sizes together."""
+        """Select in blocks of groups with known R; blocks with the same group sizes together."""
         all_sizes = np.diff(self.suspects.row_starts)
         alike: dict[tuple[int, ...], list[int]] = {}
         for place, (groups, _, _) in enumerate(blocks):
@@ -198,7 +200,7 @@ class Choosing:
 def hides(unit: UnitWeight, scale: float) -> bool:
     """Whether there may be gross errors although no group is significant.
 
-    With a known unit weight the global test says so; without, nothing speaks against it.
+    The global test decides if the unit weight is known; otherwise always True.
     """
     if not unit.known:
         return True
@@ -209,7 +211,7 @@ def hides(unit: UnitWeight, scale: float) -> bool:
 
 
 def _beyond(tests: Tests, unit: UnitWeight, scales: Floats, limit: float) -> Bools:
-    """Return which groups have a T beyond the limit."""
+    """Return (G,) groups whose T exceeds the limit."""
     critical = np.full(len(tests.rank), math.inf)
     for rank in np.unique(tests.rank[tests.rank > 0]).tolist():
         critical[tests.rank == rank] = _critical(unit, rank, limit)
@@ -224,7 +226,7 @@ def _critical_sum(degrees_of_freedom: float) -> float:
 
 @lru_cache
 def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
-    """Return the limit of T: of chi-square, or of F solved for T."""
+    """Return the critical value of T: of chi-square, or of F solved for T."""
     if unit.known:
         return critical_chi_square(limit, dimension)
     others = unit.degrees_of_freedom - dimension
@@ -235,14 +237,14 @@ def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
 
 
 def _among_all(choice: Chosen, places: Indices, offsets: Indices) -> Chosen:
-    """Count rows and rivals among all."""
+    """Convert row and alternative numbers from a block to all groups."""
     rivals = tuple((int(places[place]), t, m, odds) for place, t, m, odds in choice.rivals)
     rows = choice.rows + offsets[choice.group]
     return replace(choice, group=int(places[choice.group]), rows=rows, rivals=rivals)
 
 
 class _Load:
-    """What the chosen may do to the test values of others, by photo: the sum of sqrt(h_i T_i)."""
+    """Bound of the effect of the selected groups on other test values by photo: the sum of sqrt(h_i T_i)."""
 
     def __init__(self, suspects: Suspects, tests: Tests) -> None:
         self.suspects, self.tests = suspects, tests
@@ -253,19 +255,19 @@ class _Load:
         return 0.0 if math.isnan(shared) else shared
 
     def _photos(self, group: int) -> list[int]:
-        """Return the photo of a group; those that its point is seen from where it has none."""
+        """Return the photo of a group; without one, the photos that observe its point."""
         photo = int(self.suspects.photos[group])
         return [photo] if photo >= 0 else self.suspects.loads(group).tolist()
 
     def leaves(self, choice: Chosen, critical: float) -> bool:
-        """Whether a group is significant whatever the chosen do to it."""
+        """Whether a group is significant for any effect of the selected groups."""
         group = choice.group
         load = max((self.of_photo.get(each, 0.0) for each in self._photos(group)), default=0.0)
         left = math.sqrt(max(choice.statistic, 0.0)) - math.sqrt(self._shared(group)) * load
         return left > math.sqrt(critical) or (load == 0.0)
 
     def add(self, choice: Chosen) -> None:
-        """Count a group that was chosen."""
+        """Add a selected group."""
         size = math.sqrt(self._shared(choice.group) * max(choice.statistic, 0.0))
         for each in self._photos(choice.group):
             self.of_photo[each] = self.of_photo.get(each, 0.0) + size

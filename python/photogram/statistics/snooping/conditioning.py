@@ -1,10 +1,10 @@
-"""Groups tested one after the other, each as if those before it were out, without a new adjustment.
+"""Conditional tests of groups, each as if the previous ones were removed, without a new adjustment.
 
-With v and R the residuals of unit weight of some rows and their cofactors, and S the rows that go,
+v and R are the residuals of unit weight of some rows and their cofactors, and S are the removed rows. Then
 
     v <- v - R_S R_SS^- v_S,    R <- R - R_S R_SS^- R_S',    Omega <- Omega - T_S,    f <- f - m'_S
 
-is what an adjustment without S gives in a linear model (Hadi and Simonoff 1993).
+is the result of an adjustment without S in a linear model (Hadi and Simonoff 1993).
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.groups import INVISIBLE, GroupTests, group_tests
 
 SAME = 1e-3
-"""Relative; logarithms of probabilities that differ by less are equal, and the order of the input decides:
-the images of a point on two photos, but for what an adjustment that ended early has left."""
+"""Relative difference of equal log-probabilities, for which the input order decides.
+
+Observations of a point on two photos differ only by the convergence error of the adjustment."""
 
 
 @dataclass(frozen=True)
 class UnitWeight:
-    """What the tests rest on."""
+    """Unit weight of the tests."""
 
-    known: bool  # Whether the unit weight is known: chi-square, else F
+    known: bool  # Whether the unit weight is known: chi-square, otherwise F
     weighted_sum_of_squares: float  # Omega and f
     degrees_of_freedom: float
 
     def without(self, statistic: float, dimension: int) -> UnitWeight:
-        """Return the same when a group is out."""
+        """Return the unit weight without a group."""
         left = max(self.weighted_sum_of_squares - statistic, 1e-12 * self.weighted_sum_of_squares)
         return UnitWeight(self.known, left, self.degrees_of_freedom - dimension)
 
@@ -46,10 +47,10 @@ class UnitWeight:
         return statistic / dimension / left if left > 0 else math.inf
 
     def odds(self, first: tuple[float, int], second: tuple[float, int]) -> float:
-        """Return the odds of one group against another: T and m' of each (Akaike weights).
+        """Return the likelihood ratio of two groups from T and m' of each (Akaike weights).
 
-        T is that of linear equations, which an error of many standard deviations bends: its third power is in
-        the difference of two that explain the same.
+        T refers to linear equations. A large error has a nonlinear effect of the order T^(3/2), which is
+        removed from the difference of two T.
         """
         (t, m), (other, n) = first, second
         bent = BENT * max(t, other) ** 1.5
@@ -65,24 +66,24 @@ class UnitWeight:
 
 @dataclass(frozen=True)
 class Chosen:
-    """A group, or a part of one, that was chosen."""
+    """A selected group, or a part of one."""
 
-    group: int  # Its place among the groups of the block
-    rows: Indices  # The rows of the block that go
-    statistic: float  # Of these rows
+    group: int  # Number among the groups of the block
+    rows: Indices  # The removed rows of the block
+    statistic: float  # T of these rows
     dimension: int
     log_probability: float
     fisher: float
-    error: Floats  # Their estimated errors, of unit weight, and the cofactors of these
+    error: Floats  # Their estimated errors, of unit weight, with cofactors
     cofactors: Floats
-    # Places of groups that were significant before and are not after, with T, m' and odds
+    # Groups that were significant only before the removal, with T, m' and likelihood ratio
     rivals: tuple[tuple[int, float, int, float], ...]
     first_statistic: float = math.nan  # T at the start of the round
-    limit: float = math.nan  # the level that it was compared with
+    limit: float = math.nan  # the level it was compared with
 
 
 class Conditional:
-    """n blocks of rows, each with the same groups, whose R is known block by block."""
+    """n blocks of rows, each with the same groups and known R."""
 
     def __init__(
         self,
@@ -114,7 +115,7 @@ class Conditional:
         self.dimension[blocks] = found.dimension.reshape(shape)
 
     def _of(self, blocks: Indices, rows: Indices, places: Indices) -> GroupTests:
-        """Test rows of blocks: (b,), (b, g) with -1 for none, and the groups that they belong to."""
+        """Test rows of blocks: (b,), (b, g) with -1 for none, and their groups."""
         there = rows >= 0
         rows = np.where(there, rows, 0)
         at = blocks[:, np.newaxis]
@@ -127,7 +128,7 @@ class Conditional:
         return group_tests(r, v, omega, freedom, known=self.units[0].known)
 
     def best(self, allowed: Bools) -> Indices:
-        """Return (n,) the least probable group that is allowed, of equals the first; -1 for none."""
+        """Return (n,) the least probable allowed group, the first of equal ones; -1 for none."""
         possible = allowed & (self.dimension > 0) & ~np.isnan(self.log_probability)
         log_p = np.where(possible, self.log_probability, math.inf)
         least = log_p.min(axis=1, initial=math.inf)
@@ -148,7 +149,7 @@ class Conditional:
     def choose(
         self, blocks: Indices, places: Indices, rows: Indices, allowed: Bools, log_limit: Floats
     ) -> list[Chosen]:
-        """Take rows of one group of each of some blocks out, and test the others without them.
+        """Remove rows of one group of each of some blocks, and test the others without them.
 
         Rows are padded by -1.
         """
@@ -213,4 +214,4 @@ class Conditional:
 
 
 BENT = 2e-5  # Largest effect of curvature on the difference of two T, in T^(3/2)
-RIVAL = 20.0  # Smallest odds against a rival
+RIVAL = 20.0  # Smallest likelihood ratio against an alternative

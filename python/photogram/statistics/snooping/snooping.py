@@ -1,4 +1,4 @@
-"""The rounds of data snooping: choose, take out, adjust, test what is out again."""
+"""The rounds of data snooping: select, remove, adjust, test the removed groups again."""
 
 from __future__ import annotations
 
@@ -22,33 +22,32 @@ from photogram.words import Phrase, phrase
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What snooping has ended with."""
+    """Result of data snooping."""
 
     log: list[Removal]  # all removals in order
-    rounds: list[Round]  # the last removes nothing
-    out: Out  # what is excluded
+    rounds: list[Round]  # the last one is without removals
+    out: Out  # excluded observations
     tests: int  # number of tested groups, as at the start
     before: Standing  # with all observations, and without the excluded ones
     standing: Standing
-    # By kind, the robust factors by which standard deviations were multiplied for the tests; empty where the
-    # given ones stand
+    # Robust factors of standard deviations by type; empty if the given ones are used
     factors: dict[str, float]
-    final: Tests  # at the end
+    final: Tests  # tests at the end
     remarks: list[Phrase]
 
 
 def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None = None) -> Outcome:
-    """Take gross errors out of a network, and return what was done.
+    """Remove gross errors from a network and return the outcome.
 
     Parameters
     ----------
     trial
         The network.
     settings
-        How.
+        Settings of data snooping.
     afresh
-        Starts the trial anew from a consensus of its observations, for where its adjustment runs off; returns
-        what the consensus does without, None if there is none.
+        Restarts the trial from a consensus of its observations if its adjustment diverges. Returns the
+        observations that the consensus rejects; None without consensus.
     """
     work = begun(trial, settings, afresh)
     take_bad_photos_out(work)
@@ -82,7 +81,7 @@ def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
     standing = work.standing
     count = sum(each.is_out for each in work.log)
     choices = work.choosing(work.allowed(), count, ahead=True).choose()
-    # In a large network what went before returns in the adjustment that takes others out.
+    # In a large network, earlier removals are reinstated in the adjustment that removes others.
     returned = [] if work.trial.whole else agreeing(work)
     removed = work.apply(work.entries(choices, number), returned)
     note_return(work, returned, number)

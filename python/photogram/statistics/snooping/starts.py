@@ -1,11 +1,11 @@
-"""How snooping begins where many observations are wrong, or some so much that the adjustment runs off.
+"""The start of data snooping with many gross errors, or with errors that make the adjustment diverge.
 
-Where many are wrong: with robust factors of standard deviations, and a robust adjustment.
+With many gross errors, robust factors of standard deviations and a robust adjustment are used.
 
-Where errors are huge, from what most observations agree on. Images under exchanged names are off by
-thousands of standard deviations. The adjustment of a block with them bends or diverges, and every test of it,
-robust or not, is of the bent block. Resections and intersections by consensus are not moved by a minority,
-however large its errors are.
+With huge errors, a consensus of most observations is used. Observations under exchanged names are off by
+thousands of standard deviations. The adjustment of such a block is distorted or diverges, and so are all its
+tests, robust or not. A minority does not affect resections and intersections by consensus, for any size of
+its errors.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from photogram.words import Phrase, phrase
 
 MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 MEDIAN_OF_TWO = 1.1774100225154747  # Median of the length of a vector of two of them
-OPTIMISTIC = 2.0  # Factor of standard deviations that the median shows
+OPTIMISTIC = 2.0  # Factor of standard deviations above which the median indicates a common scaling
 ENOUGH = 20  # Smallest number of test values for a median
 
 
 def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
-    """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""
+    """Return robust factors k by type if standard deviations are too small, and k^2 by group."""
     suspects, tests = work.suspects, work.tests
     squares = np.ones(len(suspects))
     if not work.settings.known:
@@ -56,7 +56,7 @@ def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
 
 
 def values(work: TakingOut, groups: Bools) -> Floats:
-    """Return |w| of all rows of some groups that are testable."""
+    """Return |w| of all testable rows of some groups."""
     rows = np.repeat(groups, np.diff(work.suspects.row_starts))
     with np.errstate(invalid="ignore", divide="ignore"):
         w = np.abs(work.tests.residual) / np.sqrt(work.tests.redundancy)
@@ -64,20 +64,19 @@ def values(work: TakingOut, groups: Bools) -> Floats:
 
 
 def robust_factor(values: Floats) -> float:
-    """Return the robust standard deviation of test values whose sizes are given."""
+    """Return the robust standard deviation of test values from their absolute values."""
     return float(np.median(values)) / MEDIAN if values.size else 1.0
 
 
-MANY = 0.05  # Share of images beyond `FAR` that requires a robust start
+MANY = 0.05  # Share of image observations beyond `FAR` that requires a robust start
 FAR = 5.0
 CANDIDATE = 4.4
-"""Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
-weight."""
+"""Robust standard deviations of a residual above which Cauchy's loss reduces its weight to a quarter."""
 SCALES = 5  # Largest number of robust adjustments
 
 
 def needs_robust_start(work: TakingOut) -> bool:
-    """Whether more disagrees than tests of single groups can sort out, or nothing converges."""
+    """Whether too many observations disagree for tests of single groups, or the adjustment fails."""
     if work.settings.robust is not None:
         return work.settings.robust
     if work.standing.status != "converged":
@@ -92,10 +91,10 @@ def needs_robust_start(work: TakingOut) -> bool:
 
 
 def start_robustly(work: TakingOut) -> None:
-    """Put points aside where robust weights nearly vanish, and test them against all others.
+    """Exclude points whose robust weights nearly vanish, and test them against all others.
 
-    A robust adjustment tells that something is wrong with a point, but not which of its rays it is: of
-    two rays both lose their weight, and a good one beside a large error often does.
+    A robust adjustment reveals an erroneous point, but not its erroneous ray. Both of two rays lose their
+    weight, and often a good one near a large error does.
     """
     suspects = work.suspects
     try:
@@ -119,7 +118,7 @@ def start_robustly(work: TakingOut) -> None:
 def start_without(
     work: TakingOut, candidates: Indices, first: Tests, standing: Standing, start: Phrase
 ) -> None:
-    """Put the points of some groups aside, and let tests against all others decide about them."""
+    """Exclude the points of some groups, and decide by tests against all others."""
     suspects, out = work.suspects, work.out
     points = np.unique(suspects.points[candidates])
     points = points[points >= 0]
@@ -139,12 +138,10 @@ def start_without(
 
 
 def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
-    """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
+    """Return sizes of residuals in a robust adjustment, and the factor of its standard deviations.
 
-    None if no robust adjustment converges.
-
-    The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
-    residuals of the robust adjustment, until it stands.
+    None if no robust adjustment converges. Many gross errors increase the median of all residuals. So the
+    factor is estimated again from robust residuals, until it is stable.
     """
     active = work.tests.active & (work.suspects.kinds == 0)
     rows = np.repeat(active, np.diff(work.suspects.row_starts))
@@ -168,7 +165,7 @@ def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
 def _on_points_aside(
     work: TakingOut, points: list[int], candidates: Indices, first: Tests
 ) -> tuple[list[Chosen], set[int]]:
-    """Adjust without some points and all candidates; choose on these points; tell which were judged."""
+    """Adjust without some points and all candidates; select on these points; return the tested points."""
     out = work.out.copy()
     out.points |= set(points)
     aside = np.isin(work.suspects.points, points)
@@ -177,7 +174,7 @@ def _on_points_aside(
     try:
         work.adjust(out)
     except LostSupportError:
-        # Photos are not determined without them: what has lost its weight goes, and is tested alone.
+        # Photos are not determined without them: groups without weight are removed, and tested separately.
         return [], set()
     work.factors, work.scales = scales(work)
     choosing = work.choosing(np.asarray(work.suspects.removable), 0, ahead=False)
@@ -188,7 +185,7 @@ BENT = 10.0  # Median of test values of a distorted network (sd)
 
 
 def _runs_off(work: TakingOut) -> bool:
-    """Whether the adjustment does not converge, or leaves residuals that no standard deviation explains."""
+    """Whether the adjustment diverges, or its residuals exceed any plausible standard deviation."""
     if work.standing.status != "converged":
         return True
     everything = values(work, np.ones(len(work.suspects), dtype=bool))
@@ -196,10 +193,11 @@ def _runs_off(work: TakingOut) -> bool:
 
 
 def begun(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None) -> TakingOut:
-    """Adjust a network for the first time, from a consensus where its adjustment runs off.
+    """Adjust a network for the first time; start from a consensus if the adjustment diverges.
 
-    An image whose point has other rays is tested against its prediction. Where no two are left, the point is
-    aside with all of them, and each is tested as if it were in, so that both of two rays are named.
+    An observation of a point with other rays is tested against its prediction. If fewer than two other rays
+    remain, the point is excluded, and each observation is tested as if it were included. So both of two rays
+    are reported.
     """
     start = None if settings.robust is False else afresh
     try:
@@ -218,7 +216,7 @@ def begun(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] |
 
 
 def _without(trial: Trial, aside: Aside) -> Out:
-    """Return what is out with what a consensus does without, and points with too few rays then."""
+    """Return the exclusions by a consensus, and points with too few remaining rays."""
     suspects = trial.suspects
     out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool))
     groups = list(aside.images)
@@ -230,9 +228,9 @@ def _without(trial: Trial, aside: Aside) -> Out:
 
 
 def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
-    """Test what a consensus does without against the rest; what agrees takes part.
+    """Test the exclusions of a consensus against the rest, and include agreeing ones.
 
-    `before`: how everything together stood; None if it could not be adjusted.
+    `before` is the adjustment of all observations; None if it failed.
     """
     first, tests, start = work.standing, work.tests, work.out
     out, consequences = Out(np.zeros_like(start.rows)), {}
@@ -267,9 +265,10 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
 
 
 def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests) -> list[int]:
-    """Take out again what tests against the rest have let in, and with which the adjustment runs off.
+    """Exclude again the included observations with which the adjustment diverges.
 
-    Two rays that part before the cameras agree with any photos in a linear model, for they meet behind them.
+    Two rays that diverge in front of the cameras agree with any photos in a linear model, because they
+    intersect behind them.
     """
     suspects = work.suspects
     back = [group for group in images.tolist() if not work.out.rows[suspects.rows(group)].any()]
@@ -283,7 +282,7 @@ def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests
 
 
 def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:
-    """Put groups out; return the points that have too few rays without them: they are out with all."""
+    """Exclude groups; return the points with too few remaining rays, which are excluded as well."""
     suspects = trial.suspects
     for group in groups:
         out.rows[suspects.rows(group)] = True
@@ -298,7 +297,7 @@ def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:
 
 
 def _predicted(work: TakingOut, groups: Indices) -> tuple[list[Removal], int]:
-    """Return entries of images that contradict what the rest predicts, and how many agree with it."""
+    """Return entries of observations that contradict their prediction, and the number of agreeing ones."""
     level = work.level.limit(0)
     standing = work.standing
     variance = standing.weighted_sum_of_squares / max(standing.degrees_of_freedom, 1)

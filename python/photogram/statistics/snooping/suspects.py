@@ -1,4 +1,4 @@
-"""Groups of observations that may hold a gross error together, and what is asked of a network of them."""
+"""Groups of observations that may contain a joint gross error, and the interface of their network."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from photogram.words import Phrase
 
 
 class Suspects(ABC):
-    """G groups of observations with M rows in all, one group after the other."""
+    """G groups of observations with M rows in all, in the order of the groups."""
 
     def __init__(
         self,
@@ -36,15 +36,15 @@ class Suspects(ABC):
         self.subjects = subjects  # (G,) number of the image, point, observation, ... of a group
         # (G,) point and photo of a group, or -1; tests of groups of one point depend on each other
         self.points, self.photos = points, photos
-        self.removable = removable  # (G,) whether snooping may remove it
+        self.removable = removable  # (G,) whether data snooping may remove it
 
     @abstractmethod
     def loads(self, group: int) -> Indices:
-        """Return the photos that a group concerns: those that observe its point."""
+        """Return the photos that a group affects: the ones that observe its point."""
 
     @abstractmethod
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return the rows that may go alone, of a group by its number; None if it goes as a whole."""
+        """Return the rows of a group that may be removed alone; None if only all together."""
 
     @abstractmethod
     def name(self, group: int) -> Phrase:
@@ -66,7 +66,7 @@ class Suspects(ABC):
         return len(self.kinds)
 
     def kind(self, group: int) -> str:
-        """Return what the kind of a group is called."""
+        """Return the observation type of a group."""
         return self.kind_names[int(self.kinds[group])]
 
     def rows(self, group: int) -> Indices:
@@ -84,11 +84,11 @@ class Suspects(ABC):
         return order, self.photos[order]
 
     def on_point(self, point: int) -> Indices:
-        """Return the groups of a point, in their order."""
+        """Return the groups of a point."""
         return _at(self._by_point, point)
 
     def on_photo(self, photo: int) -> Indices:
-        """Return the groups of a photo, in their order."""
+        """Return the groups of a photo."""
         return _at(self._by_photo, photo)
 
 
@@ -100,37 +100,37 @@ def _at(by: tuple[Indices, Indices], value: int) -> Indices:
 
 @dataclass(eq=False)
 class Out:
-    """What takes no part."""
+    """Excluded observations."""
 
-    rows: Bools  # (M,) which rows are out
+    rows: Bools  # (M,) excluded rows
     # Excluded points and photos, with all their observations
     points: set[int] = field(default_factory=set)
     photos: set[int] = field(default_factory=set)
 
     def copy(self) -> Out:
-        """Return the same, to be changed."""
+        """Return a copy to be changed."""
         return Out(self.rows.copy(), set(self.points), set(self.photos))
 
 
 @dataclass(frozen=True)
 class Standing:
-    """How a network stands without what is out."""
+    """State of a network without the excluded observations."""
 
-    status: str  # `converged`, or what else came of the iteration
-    # weighted_sum_of_squares, degrees_of_freedom: Omega and f of what takes part
+    status: str  # `converged`, or another end of the iteration
+    # weighted_sum_of_squares, degrees_of_freedom: Omega and f of the included observations
     weighted_sum_of_squares: float
     degrees_of_freedom: int
 
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests of all groups; NaN for what is out."""
+    """Tests of all groups; NaN if excluded."""
 
-    active: Bools  # (G,) whether any row takes part
-    rank: Indices  # (G,) directions in which an error shows
-    statistic: Floats  # (G,) T, by which Omega falls without the group
-    least: Floats  # (G,) the smallest redundancy of a direction that shows
-    # (G,) h: |correlation| of two groups of different points is no more than the root of the product
+    active: Bools  # (G,) whether any row is included
+    rank: Indices  # (G,) directions in which an error is visible
+    statistic: Floats  # (G,) T, the decrease of Omega without the group
+    least: Floats  # (G,) the smallest redundancy of a visible direction
+    # (G,) h: the absolute correlation of two groups of different points is bounded by the root of the product
     shared: Floats
     residual: Floats  # (M,) of unit weight
     redundancy: Floats  # (M,) redundancy numbers
@@ -139,34 +139,34 @@ class Tests:
     error_sd: Floats
 
     def testable(self, row_starts: Indices) -> Bools:
-        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        """Return (G,) groups with a direction whose errors are notable in their own residuals."""
         largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
         return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What is out of a group against what the rest predicts."""
+    """Excluded rows of a group compared with the prediction from the rest."""
 
     statistic: float  # d' C^-1 d: chi-square; its degrees of freedom are the number of excluded rows
-    rows: tuple[int, ...]  # These, of all
-    # error, error_sd: Observed minus predicted of each, and its standard deviation, in its unit
+    rows: tuple[int, ...]  # These rows, numbered among all
+    # error, error_sd: observed minus predicted of each, and its standard deviation, in its unit
     error: tuple[float, ...]
     error_sd: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Aside:
-    """What a consensus does without, from which a network was started anew."""
+    """Exclusions by the consensus from which a network was restarted."""
 
-    # The groups, by their numbers, that do not meet where most of their point and photo do
+    # Groups, by number, that do not agree with most of their point and photo
     images: tuple[int, ...]
-    photos: dict[int, str | Phrase]  # Photos whose images agree with no pose, with the reason
+    photos: dict[int, str | Phrase]  # Photos whose observations agree with no pose, with the reason
     found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
 
 class LostSupportError(Exception):
-    """What is out leaves unknowns undetermined: of these points and photos."""
+    """The exclusions make unknowns of these points and photos undetermined."""
 
     def __init__(self, points: Sequence[int], photos: Sequence[int]) -> None:
         super().__init__(f"undetermined: points {list(points)}, photos {list(photos)}")
@@ -175,7 +175,7 @@ class LostSupportError(Exception):
 
 
 class Trial(Protocol):
-    """What snooping asks of a network."""
+    """The interface of a network for data snooping."""
 
     @property
     def suspects(self) -> Suspects:
@@ -187,35 +187,35 @@ class Trial(Protocol):
 
     @property
     def whole(self) -> bool:
-        """Whether R of all rows together is small enough to be had."""
+        """Whether R of all rows together is small enough to be computed."""
 
     def adjust(self, out: Out) -> Standing:
-        """Adjust without what is out; raises LostSupportError."""
+        """Adjust without exclusions; raise LostSupportError if undetermined."""
 
     def tests(self) -> Tests:
         """Test all groups."""
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups; None if it cannot be predicted."""
+        """Test the excluded rows of groups; None if they cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
 
     def response(self) -> tuple[Floats, Floats]:
-        """Return residuals of unit weight (M,) and R (M, M) of all rows; zero for those that are out."""
+        """Return residuals of unit weight (M,) and R (M, M) of all rows; zero if excluded."""
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for points that are out, all groups there with residuals and R as if they took part.
+        """Return, for excluded points, all groups there with residuals and R as if included.
 
-        Each point by itself, against what the others determine; empty if that is not known.
+        Each point is separate, based on the unknowns from the others; empty if these are undetermined.
         """
 
     def resist(self, scale: float) -> Floats | None:
-        """Adjust robustly, errors beyond some `scale` standard deviations losing weight.
+        """Adjust robustly; errors beyond `scale` standard deviations lose weight.
 
-        Returns (G,) the lengths of the residuals of unit weight, zero for what no loss is applied to; None
-        where that leads nowhere, and nothing has changed.
+        Returns (G,) lengths of the residuals of unit weight, zero for groups without loss; None if the
+        adjustment fails, with the state unchanged.
         """
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
-        """Return points that are left with too few rays, and photos without support, when a group is out."""
+        """Return points with too few rays, and photos without support, after the exclusion of a group."""

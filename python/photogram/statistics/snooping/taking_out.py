@@ -1,4 +1,4 @@
-"""A network that is being snooped: what is out, how the rest stands, and the log; what agrees comes back."""
+"""A network during data snooping: exclusions, state of the rest, log, and reinstatement."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Settings:
-    """How to snoop."""
+    """Settings of data snooping."""
 
-    level: float = LEVEL  # Family level of all tests together, or the false discovery rate
-    fdr: bool = False  # Whether it is the latter
-    known: bool = True  # Whether the unit weight is known: chi-square decides, else F
-    robust: bool | None = None  # Whether to start robustly; None where many observations are wrong
+    level: float = LEVEL  # Joint level of all tests, or the false discovery rate
+    fdr: bool = False  # Whether `level` is the false discovery rate
+    known: bool = True  # Whether the unit weight is known: chi-square decides, otherwise F
+    robust: bool | None = None  # Whether to start robustly; None if many observations are wrong
     max_rounds: int = 20
 
 
-RESCUES = 5  # Largest number of attempts of a round to determine all unknowns
+RESCUES = 5  # Largest number of attempts per round to determine all unknowns
 _NOT_DETERMINED = Phrase("snooping.point-undetermined")
 
 
 class TakingOut:
-    """A network that is being snooped."""
+    """A network during data snooping."""
 
     def __init__(self, trial: Trial, settings: Settings, out: Out | None = None) -> None:
         self.trial, self.settings = trial, settings
@@ -63,12 +63,12 @@ class TakingOut:
         self.images = frozenset(np.flatnonzero(suspects.kinds == 0).tolist())
 
     def unit(self) -> UnitWeight:
-        """Return what tests of the network as it stands rest on."""
+        """Return the unit weight of tests of the current network."""
         standing = self.standing
         return UnitWeight(self.settings.known, standing.weighted_sum_of_squares, standing.degrees_of_freedom)
 
     def choosing(self, allowed: Bools, out: int, *, ahead: bool) -> Choosing:
-        """Return what chooses among allowed groups when so many are out."""
+        """Return the selection among allowed groups after `out` removals."""
         return Choosing(
             self.trial, self.tests, self.unit(), self.scales, allowed, self.level, out, ahead=ahead
         )
@@ -82,7 +82,7 @@ class TakingOut:
         *,
         out: int = 0,
     ) -> None:
-        """Add a round to the log: how the network stood before it, with so many out, and what it changed."""
+        """Add a round to the log: the state before it, with `out` removals, and its changes."""
         self.rounds.append(
             Round(
                 number=number,
@@ -97,17 +97,17 @@ class TakingOut:
         )
 
     def allowed(self) -> Bools:
-        """Return (G,) which groups may go: testable, and not kept before."""
+        """Return (G,) groups that may be removed: testable, and not retained before."""
         allowed = self.suspects.removable & self.testable()
         allowed[list(self.kept)] = False
         return allowed
 
     def testable(self) -> Bools:
-        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
+        """Return (G,) groups with a direction whose errors are notable in their own residuals."""
         return self.tests.testable(self.suspects.row_starts)
 
     def as_it_was(self, group: int, tests: Tests) -> Removal:
-        """Return the entry of a group that goes without a test of its own."""
+        """Return the entry of a group that is removed without a separate test."""
         rows = self.suspects.rows(group)
         statistic, dimension = float(tests.statistic[group]), int(tests.rank[group])
         return self.entry(
@@ -125,7 +125,7 @@ class TakingOut:
         )
 
     def entries(self, choices: list[Chosen], number: int) -> list[Removal]:
-        """Return what was chosen as entries of the log."""
+        """Return the selected groups as entries of the log."""
         entries = []
         for choice in choices:
             deviations = self.trial.deviations[choice.rows]
@@ -171,9 +171,9 @@ class TakingOut:
         )
 
     def apply(self, entries: list[Removal], returning: Sequence[int] = ()) -> list[int]:
-        """Take groups out with what cannot stay without them, and adjust.
+        """Remove groups with all dependent observations, and adjust.
 
-        Groups without which the network falls apart stay, and are said to.
+        Groups that are needed to determine the network are retained and reported.
         """
         if not entries and not returning:
             return []
@@ -216,7 +216,7 @@ class TakingOut:
         self.log.append(entry.with_(kept=Phrase("snooping.needed")))
 
     def _out_with(self, out: Out, entry: Removal) -> Removal:
-        """Put a group out, and what cannot stay without it."""
+        """Exclude a group and all observations that depend on it."""
         out.rows[list(entry.rows)] = True
         points, photos = self.trial.consequences(out, entry.group)
         consequences = list(entry.consequences)
@@ -233,7 +233,7 @@ class TakingOut:
         return entry.with_(consequences=tuple(dict.fromkeys(consequences))) if consequences else entry
 
     def left(self, out: Out, point: int) -> Iterator[Phrase]:
-        """Put everything of a point out, with a message for each group."""
+        """Exclude all observations of a point, with a message for each group."""
         for group in self.suspects.on_point(point).tolist():
             rows = self.suspects.rows(group)
             if not out.rows[rows].all():
@@ -241,21 +241,21 @@ class TakingOut:
                 yield Phrase("snooping.single-ray", {"name": self.suspects.name(group)})
 
     def adjust(self, out: Out) -> None:
-        """Adjust without what is out, and test the rest; raises LostSupportError."""
+        """Adjust without exclusions and test the rest; raise LostSupportError if undetermined."""
         self.standing = self.trial.adjust(out)
         self.out = out
         self.tests = self.trial.tests()
 
 
 def note_return(work: TakingOut, places: list[int], number: int) -> None:
-    """Say in the log that entries, by their places there, have come back in a round."""
+    """Record the reinstatement of log entries in a round."""
     for place in places:
         work.returns.add(work.log[place].group)
         work.log[place] = with_prediction(work, place).with_(returned=number)
 
 
 def take_back(work: TakingOut, number: int) -> list[int]:
-    """Take back what agrees with the rest, one adjustment after the other."""
+    """Reinstate observations that agree with the rest, one adjustment after the other."""
     returning = agreeing(work)
     if not returning:
         return []
@@ -271,7 +271,7 @@ def take_back(work: TakingOut, number: int) -> list[int]:
 
 
 def agreeing(work: TakingOut) -> list[int]:
-    """Test what is out against the rest, and return what agrees: the best, or all that are apart."""
+    """Test exclusions against the rest, and return the best agreeing one, or all independent ones."""
     places = [place for place, each in enumerate(work.log) if each.is_out and each.rows]
     if not places:
         return []
@@ -294,7 +294,7 @@ def agreeing(work: TakingOut) -> list[int]:
 
 
 def _apart(work: TakingOut, places: list[int]) -> list[int]:
-    """Return the first where every one is tested alone, else those that have no photo in common."""
+    """Return the first if each must be tested singly, otherwise the ones without a common photo."""
     if work.trial.whole:
         return places[:1]
     taken: set[int] = set()
@@ -310,11 +310,11 @@ def _apart(work: TakingOut, places: list[int]) -> list[int]:
 
 
 def with_prediction(work: TakingOut, place: int) -> Removal:
-    """Return an entry of the log with what the rest says of it."""
+    """Return an entry of the log with its prediction from the rest."""
     if place not in work.predicted:
         return work.log[place]
     prediction, log_p = work.predicted[place]
-    # Another entry may have taken out other components of the same group.
+    # Another entry may have removed other components of the same group.
     errors = dict(zip(prediction.rows, prediction.error, strict=True))
     return work.log[place].with_(
         prediction=prediction.statistic,
@@ -324,7 +324,7 @@ def with_prediction(work: TakingOut, place: int) -> Removal:
 
 
 def log_probability(work: TakingOut, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
-    """Return log-probabilities of what is out as observations of the network without it."""
+    """Return log-probabilities of excluded observations relative to the network without them."""
     if work.settings.known:
         return log_chi_square(statistic / work.scales[groups], dimension)
     f = work.standing.degrees_of_freedom

@@ -1,4 +1,4 @@
-"""Photos that go as a whole: those of another exposure, or with scrambled names."""
+"""Removal of whole photos: photos of another exposure, or with scrambled names."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from photogram.words import Phrase, phrase
 
 FAR = 5.0
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
-"""Images of a photo that are out, by number and share, from which on the whole photo goes."""
+"""Least number and share of removed observations above which the whole photo is removed."""
 EVEN = 0.25
-"""Share of the largest test value of a photo that the median of all of them has where all its images are
-bad: a few huge errors, such as exchanged names, lift the others, but far less."""
-BAD_PHOTOS = 5  # Largest number of photos that are removed before tests of images
+"""Ratio of the median and the largest test value of a photo if all its observations are wrong.
+
+A few huge errors, such as exchanged names, increase the other values, but far less."""
+BAD_PHOTOS = 5  # Largest number of photos that are removed before tests of observations
 
 
 def take_bad_photos_out(work: TakingOut) -> None:
-    """Take out as one group each photo whose images all disagree: those of another exposure, wrong names.
+    """Remove each photo whose observations all disagree: another exposure, or wrong names.
 
-    Such a photo spoils all around it, so that nothing can be told of single images. The median of its
-    test values stands out: a few gross errors do not move it. Where that is by its observed station, the
-    photo stays, and the station is left to its own test.
+    Such a photo affects all around it, so that single observations cannot be tested. The median of its test
+    values is conspicuous, and a few gross errors do not change it. If an observed station causes it, the
+    photo is retained, and the station is tested separately.
     """
     for _ in range(BAD_PHOTOS):
         middles = _middles(work)
@@ -46,7 +47,7 @@ def take_bad_photos_out(work: TakingOut) -> None:
 
 
 def take_photos_out(work: TakingOut, number: int) -> list[int]:
-    """Take out as a whole the photos most of whose images are out, each by itself."""
+    """Remove the photos most of whose observations are removed, each separately."""
     suspects = work.suspects
     single = [work.log[place] for place in range(len(work.log)) if work.log[place].is_out]
     photos = [int(suspects.photos[each.group]) for each in single if each.group in work.images]
@@ -63,7 +64,7 @@ def take_photos_out(work: TakingOut, number: int) -> list[int]:
 
 
 def _photo_out(work: TakingOut, photo: int, number: int, reason: Phrase) -> int | None:
-    """Take a photo out with all that was observed of it; return the place of its entry in the log."""
+    """Remove a photo with all its observations; return the number of its log entry."""
     before = work.standing
     out = work.out.copy()
     consequences = take_photo(work, out, photo)
@@ -76,7 +77,7 @@ def _photo_out(work: TakingOut, photo: int, number: int, reason: Phrase) -> int 
 
 
 def take_photo(work: TakingOut, out: Out, photo: int) -> list[Phrase]:
-    """Put a photo out with all that was observed of it; return what else leaves with it."""
+    """Exclude a photo with all its observations; return messages on dependent exclusions."""
     suspects = work.suspects
     own = suspects.on_photo(photo)
     out.rows[np.concatenate([suspects.rows(group) for group in own.tolist()])] = True
@@ -94,9 +95,9 @@ def take_photo(work: TakingOut, out: Out, photo: int) -> list[Phrase]:
 def log_photo(
     work: TakingOut, photo: int, number: int, before: Standing | None, consequences: tuple[Phrase | str, ...]
 ) -> int:
-    """Enter a photo that is out, with what has fallen since then; return its place in the log.
+    """Log the removal of a photo, with the decrease of Omega; return the number of the entry.
 
-    `before` is None if the network has never been adjusted with it.
+    `before` is None if the network was never adjusted with the photo.
     """
     suspects = work.suspects
     omega, log_p = math.nan, math.nan
@@ -130,14 +131,14 @@ def log_photo(
 
 
 def _largest(work: TakingOut, photo: int) -> float:
-    """Return the largest test value of the images of a photo, in standard deviations."""
+    """Return the largest test value of the observations of a photo, in standard deviations."""
     own = work.suspects.on_photo(photo)
     own = own[(work.suspects.kinds[own] == 0) & work.testable()[own]]
     return float(np.sqrt(work.tests.statistic[own] / work.tests.rank[own]).max(initial=0.0))
 
 
 def _middles(work: TakingOut) -> Floats:
-    """Return the median of the test values of the images of each photo, in standard deviations."""
+    """Return the median of the test values of the observations of each photo, in standard deviations."""
     suspects, tests = work.suspects, work.tests
     tested = (suspects.kinds == 0) & work.testable()
     size = np.sqrt(tests.statistic / np.maximum(tests.rank, 1))
@@ -152,7 +153,7 @@ def _middles(work: TakingOut) -> Floats:
 
 
 def _is_by_station(work: TakingOut, photo: int, middle: float) -> bool:
-    """Whether the images of a photo agree as soon as its observed position and attitude are out."""
+    """Whether the observations of a photo agree without its observed position and attitude."""
     own = work.suspects.on_photo(photo)
     stations = own[(work.suspects.kinds[own] != 0) & work.tests.active[own]]
     if not stations.size:
