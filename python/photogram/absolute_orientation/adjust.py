@@ -32,12 +32,13 @@ UnitVariance = Literal["estimated", "unity"]
 
 
 MOST_ITERATIONS = 50
-TRIAL_ITERATIONS = 15  # Control that fits needs four or five; one that needs more explains nothing
-WEAK = 1e3  # Condition number from which control is called weak
+TRIAL_ITERATIONS = 15  # Fitting control needs four or five; a trial with more explains nothing
+WEAK = 1e3  # Condition number above which control is weak
 SUSPICIOUS = 1e-4
-"""Root mean square residual, in sizes of the model, from which a cause is looked for; a good one is a few
-parts in a hundred thousand."""
-NO_FIT = 0.1  # And from which it is no orientation
+"""Root mean square residual, relative to the size of the model, above which the cause is searched.
+
+The residuals of good control are a few parts in a hundred thousand."""
+NO_FIT = 0.1  # The same for a failed orientation
 IN_A_PLANE = 3.0  # Largest distance of points from a common plane (rms residuals)
 ROUNDING = 1e-9  # Residuals below this fraction of the size of the model are rounding
 
@@ -55,61 +56,60 @@ def orient(
     trace: bool = False,
     scale: float | None = None,
 ) -> Orientation:
-    """Orient a model absolutely: find s, A and B of x = s A X + B from any mix of control.
+    """Compute the absolute orientation of a model: s, A and B of x = s A X + B.
 
-    Minimised is the weighted sum of squares of the residuals in both systems; without standard deviations
-    that of u = s X - A^T (x - B) over the known components (TB 19, made right for partial control).
+    Any mix of control coordinates is allowed. The weighted sum of squares of the residuals in both systems is
+    minimised. Without standard deviations, it is the sum of squares of u = s X - A^T (x - B) over the known
+    components (TB 19, corrected for partial control).
 
     Parameters
     ----------
     stations
         Model and control coordinates.
     method
-        `rigorous`: until no unknown changes by more than `tolerance`. `report`: the bulletin's cycle
-        (Gauss-Crout, until all corrections of angles are 1e-5 rad at the most) on the same residuals.
-        `fill-in`: the bulletin's cycle on its own equations, missing coordinates filled in from the last
-        cycle; with partial control it ends elsewhere, by 1e-6 rad or so. The report's methods take no
-        standard deviations.
+        `rigorous` iterates until no unknown changes by more than `tolerance`. `report` is the bulletin's
+        cycle on the same residuals (Gauss-Crout, until all angle corrections are at most 1e-5 rad). `fill-in`
+        is the bulletin's cycle on its own equations, with missing coordinates taken from the last cycle. With
+        partial control its result differs by about 1e-6 rad. The report's methods do not use standard
+        deviations.
     start
         `report`: from the first two stations (omega = phi = 0, any kappa). `closed-form`: at any attitude, by
-        Horn's quaternion for full control, else the best minimum over all rotations. `auto`: the report's
-        values, unless the closed form finds a better place. None stands for `auto`, and for `report` with the
-        report's methods.
+        Horn's quaternion for full control, otherwise the best minimum over all rotations. `auto`: the
+        report's values, unless the closed form finds a better minimum. None means `auto`, or `report` with
+        the report's methods.
     former
-        A former result to start from.
+        A previous result used as initial values.
     reject
-        Identifiers of stations whose control takes no part; their differences are reported.
+        Identifiers of stations whose control is not used; their differences are reported.
     unit_variance
-        Covariances are scaled by sigma0 squared (`estimated`), or not (`unity`, with standard deviations
-        given).
+        `estimated` scales covariances by sigma0 squared; `unity` does not (requires standard deviations).
     max_iterations
-        Iterations at the most.
+        Maximum number of iterations.
     tolerance
-        Fraction of its standard deviation by which no unknown changes any more.
+        Largest change of an unknown at convergence, as a fraction of its standard deviation.
     trace
-        Whether the cycles of the report's methods keep what they computed on their way (`traces`).
+        True to store intermediate results of the report's methods (`traces`).
     scale
-        s, model units per ground unit, where it is known and held: six unknowns are left, and one horizontal
+        Known s, model units per ground unit, which is then fixed. Six unknowns remain, and one horizontal
         coordinate less is needed.
 
     Returns
     -------
-    The orientation; its `status` says whether it converged, `usable` whether it is one at all.
+    The orientation; `status` reports convergence, and `usable` whether the values can be used.
 
     Raises
     ------
     RankError
-        Control that does not determine the unknowns: fewer than seven components (six with the scale held),
-        four horizontal ones (three) or three elevations; stations or elevations in a straight line;
-        horizontal stations that
-        coincide. Its `points` names the stations.
+        If the control does not determine the unknowns. Required are seven components (six with a fixed
+        scale), four horizontal ones (three) and three elevations. Stations or elevations in a straight line,
+        or coincident horizontal stations, are not sufficient. `points` contains the stations.
     AdjustmentError
-        The scale became zero or negative (the model is a mirror image), or nothing finite.
+        If the scale becomes zero or negative (the model is a mirror image), or a value is not finite.
     InputError
-        An option that cannot be; with `start="report"` first two stations without horizontal coordinates, or
-        coincident.
+        If an option is invalid, or the first two stations lack horizontal coordinates or coincide with
+        `start="report"`.
     KeyboardInterrupt
-        Ctrl-C.
+        If interrupted by Ctrl-C.
     """
     one_of("method", method, get_args(Method))
     start = ("auto" if method == "rigorous" else "report") if start is None else start
@@ -165,10 +165,10 @@ def _doubts(
     solution: _photocore.SimilaritySolution,
     fit: Callable[[Floats], Fit | None],
 ) -> tuple[list[Message], list[Message]]:
-    """Look for what may be wrong where the model fits badly, and what a good fit leaves open."""
+    """Find probable mistakes if the model fits badly, and ambiguities if it fits well."""
     model = result.stations.model[rows]
     size = math.sqrt(float(((model - model.mean(axis=0)) ** 2).sum() / len(rows)))
-    # What rounding leaves of a perfect fit, in the unit of the sum of squares.
+    # Rounding errors of a perfect fit, in the unit of the sum of squares.
     unit = result.weighted_sum_of_squares / result.rms**2 if result.rms > 0 else result.known
     rounding = unit * (ROUNDING * size) ** 2
     failed = result.test is not None and result.test.problem() is not None
@@ -199,7 +199,7 @@ def _doubts(
 
 
 def _in_a_plane(model: Floats, rms: float, size: float) -> bool:
-    """Whether points are as near to a plane as the orientation fits."""
+    """Whether points are in a plane within the residuals."""
     off_plane = float(np.linalg.svd(model - model.mean(axis=0), compute_uv=False)[-1]) / math.sqrt(len(model))
     return len(model) <= 3 or off_plane <= IN_A_PLANE * rms + ROUNDING * size
 
@@ -270,7 +270,6 @@ def _orientation(
     count = len(stations.ids)
 
     def spread(values: Floats) -> Floats:
-        """Put the rows that took part back among all stations."""
         full = np.full((count, *values.shape[1:]), np.nan)
         full[rows] = values
         return full
@@ -315,7 +314,7 @@ def _orientation(
 def _messages(
     solution: _photocore.SimilaritySolution, names: list[str], scale: float | None, freedom: int
 ) -> list[Message]:
-    """Collect remarks that did not stop the orientation, the gravest first."""
+    """Return warnings that did not stop the orientation, in the order of severity."""
     messages = []
     if solution.alternatives:
         angles = [np.degrees(Similarity.from_core(row).angles).tolist() for row in solution.alternatives]
@@ -345,7 +344,7 @@ def _named(
     message: str,
     concerned: list[int],
 ) -> AdjustmentError | InputError:
-    """Put names to the stations of a failure of the core."""
+    """Return an error of the core with the names of its stations."""
     names = [stations.ids[rows[i]] for i in concerned if i < len(rows)]
     if kind == "insufficient":
         counts = dict(zip("xyz", map(int, used.sum(axis=0)), strict=True))

@@ -1,7 +1,7 @@
-"""Stations, former results and transformations in the card order of TB 19, section 7.
+"""Stations, previous results and transformations in the card order of TB 19, section 7.
 
-The bulletin leaves the format of the cards open. Here a record is a line of words, separated by blanks or by
-commas; a missing control coordinate is a word `-`, or nothing between two commas.
+The bulletin does not define the format of the cards. Here a record is a line of words, separated by blanks or
+by commas. A missing control coordinate is a word `-`, or nothing between two commas.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ MISSING = ("", "-")
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """The cards of part I."""
+    """Cards of part I."""
 
     stations: Stations  # The station records
-    former: Similarity | None  # The approximate parameters of the first record; None when its words are zeros
+    former: Similarity | None  # The approximate parameters of the first record; None if its words are zeros
     identification: str  # The last word of the constants
-    messages: list[Message] = field(default_factory=list)  # Remarks on the records
+    messages: list[Message] = field(default_factory=list)  # Warnings on the records
 
 
 class _Record(Place):
     def words(self, least: int, most: int, what: str) -> list[str]:
-        """Split into words; between two commas there may be none."""
+        """Split into words; words between two commas may be empty."""
         text = self.text or ""
         split = text.split(",") if "," in text else text.split()
         words = [word.strip() for word in split]
@@ -57,7 +57,7 @@ class _Record(Place):
         return words
 
     def number_of(self, word: str, what: str) -> float:
-        """Read a number; D marks an exponent as E does."""
+        """Read a number with the exponent letter D or E."""
         try:
             return finite_number(word.upper().replace("D", "E"))
         except ValueError:
@@ -79,7 +79,7 @@ def read_cards(
 ) -> Deck:
     """Read the cards of part I: approximate parameters, constants, stations.
 
-    Record 1: sin omega, sin phi, sin kappa, s, b1, b2, b3, identification; zeros stand for no approximation.
+    Record 1: sin omega, sin phi, sin kappa, s, b1, b2, b3, identification; all zeros without approximation.
     Record 2: M, N, MN, identification. Then M records X1 X2 X3 x1 x2 x3 number.
 
     Parameters
@@ -87,15 +87,15 @@ def read_cards(
     path
         The file.
     zero_missing
-        Whether a control coordinate of zero is a missing one, as in the bulletin.
+        True if a control coordinate of zero means a missing one, as in the bulletin.
     ground_unit, model_unit
         Names of the units.
 
     Raises
     ------
     InputError
-        The file cannot be read, a record has other words than these, or the counts M, N, MN are not those of
-        the stations; names file, record and text.
+        If the file cannot be read, a record has other words, or the counts M, N, MN differ from the stations.
+        The message contains file, record and text.
     """
     records = _records(path)
     if len(records) < 2:
@@ -154,7 +154,7 @@ def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Sim
 
 
 def _former(record: _Record, stations: Stations, messages: list[Message]) -> Similarity | None:
-    """Read the parameters of a former result; None when all are zero."""
+    """Read the parameters of a previous result; None if all are zero."""
     words = record.words(7, 8, "parameters sin omega, sin phi, sin kappa, s, b1, b2, b3, identification")
     values = np.array([record.number_of(word, "parameter") for word in words[:7]])
     if not values.any():
@@ -173,7 +173,7 @@ def _former(record: _Record, stations: Stations, messages: list[Message]) -> Sim
 
 
 def _kappa(stations: Stations) -> float | None:
-    """Kappa = theta_X - theta_x of the first two stations, for its quadrant; None where they have no plan."""
+    """Return kappa = theta_X - theta_x of the first two stations; None without plan coordinates."""
     if len(stations.ids) < 2 or not stations.given[:2, :2].all():
         return None
     ground, model = (array[1, :2] - array[0, :2] for array in (stations.control, stations.model))
@@ -187,7 +187,7 @@ def restart_record(similarity: Similarity, identification: str) -> str:
 
 
 def transformation_records(similarity: Similarity, identification: str) -> list[str]:
-    """Return the two records that part II reads: a11 ... a23, then a31 a32 a33 s b1 b2 b3."""
+    """Return the two records of part II: a11 ... a23, then a31 a32 a33 s b1 b2 b3."""
     a = similarity.rotation.ravel()
     last = [*a[6:], similarity.scale, *similarity.translation]
     return [_record(a[:6], identification), _record(last, identification)]
@@ -200,7 +200,7 @@ def _record(values: list[float] | Floats, identification: str) -> str:
 
 
 def read_transformation(path: Path) -> Similarity:
-    """Read the two records of part II, the output of part I. Its covariance is unknown."""
+    """Read the two records of part II, the output of part I; their covariance is unknown."""
     records = _records(path)
     if len(records) < 2:
         raise InputError(phrase("orientation.transformation"), file=path)

@@ -23,11 +23,11 @@ __all__ = ["header", "is_csv", "read_csv", "spelling"]
 REQUIRED = ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS)
 OPTIONAL = (*CONTROL_SD_COLUMNS, *MODEL_SD_COLUMNS)
 SPELLINGS = {f"{letter}{k + 1}": "xyz"[k] if letter == "x" else "XYZ"[k] for letter in "xX" for k in range(3)}
-"""X1, X2, X3, x1, x2, x3 of the bulletin for X, Y, Z, x, y, z."""
+"""Names of the bulletin, X1, X2, X3, x1, x2, x3, mapped to X, Y, Z, x, y, z."""
 
 
 def is_csv(path: Path) -> bool:
-    """Whether the first line that says anything is the header of a CSV file and not a record of numbers."""
+    """Whether the first line with content is the header of a CSV file, not a record of numbers."""
     lines = enumerate(read_lines(path), 1)
     first = next(
         (Place(path, n, line) for n, line in lines if line.strip() and not line.startswith("#")), None
@@ -36,27 +36,27 @@ def is_csv(path: Path) -> bool:
 
 
 def header(place: Place) -> list[str]:
-    """Return the names of columns in a record, in the spelling X, Y, Z, x, y, z."""
+    """Return the column names of a record, in the spelling X, Y, Z, x, y, z."""
     return [spelling(cell) for cell in cells(place)]
 
 
 def spelling(name: str) -> str:
-    """Return the name of a column from what the bulletin or a file calls it."""
+    """Return the standard name of a column."""
     return SPELLINGS.get(name, name)
 
 
 def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = "model unit") -> Stations:
     """Read stations from a CSV file with a header.
 
-    Columns, in any order: `id`; `X`, `Y`, `Z` (empty where unknown); `x`, `y`, `z`; if there are any `sd_X`,
-    `sd_Y`, `sd_Z` (empty: 0, exact; `inf`: takes no part) and `sd_x`, `sd_y`, `sd_z`. Empty lines and lines
-    that begin with `#` are skipped.
+    Columns, in any order: `id`; `X`, `Y`, `Z` (empty if unknown); `x`, `y`, `z`. Optional columns are `sd_X`,
+    `sd_Y`, `sd_Z` (empty: 0, exact; `inf`: not used) and `sd_x`, `sd_y`, `sd_z`. Empty lines and lines that
+    begin with `#` are skipped.
 
     Raises
     ------
     InputError
-        The file cannot be read, a column is missing or unknown, a field is no number; names file, record and
-        text.
+        If the file cannot be read, a column is missing or unknown, or a field is not a number. The message
+        contains file, record and text.
     """
     table = Table.read(path, comment="#", spelling=spelling)
     _check_header(table)
@@ -99,7 +99,7 @@ def _check_header(table: Table) -> None:
 
 
 def _number(row: Row, column: str, blank: float | None) -> float:
-    """Read a number; infinity only for a standard deviation of control."""
+    """Read a number; infinity only as a standard deviation of control."""
     text = row.cells.get(column, "")
     if column in CONTROL_SD_COLUMNS and text.lower() in ("inf", "+inf", "infinity"):
         return math.inf

@@ -81,7 +81,7 @@ def orientation_document(result: Orientation) -> Document:
 
 
 def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
-    """Return how much there is, and how good it is."""
+    """Return facts on size and on quality."""
     given, scale = result.used.sum(axis=0).tolist(), result.similarity.scale
     model, ground = result.stations.model_unit, result.stations.ground_unit
     done = len(result.iterations) if result.cycles is None else len(result.cycles)
@@ -166,13 +166,13 @@ def to_json(result: Orientation) -> bytes:
 
 
 def without_points(result: Orientation) -> Iterator[bytes]:
-    """Return the document up to the first of its points, so that any number of them can follow."""
+    """Yield the document up to its first point, so that any number of points can follow."""
     yield json.to_json(record(result.document())).removesuffix(b"\n}\n")
     yield b',\n  "points": ['
 
 
 def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
-    """Return points as JSON objects, one a line, with commas between them."""
+    """Return points as JSON objects, one per line, separated by commas."""
     rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
     objects = (
         orjson.dumps({"id": name, "position": position, "covariance": covariance})
@@ -182,7 +182,7 @@ def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> by
 
 
 def orientation_findings(result: Orientation) -> Findings:
-    """Return the tests of an orientation: w with standard deviations to be relied on, else t."""
+    """Return the tests of an orientation: w with a priori standard deviations, otherwise t."""
 
     def name(index: tuple[int, ...]) -> Phrase:
         station, axis = result.stations.ids[index[0]], "XYZ"[index[1]]

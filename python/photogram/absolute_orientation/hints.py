@@ -1,8 +1,8 @@
-"""What may be wrong with control that does not fit its model, found by trying it.
+"""Hypotheses on mistakes in control that does not fit its model, tested by trial.
 
 A hypothesis changes the control: a mirror image, elevations in another unit, coordinates exchanged at one
-station. The model is oriented anew with each; one that explains the residuals makes their sum of squares fall
-by far more than chance and the number of trials allow (likelihood ratio f ln(Omega_0 / Omega_h)).
+station. The model is oriented again for each. A hypothesis is accepted if the sum of squares decreases by far
+more than chance and the number of trials allow (likelihood ratio f ln(Omega_0 / Omega_h)).
 """
 
 from __future__ import annotations
@@ -19,25 +19,24 @@ from photogram.statistics.likelihood import judged
 from photogram.words import Phrase, phrase
 
 FOOT = 0.3048
-STATIONS = 60  # Stations that are tried one by one, at the most
+STATIONS = 60  # Maximum number of stations that are tried one by one
 WORK = 20_000
-"""Of many stations fewer are tried, so that about as many are oriented anew altogether, but always a few."""
+"""With many stations fewer are tried, at least FEW, so that the total work is limited."""
 FEW = 6
 PAIRS = 60
-"""Pairs of stations that are exchanged on trial, at the most: of more, those that are nearest each other's
-places."""
-MOST = 5  # Hypotheses accepted one upon the other, at the most
-AS_WELL = 4.0  # A mirror image fits as well when its sum of squares is at most this multiple
+"""Maximum number of tried exchanges; pairs near each other's positions are preferred."""
+MOST = 5  # Maximum number of successive hypotheses
+AS_WELL = 4.0  # A mirror image fits as well if its sum of squares is at most this multiple
 SAME_SCALE = 1e-3  # Relative difference from the ratio of feet and metres
 SCALE_DEVIATIONS = 3.0
-ROUNDING = 1e-5  # And what coordinates of a few digits leave of it
+ROUNDING = 1e-5  # The same for coordinates of a few digits
 
 UNITS = {FOOT: "feet", 1 / FOOT: "metres"}
 
 
 @dataclass(frozen=True)
 class Fit:
-    """An orientation that was tried: its sum of squares, and a33, the cosine of its tilt."""
+    """A trial orientation: its sum of squares, and a33, the cosine of its tilt."""
 
     sum_of_squares: float
     upright: float
@@ -52,7 +51,7 @@ class Hint:
 
 
 Orient = Callable[[Floats], Fit | None]
-"""Orients the model with changed control; None where that cannot be done."""
+"""Orients the model with changed control; returns None on failure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +73,11 @@ def find(
     degrees_of_freedom: int,
     orient: Orient,
 ) -> list[Hint]:
-    """Try what may be wrong, and return what explains the residuals.
+    """Try possible mistakes and return the ones that explain the residuals.
 
-    `control` (n, 3) is NaN where it takes no part; `placed` is where the orientation as it is places the
-    model, with its sum of squares and degrees of freedom; a sum of squares up to `rounding` is no more than
-    that.
+    `control` (n, 3) is NaN if not used. `placed` are the control coordinates of the model by the given
+    orientation, with its sum of squares and degrees of freedom. A sum of squares up to `rounding` is rounding
+    only.
     """
     hints: list[Hint] = []
     now = sum_of_squares
@@ -99,7 +98,7 @@ def find(
 
 
 def trials(names: list[str], control: Floats, placed: Floats, rounding: float, orient: Orient) -> list[Trial]:
-    """Orient the model anew with every hypothesis; those of the whole set come first. See :func:`find`."""
+    """Orient the model for each hypothesis, mistakes of the whole set first; see :func:`find`."""
     return [
         Trial(text, changed, max(fit.sum_of_squares, rounding))
         for text, changed in _hypotheses(names, control, placed)
@@ -133,12 +132,11 @@ def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[t
 
 
 def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[int, int]]:
-    """Return pairs of stations with the same known coordinates, those first that come nearest each other."""
+    """Return pairs of stations with the same known components, closest to each other's positions first."""
     known = np.isfinite(control)
     pairs = [(one, other) for one, other in combinations(suspects, 2) if (known[one] == known[other]).all()]
 
     def apart(pair: tuple[int, int]) -> float:
-        """Sum of squared distances when they are exchanged, less that as they are."""
         own, swapped = control[list(pair)], control[list(pair[::-1])]
         at = placed[list(pair)]
         return float(np.nansum((at - swapped) ** 2) - np.nansum((at - own) ** 2))
@@ -147,9 +145,9 @@ def _pairs(control: Floats, placed: Floats, suspects: list[int]) -> list[tuple[i
 
 
 def _suspects(control: Floats, residuals: Floats) -> list[int]:
-    """Stations to be tried: all of a few; of many those with the largest residuals and those farthest out.
+    """Return stations to be tried: all, or the largest residuals and the most distant ones.
 
-    A station that is far out draws the orientation to itself, and its residual may be small.
+    A distant station attracts the orientation, and its residual may be small.
     """
     count = len(control)
     tried = min(STATIONS, max(FEW, WORK // count))
@@ -162,7 +160,7 @@ def _suspects(control: Floats, residuals: Floats) -> list[int]:
 
 
 def unit_of(scale: float, sd: float) -> Phrase | None:
-    """Return a remark if a scale with its standard deviation (or NaN) is the ratio of feet and metres."""
+    """Return a message if a scale, within its sd (or NaN), is the ratio of feet and metres."""
     for factor, unit in UNITS.items():
         near = abs(math.log(scale / factor))
         if near <= SAME_SCALE and not near > max(SCALE_DEVIATIONS * sd / scale, ROUNDING):
@@ -171,13 +169,13 @@ def unit_of(scale: float, sd: float) -> Phrase | None:
 
 
 def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> Phrase | None:
-    """Return a remark if a mirror image of the model fits as well, because control is in a plane.
+    """Return a message if a mirror image of the model fits as well, because control is in a plane.
 
     `control` (n, 3) is NaN if it is not used; a sum of squares up to `rounding` is rounding only.
     """
     mirrored = orient(control * [1.0, 1.0, -1.0])
     if mirrored is None or mirrored.sum_of_squares > AS_WELL * fit.sum_of_squares + rounding:
         return None
-    # Mirrored, the third axis points the other way.
+    # In the mirror image, the third axis has the opposite direction.
     is_upside_down = fit.upright < 0 < -mirrored.upright
     return phrase("orientation.plane.upside-down" if is_upside_down else "orientation.plane")

@@ -1,7 +1,7 @@
-"""Models before their absolute orientation: pairs of photos oriented relatively, and joined to strips.
+"""Models before their absolute orientation: relative orientation of pairs of photos, and strips.
 
-A model is a network of two photos in a minimum datum, a strip a chain of similarities between models: both
-are what the engine and `orient` do already.
+A model is a network of two photos with a minimum datum. A strip is a chain of similarities between models.
+Both use the adjustment and `orient`.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.words import phrase
 
-LEAST = 5  # Points that determine the relative orientation of two photos
+LEAST = 5  # Points needed for the relative orientation of two photos
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Two photos oriented relatively.
+    """A model of two photos after relative orientation.
 
     Attributes
     ----------
     ids
-        Of its n places: points, then the projection centres, by the names of their photos in brackets.
+        Names of its n positions: points, then the projection centres, as names of their photos in brackets.
     positions
-        (n, 3) in axes of its own, from the first projection centre; the second is at the distance 1.
+        (n, 3) in model axes, from the first projection centre; the base is 1.
     result
         The adjustment of the two photos in a minimum datum, with residuals and tests.
     """
@@ -53,12 +53,11 @@ class Strip:
     Attributes
     ----------
     ids, positions
-        As of a model; places of several models have their mean.
+        As in a model; positions in several models are averaged.
     models
-        What was joined.
+        The joined models.
     rms
-        Of each joint after the first model: root mean square of the differences of common places, in units of
-        the strip.
+        Root mean square difference of common positions at each joint, in units of the strip.
     """
 
     ids: tuple[str, ...]
@@ -68,12 +67,12 @@ class Strip:
 
     @property
     def converged(self) -> bool:
-        """Whether all models have."""
+        """Whether the adjustments of all models converged."""
         return all(each.result.converged for each in self.models)
 
     @property
     def unchecked(self) -> list[str]:
-        """Models that nothing checks: five points leave no degrees of freedom."""
+        """Models of five points, which have zero degrees of freedom."""
         return [
             " ".join(each.result.block.photo_ids)
             for each in self.models
@@ -82,16 +81,16 @@ class Strip:
 
 
 def relative_model(block: Block, first: str, second: str) -> Model:
-    """Orient two photos of a block relatively: their common points alone, in a minimum datum.
+    """Compute the relative orientation of two photos of a block from their common points.
 
     Raises
     ------
     InputError
-        Photos that are not there; geographic space; photos on trajectories.
+        If a photo does not exist or is on a trajectory, or the object space is geographic.
     RankError
-        Fewer than five common points.
+        If there are fewer than five common points.
     AdjustmentError
-        The adjustment gave nothing finite.
+        If the adjustment results in values that are not finite.
     """
     missing = [name for name in (first, second) if name not in block.photo_ids]
     if missing or first == second:
@@ -131,27 +130,27 @@ def relative_model(block: Block, first: str, second: str) -> Model:
     places = np.vstack([result.point_positions, centres])
     start = own.photo_ids.index(first)
     ids = [*own.point_ids, *(f"[{name}]" for name in own.photo_ids)]
-    # What first values set aside has no place.
+    # Observations rejected by the initial orientation are without position.
     rows = np.flatnonzero(np.isfinite(places).all(axis=1))
     return Model(tuple(ids[row] for row in rows.tolist()), (places[rows] - centres[start]) / base, result)
 
 
 def strip_of(block: Block, photos: Sequence[str]) -> Strip:
-    """Form the models of neighbouring photos, and join each to those before by a similarity.
+    """Compute the models of neighbouring photos and join them to a strip by similarities.
 
     Parameters
     ----------
     block
-        The block; its control, its poses and what was observed beside images take no part.
+        The block; its control, its poses and its additional observations are not used.
     photos
-        Names in the order of the strip, two at least.
+        At least two names in the order of the strip.
 
     Raises
     ------
     InputError
-        Fewer than two photos, or what :func:`relative_model` refuses.
+        If there are fewer than two photos, or :func:`relative_model` raises it.
     RankError
-        Models that have too few places in common, or all of them on a line.
+        If models have too few common positions, or all of them are on a line.
     """
     if len(photos) < 2:
         raise InputError(phrase("orientation.strip"))

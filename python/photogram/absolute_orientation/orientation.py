@@ -1,4 +1,4 @@
-"""The result of an absolute orientation: arrays with their covariances, and the ways to show them."""
+"""The result of an absolute orientation: arrays, covariances, tables and plots."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ __all__ = ["Orientation", "Trace"]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What one cycle of the bulletin computed on its way: its prints under sense switches.
+    """Intermediate results of one cycle of the bulletin: its prints under sense switches.
 
-    Coordinates are counted from the centres of both systems.
+    Coordinates are relative to the centres of both systems.
     """
 
-    rotation: list[list[float]]  # (3, 3) A as the cycle began, after statement 8
-    # The m equations, after 27: station (among those that took part) and component of each, and (m, 8)
-    # P-values: omega, phi, kappa, s, three translations, constant
+    rotation: list[list[float]]  # (3, 3) A at the start of the cycle, after statement 8
+    # The m equations, after 27: station (among the used ones) and component of each, and (m, 8) P-values:
+    # omega, phi, kappa, s, three translations, constant
     equations: tuple[list[tuple[int, int]], Floats]
     normal: Floats  # (7, 8) C after 29 and D after 33
     auxiliary: Floats
@@ -47,22 +47,22 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orientation(Documented, Judged, Brief):
-    """An absolutely oriented model; arrays in the order of the n stations, NaN for what took no part.
+    """Result of an absolute orientation; arrays in the order of the n stations, NaN if not used.
 
     Covariances are cofactors times `covariance_scale`.
 
     Attributes
     ----------
     stations
-        What was oriented.
+        Input of the orientation.
     used
-        (n, 3) which control coordinates took part.
+        (n, 3) True for used control coordinates.
     rejected
         Identifiers of the stations that were rejected by name.
     similarity, initial
         The parameters with their covariance, and the initial ones.
     started
-        Where the initial values are from: `restart`, `report` (first two stations) or `closed-form`.
+        Source of the initial values: `restart`, `report` (first two stations) or `closed-form`.
     alternatives
         Other orientations that fit as well.
     method
@@ -70,44 +70,44 @@ class Orientation(Documented, Judged, Brief):
     status
         `converged`, `not converged` or `diverged`.
     iterations
-        Of the rigorous method.
+        Iterations of the rigorous method.
     cycles
-        Largest correction of an angle (rad) in each cycle of the report's methods, else None.
+        Largest angle correction (rad) in each cycle of the report's methods, otherwise None.
     residuals
-        (n, 3) u = s X - A^T (x - B) of the components that took part, control axes, model units.
+        (n, 3) u = s X - A^T (x - B) of the used components, control axes, model units.
     model_residuals
         (n, 3) v = s A X + B - x with the adjusted X (TB 19, equation 5.1), model axes, model units.
     adjusted_control, control_covariances
-        (n, 3) adjusted control coordinates in ground units, unknown ones included, and (n, 3, 3) their
+        (n, 3) adjusted control coordinates in ground units, including unknown ones, and (n, 3, 3) their
         covariances.
     redundancy
         (n, 3) redundancy numbers of the residuals; they sum to the degrees of freedom.
     standardized
-        (n, 3) residuals divided by their own standard deviations: by the a priori ones with standard
-        deviations given (Baarda's w), else by sigma0's; NaN where no other component checks them. The latter
-        never exceed the root of the degrees of freedom.
+        (n, 3) residuals divided by their own standard deviations: a priori if standard deviations are given
+        (Baarda's w), otherwise from sigma0. The latter never exceed the root of the degrees of freedom. NaN
+        without redundancy.
     studentized
-        (n, 3) residuals divided by their own standard deviations, sigma0 being that of all others: Student
-        with one degree of freedom less than the orientation has, and without a bound. NaN with less than two.
+        (n, 3) residuals divided by their own standard deviations, with sigma0 of all others: Student with one
+        degree of freedom less than the orientation, unbounded. NaN with less than two degrees of freedom.
     test
-        The global test of the standard deviations, where they were given and there are degrees of freedom.
+        The global test of given standard deviations; None without these or without degrees of freedom.
     unit_variance
         `estimated` or `unity`.
     weighted_sum_of_squares
-        Of both systems; without standard deviations the sum of the squared residuals.
+        Weighted sum of squares of both systems; without standard deviations the sum of squared residuals.
     covariance_scale
-        sigma0 squared, or 1; None when it is unknown.
+        sigma0 squared, or 1; None if unknown.
     condition
         Condition number of the linearized residuals: rotations in radians, relative scale, translations in
         sizes of the model.
     messages
-        Remarks that did not stop the orientation.
+        Warnings that did not stop the orientation.
     grave
-        Why this is no orientation to be used, though it converged.
+        Reasons for not using a converged orientation.
     traces
-        What each cycle of the report's methods computed, where it was asked for.
+        Intermediate results of each cycle of the report's methods, if requested.
     scale_held
-        Whether the scale was given, and six unknowns were left.
+        True if the scale was fixed, with six unknowns.
     """
 
     stations: Stations
@@ -140,32 +140,32 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def converged(self) -> bool:
-        """Whether the criterion of convergence was met."""
+        """Whether the convergence criterion was met."""
         return self.status == "converged"
 
     @property
     def usable(self) -> bool:
-        """Whether the values can be used: `verdict` says why not."""
+        """Whether the values can be used; `verdict` contains the reason."""
         return self.verdict.usable
 
     @property
     def decided_by_w(self) -> bool:
-        """Whether test values are the standardized residuals: standard deviations were given to be relied on.
+        """Whether standardized residuals are tested: the given standard deviations are reliable.
 
-        Otherwise unit weight is estimated, and they are the studentized ones.
+        Otherwise the unit weight is estimated, and studentized residuals are tested.
         """
         return self.weighted and self.unit_variance == "unity"
 
     @property
     def tested(self) -> Floats:
-        """(n, 3) test values of the residuals; NaN where a redundancy number is too small for a test."""
+        """(n, 3) test values of the residuals; NaN if a redundancy number is too small for a test."""
         values = self.standardized if self.decided_by_w else self.studentized
         tested: Floats = np.where(self.redundancy >= TESTABLE, values, np.nan)
         return tested
 
     @property
     def limit(self) -> float:
-        """What test values of good control exceed in one of twenty orientations (Bonferroni)."""
+        """Critical value that good control exceeds in one of twenty orientations (Bonferroni)."""
         tests = int(np.isfinite(self.tested).sum())
         if self.decided_by_w:
             return normal_limit(tests)
@@ -173,14 +173,14 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def outliers(self) -> list[tuple[int, int]]:
-        """Row and component of the control whose test values exceed the limit, the largest first."""
+        """Row and component of control whose test value exceeds the limit, the largest first."""
         values = np.abs(np.nan_to_num(self.tested))
         beyond = np.argwhere(values > self.limit).tolist()
         return sorted(((row, axis) for row, axis in beyond), key=lambda place: -values[place])
 
     @property
     def problems(self) -> list[str]:
-        """What keeps a reader from using the values, or should make them careful: the gravest first."""
+        """Reasons for not using the values, and warnings, in the order of severity."""
         found = [str(message) for message in self.messages]
         if not self.grave and (outliers := self._outliers_named()):
             found.insert(0, outliers)
@@ -208,12 +208,12 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def known(self) -> int:
-        """Number n of control coordinates that took part."""
+        """Number n of used control coordinates."""
         return int(self.used.sum())
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Control coordinates that took part, minus the unknowns: seven, or six with the scale held."""
+        """Used control coordinates minus unknowns: seven, or six with a fixed scale."""
         return self.known - 7 + self.scale_held
 
     @property
@@ -223,7 +223,7 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def sigma0(self) -> float | None:
-        """Standard deviation of unit weight, of a model coordinate (model units) when no others were given.
+        """Standard deviation of unit weight; of a model coordinate (model units) without given sd.
 
         None without degrees of freedom.
         """
@@ -239,20 +239,20 @@ class Orientation(Documented, Judged, Brief):
 
     @property
     def differences(self) -> Floats:
-        """(n, 3) given minus transformed coordinates of all control, rejected too, ground units."""
+        """(n, 3) given minus transformed coordinates of all control, including rejected, ground units."""
         positions, _ = self.similarity.transform(self.stations.model)
         differences: Floats = self.stations.control - positions
         return differences
 
     @property
     def took_part(self) -> Bools:
-        """(n,) whether a station took part with any coordinate."""
+        """(n,) whether any coordinate of a station was used."""
         part: Bools = np.any(self.used, axis=1)
         return part
 
     @property
     def points(self) -> Bools:
-        """(n,) whether a station has no control coordinate at all: a point to be transformed."""
+        """(n,) whether a station lacks control coordinates: a point to be transformed."""
         without: Bools = ~np.any(self.stations.given, axis=1)
         return without
 
@@ -264,7 +264,7 @@ class Orientation(Documented, Judged, Brief):
         return [self.stations.ids[row] for row in rows.tolist()], positions, covariances
 
     def control_table(self) -> pd.DataFrame:
-        """Return stations as a data frame: residuals in both units, redundancy numbers, test values."""
+        """Return the stations as a data frame with residuals, redundancy numbers and test values."""
         from photogram.absolute_orientation.tables import control
 
         return control(self).frame()
@@ -287,7 +287,7 @@ class Orientation(Documented, Judged, Brief):
         return orientation_findings(self)
 
     def plot(self) -> Plot:
-        """Plot the residuals of the control, given minus transformed: arrows in plan, bars for elevations."""
+        """Plot the control residuals, given minus transformed: arrows in plan, bars for elevations."""
         from photogram.absolute_orientation.plot import control_plot
 
         rows = np.flatnonzero(self.took_part)

@@ -22,7 +22,7 @@ def control_plot(
     used: NDArray[np.bool_],
     rms: float,
 ) -> Plot:
-    """Plot residuals of control, given minus transformed: arrows in plan, bars for elevations."""
+    """Plot control residuals, given minus transformed: arrows in plan, bars for elevations."""
     unit = stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
     largest = float(np.nanmax(np.abs(residuals)))
@@ -59,7 +59,7 @@ def _stations(used: NDArray[np.bool_], plan: Floats) -> list[Mark]:
 
 
 def _residuals(plan: Floats, enlarged: Floats) -> tuple[list[Mark], Floats]:
-    """Return residuals, already in the scale of the plan, and places along them, which names spare."""
+    """Return marks of scaled residuals, and points along them to be avoided by names."""
     flat, high = np.isfinite(enlarged[:, :2]).any(axis=1), np.isfinite(enlarged[:, 2])
     steps = np.nan_to_num(enlarged)
     up = np.column_stack([np.zeros(len(plan)), steps[:, 2]])

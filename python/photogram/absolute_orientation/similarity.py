@@ -23,7 +23,7 @@ from photogram.words import phrase
 __all__ = ["Similarity", "read_similarity"]
 
 
-ORTHOGONAL = 1e-6  # Elements of A A^T - I that a matrix read from a file may have
+ORTHOGONAL = 1e-6  # Largest element of A A^T - I of a matrix read from a file
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +39,15 @@ class Similarity:
     rotation
         (3, 3) A.
     control_centre, model_centre, shift
-        (3,) x - model_centre = s A (X - control_centre) + shift: the form that is computed with, so that
-        large coordinates cost no digits.
+        (3,) each. The computations use x - model_centre = s A (X - control_centre) + shift, which preserves
+        the digits of large coordinates.
     tangent_covariance
-        (7, 7) of three small rotations about the model axes (rad), s and shift; it is regular at every
-        attitude. None when it is unknown.
+        (7, 7) covariance of three small rotations about the model axes (rad), s and shift; regular at every
+        attitude. None if unknown.
     deviation_factor
-        What the standard deviations of points to be transformed are multiplied by. Where those of the
-        stations were given and the covariance is scaled by sigma0 squared, sigma0: an error of the unit
-        weight is one of the points as well. Else 1.
+        Factor of the standard deviations of transformed points. It is sigma0 if standard deviations of the
+        stations were given and the covariance is scaled by sigma0 squared, because an error of the unit
+        weight affects the points as well. Otherwise 1.
     """
 
     scale: float
@@ -65,7 +65,7 @@ class Similarity:
         tangent_covariance: Floats | None = None,
         deviation_factor: float = 1.0,
     ) -> Self:
-        """Take over what the core returns."""
+        """Convert the row of the core."""
         scale, rotation, shift, control_centre, model_centre = row
         return cls(
             scale,
@@ -89,7 +89,7 @@ class Similarity:
         model_centre: ArrayLike = (0.0, 0.0, 0.0),
         deviation_factor: float = 1.0,
     ) -> Self:
-        """Make a similarity from x = s A X + B.
+        """Create a similarity from the parameters of x = s A X + B.
 
         Parameters
         ----------
@@ -98,15 +98,15 @@ class Similarity:
         covariance
             (7, 7) of omega, phi, kappa (rad), s, b1, b2, b3, or None.
         control_centre, model_centre
-            (3,) where to count from; any points amid the stations.
+            (3,) origins of the computation; any points near the stations.
         deviation_factor
-            What the standard deviations of points are multiplied by.
+            Factor of the standard deviations of points.
 
         Raises
         ------
         InputError
-            A scale that is not positive, a matrix that is no rotation, a covariance that is none, what is no
-            number or not finite.
+            If the scale is not positive, the matrix is not a rotation, the covariance is invalid, or a value
+            is not a finite number.
         """
         a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
         scale, deviation_factor = number("scale", scale), number("deviation_factor", deviation_factor)
@@ -155,9 +155,10 @@ class Similarity:
 
     @property
     def covariance(self) -> Floats | None:
-        """(7, 7) of omega, phi, kappa (rad), s, b1, b2, b3 (model units); None when it is unknown.
+        """(7, 7) covariance of omega, phi, kappa (rad), s, b1, b2, b3 (model units); None if unknown.
 
-        Where phi comes near 90 degrees, those of omega and kappa grow without bound; points keep theirs.
+        Near phi = 90 degrees, the variances of omega and kappa are unbounded. Point covariances are not
+        affected.
         """
         if self.tangent_covariance is None:
             return None
@@ -166,31 +167,31 @@ class Similarity:
         return covariance
 
     def to_model(self, control: ArrayLike) -> Floats:
-        """Model coordinates x = s A X + B, (n, 3), of (n, 3) control coordinates (TB 19, equation 2.1)."""
+        """Return (n, 3) model coordinates x = s A X + B of control coordinates (TB 19, equation 2.1)."""
         centred = _rows("control", control) - self.control_centre
         model: Floats = self.scale * centred @ self.rotation.T + self.shift + self.model_centre
         return model
 
     def transform(self, model: ArrayLike, model_sd: ArrayLike = 0.0) -> tuple[Floats, Floats]:
-        """Control coordinates of model points, with their covariances (TB 19, equation 2.2).
+        """Transform model points to control coordinates with covariances (TB 19, equation 2.2).
 
         Parameters
         ----------
         model
             (n, 3) model coordinates.
         model_sd
-            (n, 3) their own standard deviations in model units, or anything that broadcasts to that; 0 for
-            the covariance that the parameters alone give. They count times `deviation_factor`.
+            Standard deviations in model units, broadcast to (n, 3), multiplied by `deviation_factor`. Default
+            0, for the covariance of the parameters only.
 
         Returns
         -------
-        (n, 3) X = A^T (x - B) / s in ground units, and their (n, 3, 3) covariances, NaN when that of the
-        parameters is unknown.
+        (n, 3) X = A^T (x - B) / s in ground units, and their (n, 3, 3) covariances, NaN if the parameter
+        covariance is unknown.
 
         Raises
         ------
         InputError
-            Another shape, or what is no number.
+            If a shape differs, or a value is not a number.
         """
         points = _rows("model", model)
         try:
@@ -212,7 +213,6 @@ class Similarity:
 
 
 def _rows(name: str, values: ArrayLike) -> Floats:
-    """Return an array (n, 3)."""
     array = numbers(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(phrase("orientation.shape", name=name, shape=str(array.shape), rows="n"))
@@ -220,17 +220,19 @@ def _rows(name: str, values: ArrayLike) -> Floats:
 
 
 def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
-    """Read the parameters, with their covariance, out of a JSON document.
-
-    Raises InputError: the file cannot be read, is no such document, or holds an orientation that is not to be
-    used.
+    """Read the parameters and their covariance from a JSON document.
 
     Parameters
     ----------
     path
         The document.
     usable
-        Whether to refuse an orientation that has not converged, or in which something grave was found.
+        True to reject an orientation that has not converged, or that has grave findings.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not such a document, or the orientation is rejected.
     """
     with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))
@@ -251,7 +253,7 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
 
 
 def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
-    """Return a covariance; None when it, or an element of it, is unknown."""
+    """Return a covariance; None if any element is unknown."""
     if covariance is None or any(value is None for row in covariance for value in row):
         return None
     return covariance

@@ -1,4 +1,4 @@
-"""The stations of a model: model coordinates, and control coordinates as far as they are known."""
+"""The stations of a model: model coordinates, and known control coordinates."""
 
 from __future__ import annotations
 
@@ -37,34 +37,33 @@ MODEL_SD_COLUMNS = ("sd_x", "sd_y", "sd_z")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stations(Brief):
-    """The stations of a model, in their order; arrays are copied and checked.
+    """Stations of a model with model and control coordinates; arrays are copied and checked.
 
-    A station without any control coordinate is a point to be transformed. The arrays cannot be written, so
-    that results made from them stay what they are.
+    A station without control coordinates is a point to be transformed. The arrays are read-only, so that
+    results based on them cannot change.
 
     Attributes
     ----------
     ids
-        (n,) identifiers, each once.
+        (n,) unique identifiers.
     control
-        (n, 3) control coordinates X, Y, Z in ground units; NaN where unknown. Each counts by itself.
+        (n, 3) control coordinates X, Y, Z in ground units; NaN if unknown. Each component is independent.
     model
         (n, 3) model coordinates x, y, z in model units.
     control_sd
-        (n, 3) standard deviations of the control in ground units, or anything that broadcasts to that:
-        0 exact (the default), infinite for a known coordinate that takes no part.
+        Standard deviations of the control in ground units, broadcast to (n, 3): 0 (default) is exact,
+        infinite excludes a known coordinate.
     model_sd
-        (n, 3) standard deviations of the model coordinates in model units, or anything that broadcasts to
-        that; 0 for exact ones, where the control is not. None when only their equality is known: sigma0 then
-        is their standard deviation.
+        Standard deviations of the model coordinates in model units, broadcast to (n, 3); 0 is exact, if the
+        control is not. None if they are equal but unknown; sigma0 is then their estimate.
     ground_unit, model_unit
         Names of the units, for reports.
 
     Raises
     ------
     InputError
-        Shapes that do not fit, what is no number, an identifier that occurs twice, a model coordinate that is
-        not finite, a standard deviation that cannot be, a coordinate that is exact in both systems.
+        If shapes differ, a value is not a number, an identifier occurs twice, a model coordinate is not
+        finite, a standard deviation is invalid, or a coordinate is exact in both systems.
     """
 
     ids: Sequence[str]
@@ -104,15 +103,15 @@ class Stations(Brief):
         Parameters
         ----------
         table
-            `id`, `X`, `Y`, `Z` (NaN where unknown), `x`, `y`, `z`; `sd_X`, `sd_Y`, `sd_Z` and `sd_x`, `sd_y`,
-            `sd_z` if there are any (a missing control deviation is 0).
+            `id`, `X`, `Y`, `Z` (NaN if unknown), `x`, `y`, `z`; optionally `sd_X`, `sd_Y`, `sd_Z` (0 if
+            missing) and `sd_x`, `sd_y`, `sd_z`.
         units
             `ground_unit`, `model_unit`.
 
         Raises
         ------
         InputError
-            A column is missing, or as for the class itself.
+            If a column is missing, or the class raises it.
         """
         missing = [name for name in ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS) if name not in table]
         if missing:
@@ -132,12 +131,12 @@ class Stations(Brief):
 
     @property
     def given(self) -> Bools:
-        """(n, 3) which control coordinates are known."""
+        """(n, 3) True for known control coordinates."""
         return np.isfinite(self.control)
 
     @property
     def held(self) -> Bools:
-        """(n, 3) which control coordinates may take part: known, with a finite standard deviation."""
+        """(n, 3) True for usable control coordinates: known, with a finite standard deviation."""
         return self.given & np.isfinite(self.control_sd)
 
     def _check(self) -> None:

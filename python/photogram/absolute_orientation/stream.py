@@ -1,4 +1,4 @@
-"""Part II: any number of model points from file to file, chunk by chunk."""
+"""Part II: transformation of any number of model points from file to file, chunk by chunk."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ OUTPUT = b"id,X,Y,Z,sd_X,sd_Y,sd_Z\n"
 
 @dataclass(frozen=True)
 class Document:
-    """A JSON document that the points are written into as well."""
+    """A JSON document to which the points are written as well."""
 
-    path: Path  # Where it goes
-    head: bytes  # Everything up to its first point
-    first: bytes = b""  # Points that come before those of the file
+    path: Path  # Its path
+    head: bytes  # The document up to its first point
+    first: bytes = b""  # Points before the points of the file
 
 
 def transform_file(
@@ -55,12 +55,12 @@ def transform_file(
     outputs: OutputSet | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:
-    """Transform the points of a file into another file: control coordinates and their standard deviations.
+    """Transform the points of a file and write control coordinates with standard deviations to another.
 
-    `source` is a CSV file with the columns `id`, `x`, `y`, `z` and, if there are any, `sd_x`, `sd_y`,
-    `sd_z`; or lines `x y z number` without a header (part II of TB 19). `target` gets the columns `id`, `X`,
-    `Y`, `Z`, `sd_X`, `sd_Y`, `sd_Z`, the last three empty when the covariance of the similarity is unknown.
-    What is written is there whole or not at all.
+    `source` is a CSV file with the columns `id`, `x`, `y`, `z` and optionally `sd_x`, `sd_y`, `sd_z`, or
+    lines `x y z number` without a header (part II of TB 19). `target` has the columns `id`, `X`, `Y`, `Z`,
+    `sd_X`, `sd_Y`, `sd_Z`; the last three are empty if the covariance of the similarity is unknown. Files are
+    written completely or not at all.
 
     Parameters
     ----------
@@ -69,15 +69,15 @@ def transform_file(
     source, target
         The files.
     decimals
-        Decimals that coordinates are rounded to; standard deviations get one more.
+        Number of decimals of coordinates; standard deviations have one more.
     point_sd
-        Standard deviation of each coordinate of a point in model units, where the file has none.
+        Standard deviation of each coordinate of a point in model units, if not in the file.
     document
         A JSON document to write the points into as well, with their full covariances.
     outputs
-        The set that the files belong to, which puts them in place; without one they are a set of their own.
+        Set of output files to which the files belong; default: a new set.
     progress
-        Called after each chunk with the number of points done; an exception it raises stops the work.
+        Called after each chunk with the number of transformed points; an exception stops the work.
 
     Returns
     -------
@@ -86,10 +86,10 @@ def transform_file(
     Raises
     ------
     InputError
-        An output is the input, or both are one file; the file cannot be read, has other columns, no points,
-        or a field that is no number; names file, record and text.
+        If an output is the input, or both are one file; if the file cannot be read, has other columns, lacks
+        points, or a field is not a number. The message contains file, record and text.
     OSError
-        A file cannot be written.
+        If a file cannot be written.
     """
     if not 0 <= point_sd < np.inf:
         raise InputError(phrase("orientation.point-sd", value=point_sd))
@@ -122,7 +122,7 @@ def transform_file(
 
 
 def decimals_for(deviation: float) -> int:
-    """Return decimals for coordinates whose last digit is a thousandth of a standard deviation."""
+    """Return the number of decimals whose last digit is a thousandth of a standard deviation."""
     if not deviation > 0:
         return 6
     return int(np.clip(np.ceil(3 - np.log10(deviation)), 0, 15))
@@ -130,7 +130,7 @@ def decimals_for(deviation: float) -> int:
 
 def _lines(ids: list[str], positions: Floats, covariances: Floats, decimals: int) -> bytes:
     """Return the lines of a chunk; orjson writes numbers far faster than pandas."""
-    # Rounding can leave a variance below zero.
+    # Rounding can cause a negative variance.
     sd = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
     known = bool(np.isfinite(sd).all())
     values: list[Floats] = [np.round(positions, decimals)]
@@ -143,7 +143,7 @@ def _lines(ids: list[str], positions: Floats, covariances: Floats, decimals: int
 
 
 def _cells(ids: list[str]) -> list[bytes]:
-    """Return identifiers as fields, quoted where they must be."""
+    """Return identifiers as fields, quoted if necessary."""
     joined = "\n".join(ids)
     if "," in joined or '"' in joined:
         quote = '"'
@@ -155,7 +155,7 @@ def _cells(ids: list[str]) -> list[bytes]:
 
 
 def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
-    """Read identifiers, coordinates and, where there are any, standard deviations, chunk by chunk."""
+    """Yield identifiers, coordinates and standard deviations (None if missing), chunk by chunk."""
     import pandas as pd  # takes long to import
 
     names, options = _layout(source)
@@ -181,9 +181,9 @@ def _chunks(source: Path) -> Iterator[tuple[list[str], Floats, Floats | None]]:
 
 
 def _layout(source: Path) -> tuple[list[str], dict[str, Any]]:
-    """Find the columns of a file of points, and how pandas is to read them."""
+    """Return the columns of a file of points, and options for pandas."""
     with reading(source), source.open(encoding="utf-8-sig", errors="replace") as file:
-        # A line that does not end where a record must is not read to its end.
+        # Lines longer than a record are not read to their end.
         lines = iter(lambda: file.readline(LONGEST_RECORD + 1), "")
         number, first = next(((k, line) for k, line in enumerate(lines, 1) if line.strip()), (0, ""))
     place = Place(source, number, first.rstrip("\r\n"))
@@ -207,7 +207,7 @@ def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Fl
 
     points = table[list(MODEL_COLUMNS)].to_numpy()
     sd = table[list(MODEL_SD_COLUMNS)].to_numpy() if weighted else None
-    # pandas takes the first column for an index where rows have one field more than the header.
+    # pandas uses the first column as index if rows have one field more than the header.
     if not isinstance(table.index, pd.RangeIndex):
         raise ValueError(phrase("orientation.too-many-fields"))
     if any("\n" in name or "\r" in name for name in table["id"]):
@@ -218,7 +218,7 @@ def _checked(table: pd.DataFrame, weighted: bool) -> tuple[list[str], Floats, Fl
 
 
 def _fault(source: Path, names: list[str]) -> InputError | None:
-    """Look for the first record that cannot be read, slowly; None when all can."""
+    """Return the error for the first unreadable record (slow); None if all are readable."""
     numeric = [name for name in names if name in (*MODEL_COLUMNS, *MODEL_SD_COLUMNS)]
     with source.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         seen_header = names[-1] == "id" and names[0] == "x"

@@ -1,4 +1,4 @@
-"""The tables of an orientation, each declared once."""
+"""The tables of an orientation."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from photogram.statistics.reliability import TESTABLE
 if TYPE_CHECKING:
     from photogram import Orientation
 
-LISTED = 300  # transformed points that people see at most
+LISTED = 300  # Maximum number of transformed points in printed tables
 
 
 def control(result: Orientation) -> Table:
-    """Return the control that took part: residuals, redundancy numbers, test values, adjusted control."""
+    """Return the used control: residuals, redundancy numbers, test values, adjusted control."""
     numbers, ground, model = (
         _axes("XYZ", unit) for unit in ("", result.stations.ground_unit, result.stations.model_unit)
     )
@@ -58,7 +58,7 @@ def _test(result: Orientation) -> str:
 
 
 def model_residuals(result: Orientation) -> Table:
-    """Return the residuals of the control that took part in the axes of the model."""
+    """Return the residuals of the used control in the axes of the model."""
     residuals = Quantity(
         result.model_residuals, _axes("xyz", result.stations.model_unit), "deviation", head="v{}", figures=4
     )
@@ -68,7 +68,7 @@ def model_residuals(result: Orientation) -> Table:
 
 
 def rejected(result: Orientation) -> Table:
-    """Return control that took no part: given minus transformed."""
+    """Return unused control: given minus transformed."""
     there = result.stations.given & ~result.used
     rows = np.flatnonzero(there.any(axis=1))
     differences = np.where(there, result.differences, np.nan)
@@ -85,7 +85,7 @@ def rejected(result: Orientation) -> Table:
 
 
 def parameters(result: Orientation) -> Table:
-    """Return the seven parameters with their standard deviations, each in a row."""
+    """Return the seven parameters with their standard deviations, one per row."""
     similarity, stations = result.similarity, result.stations
     axes = (
         *(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa")),
