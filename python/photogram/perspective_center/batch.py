@@ -1,4 +1,4 @@
-"""The program as a whole: all sets of a deck, one after the other, until one cannot be solved."""
+"""Processing of a whole deck: all sets in order, until one cannot be solved."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["Run", "Stop", "run_deck"]
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a run stopped before the end of the deck.
+    """State of a run that stopped before the end of the deck.
 
     Attributes
     ----------
     error
-        Why.
+        Reason.
     title, number
-        Title of the job, and number of the set, that were at work; None and 0 before them.
+        Title of the current job and number of the current set; None and 0 before the first.
     grid
-        The set, where it was read but could not be solved.
+        The set that could not be solved; None if it was not read.
     """
 
     error: PhotogramError
@@ -40,16 +40,16 @@ class Stop:
 
 @dataclass(repr=False)
 class Run(Documented, Brief):
-    """What a run through a deck gave.
+    """Result of processing a deck.
 
     Attributes
     ----------
     results
-        The sets that were solved, in the order of the deck.
+        The solved sets, in the order of the deck.
     messages
-        Remarks on the cards and the solutions.
+        Warnings on the cards and the solutions.
     stop
-        None when the whole deck was processed.
+        None if the whole deck was processed.
     """
 
     results: list[PerspectiveCenter] = field(default_factory=list)
@@ -62,7 +62,7 @@ class Run(Documented, Brief):
         return self.stop is None and all(result.converged for result in self.results)
 
     def document(self) -> Document:
-        """Return the document of the run: each set is a layer of its sections."""
+        """Return the document of the run; each set is a layer of its sections."""
         from photogram.perspective_center.document import run_document
 
         stop = self.stop
@@ -78,9 +78,9 @@ def run_deck(
     together: bool = False,
     unknown: Sequence[str] = (),
 ) -> Run:
-    """Run through a deck as the program does: it stops at the first set that cannot be read or solved.
+    """Process a deck like the program, up to the first set that cannot be read or solved.
 
-    A set that does not converge stops nothing. What was solved before the stop is kept.
+    A set that does not converge does not stop the run. Earlier results are returned.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def run_deck(
     as_published, weights, unknown
         As in :func:`photogram.perspective_center.determine`.
     together
-        Whether all sets of a job are of one projector, at several heights, and solved as one.
+        True if all sets of a job are of one projector, at several heights, and solved as one.
 
     Raises
     ------
     InputError
-        The deck cannot be read at all; sets together as published.
+        If the deck cannot be read at all, or `together` and `as_published` are combined.
     """
     if together and as_published:
         raise InputError(phrase("projector.published-sets"))
@@ -113,7 +113,6 @@ def run_deck(
 
 
 def _jobs(grids: Iterable[Grid]) -> Iterator[Grid]:
-    """Join the sets of each job."""
     job: list[Grid] = []
     for grid in grids:
         if grid.number == 1 and job:

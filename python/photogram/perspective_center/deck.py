@@ -1,13 +1,13 @@
-"""Decks of cards of program W5344 (USGS Computer Contribution 2, 1969, "Input").
+"""Card decks of program W5344 (USGS Computer Contribution 2, 1969, "Input").
 
-A deck is one or more jobs. A job is a title, two FORMATs, specifications, coordinatograph factors if asked
-for, the plate grid, and one or more sets of readings, each with initial approximations before it and a flag
-card behind it.
+A deck is one or more jobs. A job consists of a title, two FORMATs, specifications, optional coordinatograph
+factors, the plate grid, and one or more sets of readings. Each set starts with initial approximations and
+ends with a flag card.
 
-Cards are read by the FORMAT that stands on a card itself, by the rules of FORTRAN IV. The package
-fortranformat reads the FORMAT and the numbers. What FORTRAN IV (1969) does otherwise than later FORTRAN, and
-what a card must be refused for, is here: blanks inside a field count as zeros, a card has eighty columns,
-and NaN has no spelling.
+Cards are read by the FORMAT on a card, with the rules of FORTRAN IV. The package fortranformat reads the
+FORMAT and the numbers. This module implements the differences between FORTRAN IV (1969) and later FORTRAN,
+and rejects invalid cards. Blanks inside a field are zeros, a card has eighty columns, and NaN cannot be
+written.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ _NUMBERS = {
     float: re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[ED][+-]?\d+|[+-]\d+)?", re.ASCII),
 }
 _NAMES = {int: "whole number", float: "number"}
-_FIRST = 0x2500  # A ruler: characters that occur in no card and count its columns
+_FIRST = 0x2500  # A ruler: its characters do not occur on cards and count the columns
 
 
 @dataclass(frozen=True)
 class _Field:
-    """Columns of a field, from 0 and the last excluded, and what it holds."""
+    """Columns of a field, from 0 with the last excluded, and its type."""
 
     first: int
     last: int
@@ -51,7 +51,7 @@ class _Field:
 
 
 class CardFormat:
-    """The FORMAT of a card with a whole number, then real numbers."""
+    """The FORMAT of a card with integers, followed by real numbers."""
 
     def __init__(self, text: str, *, reals: int, integers: int = 1) -> None:
         self.text = _parenthesised("".join(text.split()).upper())
@@ -61,10 +61,10 @@ class CardFormat:
         try:
             self._reader = fortranformat.FortranRecordReader(self.text)
             ruler = "".join(chr(_FIRST + column) for column in range(4 * COLUMNS))
-            # Read as text, the ruler says which columns a field has; a card of zeros, what it holds.
+            # Read as text, the ruler gives the columns of a field; a card of zeros gives its type.
             fields = fortranformat.FortranRecordReader(_NUMERIC.sub(r"A\2", self.text)).read(ruler)
             kinds = [type(value) for value in self._reader.read("0" * 4 * COLUMNS)]
-        except Exception as error:  # fortranformat raises many kinds of exceptions, some of them its own
+        except Exception as error:  # fortranformat raises many types of exceptions, including its own
             raise ValueError(phrase("format.invalid", format=self.text, error=str(error))) from None
         wanted = [int] * integers + [float] * reals
         if kinds[: len(wanted)] != wanted:
@@ -83,7 +83,7 @@ class CardFormat:
             raise record.error(error.args[0]) from None
 
     def read(self, record: Record) -> list[float]:
-        """Return the numbers of a card; whole numbers are integers."""
+        """Return the numbers of a card; integers are of type int."""
         card = record.text.ljust(COLUMNS)
         for field in self._fields:
             card = card[: field.first] + self._filled(field, record, card) + card[field.last :]
@@ -91,7 +91,7 @@ class CardFormat:
         return values[: len(self._fields)]
 
     def _filled(self, field: _Field, record: Record, card: str) -> str:
-        """Return the characters of a field with zeros for the blanks that FORTRAN IV takes for zeros."""
+        """Return the characters of a field, with FORTRAN IV blanks replaced by zeros."""
         raw = card[field.first : field.last].upper()
         digits = raw.lstrip(" ").replace(" ", "0")
         columns = {"first": field.first + 1, "last": field.last}
@@ -108,7 +108,7 @@ class CardFormat:
 
 def _check_sizes(text: str) -> None:
     """Reject sizes beyond a card before they cost memory or time."""
-    # Nine digits do: int() has a limit of its own.
+    # Nine digits suffice, because int() has a limit.
     numbers = [int(digits[:9]) for digits in re.findall(r"[0-9]+", text)]
     groups = math.prod(int(digits[:9]) for digits in re.findall(r"([0-9]+)\(", text))
     if max(numbers, default=0) > COLUMNS or groups > COLUMNS**2:
@@ -134,7 +134,7 @@ APPROXIMATIONS = CardFormat("(6F10.0)", integers=0, reals=6)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What the sets of a job share: cards 1 to 6."""
+    """Data shared by the sets of a job: cards 1 to 6."""
 
     title: str  # Card 1
     projected_format: CardFormat  # Card 3
@@ -148,11 +148,11 @@ class Job:
 
 
 class Deck:
-    """A deck that is read set by set, so that a fault in a later set does not lose the earlier ones."""
+    """A deck that is read set by set, so that earlier sets are not affected by later errors."""
 
     def __init__(self, path: Path) -> None:
         self._source = Source.read(path)
-        # The flag card of the last set may be blank; cards after it hold nothing.
+        # The flag card of the last set may be blank; later cards are empty.
         self._end = max(self._source.filled(), default=0)
         self._next = 1
         self.title: str | None = None
@@ -160,11 +160,11 @@ class Deck:
 
     @property
     def messages(self) -> list[Message]:
-        """Remarks on the cards read so far."""
+        """Warnings on the cards read so far."""
         return self._source.messages
 
     def grids(self) -> Iterator[Grid]:
-        """Read the sets one after another."""
+        """Yield the sets in order."""
         while self._next <= self._end:
             self.title, self.number = self._card("the title").text.rstrip(), 0
             job = self._job(self.title)
@@ -263,7 +263,8 @@ def read_deck(path: Path) -> list[Grid]:
     Raises
     ------
     InputError
-        A card that cannot be used; its file, number and text are named. Points in another order than on the
-        plate say `ERROR - CARDS ARE OUT OF ORDER AT POINT NO.` and the number expected, as the report has it.
+        If a card is invalid; the message contains file, number and text. If points are not in the order of
+        the plate, it contains `ERROR - CARDS ARE OUT OF ORDER AT POINT NO.` and the expected number, as in
+        the report.
     """
     return list(Deck(path).grids())

@@ -41,7 +41,7 @@ UNITS = {
 def run_document(
     results: Sequence[PerspectiveCenter], messages: Sequence[Message], stop: Judgement | None
 ) -> Document:
-    """Return the document of the sets of a run, with remarks and what stopped it."""
+    """Return the document of the sets of a run, with warnings and the reason of a stop."""
     sets = [set_document(result) for result in results]
     values = {
         "units": UNITS,

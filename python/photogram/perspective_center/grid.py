@@ -1,4 +1,4 @@
-"""A projected grid as it was measured: readings reduced to means, and corrected for the coordinatograph."""
+"""A measured projected grid: means of readings, corrected for the coordinatograph."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MINUTES_PER_RADIAN = 3437.7468  # CONV of the program, too large by 8.5e-9
 
 
 def single(values: Floats) -> Floats:
-    """Return numbers as REAL*4 words of the System/360 hold them: six hexadecimal digits, no rounding."""
+    """Return numbers as REAL*4 words of the System/360: six hexadecimal digits, truncated."""
     _, binary = np.frexp(values)
     step = 2.0 ** (4.0 * np.ceil(binary / 4.0) - 24.0)
     found: Floats = np.trunc(values / step) * step
@@ -35,9 +35,9 @@ class Coordinatograph:
     Attributes
     ----------
     x_scale, y_scale
-        Scale of its X and of its Y (XSCAL, YSCAL).
+        Scales of X and Y (XSCAL, YSCAL).
     sine
-        By how much X is turned from the perpendicular to Y, per unit of Y (SINALP).
+        Rotation of X from the perpendicular to Y, per unit of Y (SINALP).
     """
 
     x_scale: float
@@ -47,8 +47,8 @@ class Coordinatograph:
     def correct(self, xy: Floats) -> Floats:
         """Correct the (n, 2) means of a set (specification, 5.3).
 
-        They are counted from the smallest absolute values of X and Y in the set, as the program does: for
-        positive coordinates the corner of the grid. X uses the uncorrected Y.
+        They are relative to the smallest absolute values of X and Y in the set, as in the program. For
+        positive coordinates, this is the corner of the grid. X uses the uncorrected Y.
         """
         anchor = np.abs(xy).min(axis=0)
         x, y = (xy - anchor).T
@@ -72,23 +72,23 @@ class Grid(Brief):
     principal_distance
         Millimetres, positive.
     initial
-        (6,) approximations: position in the unit of the model, then omega, phi, kappa in radians; None
-        without.
+        (6,) approximations: position in the unit of the model, then omega, phi, kappa in radians; None if
+        missing.
     tolerance
         Limit of the iteration as published (GDIF), in the unit of the model.
     readings
         (n,) number of readings of each point; 1 by default.
     reading_sd
-        (n, 2) standard deviations of the readings of each point in X and Y; 0 where there is one reading.
+        (n, 2) standard deviations of the readings of each point in X and Y; 0 for a single reading.
     corrected
-        Whether a correction for the coordinatograph was made.
+        True if corrected for the coordinatograph.
     title, number
-        Title of the job, and number of the set in it.
+        Title of the job, and number of the set in the job.
 
     Raises
     ------
     InputError
-        Arrays of the wrong shape, values that are not finite.
+        If an array has a wrong shape, or a value is not finite.
     """
 
     ids: Sequence[int | str]
@@ -126,12 +126,12 @@ class Grid(Brief):
 
 
 def joined(grids: Sequence[Grid]) -> Grid:
-    """Return the sets of one projector, at several heights, as one; points bear the number of their set.
+    """Join the sets of one projector at several heights; point names include the set number.
 
     Raises
     ------
     InputError
-        No set, or sets of several principal distances.
+        If there is no set, or the principal distances differ.
     """
     if not grids or len({each.principal_distance for each in grids}) != 1:
         raise InputError(phrase("projector.joined"))
@@ -169,14 +169,14 @@ def reduce(
     readings
         (k, 3) X, Y, Z of the k readings of each point.
     coordinatograph
-        None to leave the means as they are. Standard deviations are always those of the raw readings.
+        Correction factors; None for uncorrected means. Standard deviations always refer to raw readings.
     ids, plate_xy, principal_distance, initial, tolerance, title, number
         As in :class:`Grid`.
 
     Raises
     ------
     InputError
-        Readings of another shape.
+        If readings have another shape.
     """
     if any(each.ndim != 2 or each.shape[1] != 3 or not len(each) for each in readings):
         raise InputError(phrase("projector.shape"))

@@ -13,11 +13,11 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED, round_length
 
 LONGEST_RESIDUAL = 0.12  # As a part of the extent of the grid
-SAME_RADIUS = 0.02  # Points have one mean if their radii differ by less than this part of the largest
+SAME_RADIUS = 0.02  # Points are averaged if their radii differ by less than this part of the largest
 
 
 def run_sketch(results: Sequence[PerspectiveCenter]) -> Plot:
-    """Return the picture of a run; all sets have the same scales."""
+    """Return the plot of a run; all sets have the same scales."""
     longest = max(float(np.hypot(*each.residual.T).max()) for each in results)
     largest = max(max(np.abs(each.radial_distortion).max(), each.sigma0_plate or 0.0) for each in results)
     panels = [
@@ -46,9 +46,9 @@ def _residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
 
 
 def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
-    """Return distortion over radius; `largest` is the distortion (um) for which the axis has room.
+    """Return distortion over radius; `largest` is the distortion (um) that the axis covers.
 
-    The curve omits a point at the principal point: its distortion has no sign.
+    The curve omits a point at the principal point, because the sign of its distortion is undefined.
     """
     radius, distortion = result.fixed_radius, 1000.0 * result.radial_distortion
     reach, right = 1.4 * largest or 1.0, 1.05 * (float(radius.max()) or 1.0)
@@ -67,7 +67,6 @@ def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
 
 
 def _means(places: Floats) -> Floats:
-    """Return the mean of each group of (nearly) equal radii."""
     ordered = places[np.argsort(places[:, 0], kind="stable")]
     steps = np.diff(ordered[:, 0]) > SAME_RADIUS * max(float(ordered[-1, 0]), 1e-12)
     return np.array([group.mean(axis=0) for group in np.split(ordered, np.flatnonzero(steps) + 1)])

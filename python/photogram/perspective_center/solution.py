@@ -1,8 +1,8 @@
-"""Perspective centre and attitude of a projector from a projected grid (USGS Computer Contribution 2, 1969).
+"""Perspective centre and attitude of a projector from a grid (USGS Computer Contribution 2, 1969).
 
-Plate coordinates are the observations, mean model coordinates are taken as free of error, as in the report;
-the covariance and the test values follow from the residuals of the adjustment itself.
-`docs/perspective-center.md` has the formulae.
+Plate coordinates are the observations. Mean model coordinates are assumed to be errorless, as in the report.
+The covariance and the test values follow from the residuals of the adjustment. `docs/perspective-center.md`
+contains the formulae.
 """
 
 from __future__ import annotations
@@ -34,11 +34,10 @@ __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "
 
 Weights = Literal["equal", "readings", "deviations"]
 
-MOST_CYCLES = 6  # Cycles of the program before it gives up
+MOST_CYCLES = 6  # Maximum number of cycles of the program
 STRICT_CYCLES = 50
 STRICT_FRACTION = 1e-9
-"""Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real
-plate."""
+"""Convergence limit, in standard deviations of the unknowns for a unit weight of one millimetre."""
 SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
 NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
 REPORT_ORDER = [3, 4, 5, 0, 1, 2]  # Omega, phi, kappa before X, Y, Z
@@ -48,7 +47,7 @@ STEEPEST = 1e-10  # Ratio of singular values of scaled columns below which they 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """One cycle of the iteration: position after it, its correction, angles after it in minutes."""
+    """One cycle of the iteration: position, correction, and angles after it in minutes."""
 
     position: Floats
     correction: Floats
@@ -57,29 +56,29 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PerspectiveCenter(Judged, Brief):
-    """Perspective centre and attitude of a projector, and how good they are; n points.
+    """Perspective centre and attitude of a projector, with their quality, from n points.
 
     Lengths in the model are in its unit, on the plate in millimetres; angles are omega, phi, kappa.
 
     Attributes
     ----------
     grid
-        What it was determined from.
+        The measured grid.
     as_published
-        Whether by the algorithm of the program.
+        True for the algorithm of the program.
     converged
-        Whether the criterion of convergence was met.
+        True if the convergence criterion was met.
     cycles
         The iteration.
     position, attitude
         (3,) Xc, Yc, Zc; (3,) in radians.
     interior
-        (3,) principal distance and principal point on the plate, millimetres: as given, or determined.
+        (3,) principal distance and principal point on the plate, millimetres, given or estimated.
     unknown
-        Which of `c`, `xp`, `yp` were determined, k of them.
+        The k estimated parameters among `c`, `xp`, `yp`.
     cofactors
-        (6 + k, 6 + k) of omega, phi, kappa, Xc, Yc, Zc and these for a unit weight of one millimetre on the
-        plate.
+        (6 + k, 6 + k) cofactors of omega, phi, kappa, Xc, Yc, Zc and `unknown` for a unit weight of one
+        millimetre on the plate.
     sigma0_plate, sigma0_model
         Standard error of unit weight of plate coordinates (mm) and of projected coordinates in the model (its
         unit); None without redundancy.
@@ -90,17 +89,17 @@ class PerspectiveCenter(Judged, Brief):
     residual, projected
         (n, 2) measured minus projected, and projected coordinates, in the model.
     observed_radius, fixed_radius, radial_distortion
-        (n,) radii on the plate of the measured point transformed there and of the grid point, and their
-        difference, positive outward.
+        (n,) radii on the plate of the transformed measured point and of the grid point, and their difference,
+        positive outward.
     redundancy, standardized
-        (n, 2) redundancy numbers of the residuals in X and Y, and residual / its own standard deviation, the
-        latter from `sigma0_plate`; NaN without redundancy. The latter never exceed the root of the degrees of
-        freedom.
+        (n, 2) redundancy numbers of the residuals in X and Y, and residuals over their own standard
+        deviations from `sigma0_plate`; NaN without redundancy. The latter never exceed the root of the
+        degrees of freedom.
     studentized
         (n, 2) the same with the standard error of unit weight of all other coordinates: Student with 2 n - 7
-        degrees of freedom, and without a bound. NaN with less than two degrees of freedom.
+        degrees of freedom, unbounded. NaN with less than two degrees of freedom.
     messages
-        Remarks on the solution.
+        Warnings on the solution.
     """
 
     grid: Grid
@@ -133,7 +132,7 @@ class PerspectiveCenter(Judged, Brief):
 
     @property
     def limit(self) -> float:
-        """What studentized residuals of good readings exceed in one of twenty sets (Bonferroni)."""
+        """Critical value that good readings exceed in one of twenty sets (Bonferroni)."""
         return studentized_limit(self.degrees_of_freedom, int(np.isfinite(self.studentized).sum()))
 
     @property
@@ -145,12 +144,12 @@ class PerspectiveCenter(Judged, Brief):
 
     @property
     def covariance(self) -> Floats | None:
-        """(6 + k, 6 + k) variance-covariance matrix of omega, phi, kappa (rad), Xc, Yc, Zc ..., if any."""
+        """(6 + k, 6 + k) covariance of omega, phi, kappa (rad), Xc, Yc, Zc ...; None without redundancy."""
         return None if self.sigma0_plate is None else self.cofactors * self.sigma0_plate**2
 
     @property
     def standard_errors(self) -> Floats | None:
-        """(6,) of Xc, Yc, Zc, then omega, phi, kappa in minutes; None without redundancy."""
+        """(6,) standard errors of Xc, Yc, Zc, then omega, phi, kappa in minutes; None without redundancy."""
         if self.covariance is None:
             return None
         deviations = np.sqrt(np.diagonal(self.covariance))
@@ -159,11 +158,11 @@ class PerspectiveCenter(Judged, Brief):
 
     @property
     def interior_errors(self) -> Floats | None:
-        """(k,) standard errors of what was determined of the interior, mm; None without redundancy."""
+        """(k,) standard errors of the estimated interior parameters, mm; None without redundancy."""
         return None if self.covariance is None else np.sqrt(np.diagonal(self.covariance)[6:])
 
     def _findings(self) -> Findings:
-        """Return the tests: residuals are tested by t, since no standard deviation is given."""
+        """Return the tests: residuals are tested by t, because standard deviations are not given."""
         freedom, status = self.degrees_of_freedom, "converged" if self.converged else "not converged"
         values = np.where(self.redundancy >= TESTABLE, self.studentized, np.nan)
         names = [[f"{axis} of point {name}" for axis in "XY"] for name in self.grid.ids]
@@ -188,31 +187,29 @@ def determine(
     grid
         The projected grid.
     as_published
-        Iterate, and form residuals, as the program does: six cycles at the most, until the correction of the
-        position is shorter than the tolerance; coefficients with plate coordinates in place of computed ones;
-        the last correction in the residuals; one scale, that of the last point. Otherwise: least squares to
-        strict convergence, from a direct solution where the approximations do not lead there, residuals by
-        projection onto the height of each point.
+        True to iterate, and form residuals, like the program. It uses at most six cycles, until the
+        correction of the position is shorter than the tolerance. Coefficients contain observed instead of
+        computed plate coordinates, residuals include the last correction, and one scale is used, of the last
+        point. False for strictly converged least squares, from a direct solution if the approximations fail,
+        with residuals by projection onto the height of each point.
     weights
-        `equal` as in the report; `readings`: every mean has the weight of its number of readings;
-        `deviations`: its weight is the reciprocal square of the standard deviation of the mean, from its own
-        readings in X and Y together.
+        `equal` as in the report; `readings`: the weight of a mean is its number of readings; `deviations`:
+        its weight is the reciprocal variance of the mean, from its own readings in X and Y together.
     model_sd
-        (n,) standard deviations of the mean model coordinates; their reciprocal squares are the weights
-        instead.
+        (n,) standard deviations of the mean model coordinates; their reciprocal squares replace `weights`.
     unknown
-        Which of principal distance and principal point, `c`, `xp`, `yp`, are unknowns, too. One height hardly
-        determines them: a level grid gives one scale for c and the height of the projector together. Points
-        at several heights do (:func:`joined`).
+        Additional unknowns among principal distance and principal point, `c`, `xp`, `yp`. One height hardly
+        determines them, because a level grid gives one scale for c and the height of the projector together.
+        Points at several heights do (:func:`joined`).
 
     Raises
     ------
     RankError
-        The points do not determine the projector: the program's NORMAL EQUATIONS MATRIX IS SINGULAR.
+        If the points do not determine the projector: the program's NORMAL EQUATIONS MATRIX IS SINGULAR.
     AdjustmentError
-        The approximations give coordinates that are not finite.
+        If the approximations result in coordinates that are not finite.
     InputError
-        Weights that cannot be formed.
+        If weights cannot be computed.
     """
     weight = _weights(grid, weights, model_sd)
     unknown = tuple(dict.fromkeys(unknown))
@@ -238,7 +235,7 @@ def _observed(grid: Grid, weight: Floats) -> Observed:
 
 
 def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats:
-    """Return weights of the points, 1 in the mean."""
+    """Return weights of the points with mean 1."""
     one_of("weights", weights, get_args(Weights))
     if model_sd is not None:
         variance = shaped("model_sd", model_sd, (len(grid.ids),)) ** 2
@@ -257,23 +254,23 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class _Iterated:
-    """The course of an iteration of k cycles, and what holds at its end."""
+    """An iteration of k cycles and its final state."""
 
     # The last solution of the core: cofactors, degrees of freedom, points behind
     solution: _photocore.ResectionSolution
-    # (k + 1, 6) poses, the start first, and (k, 6) what was added to them: X, Y, Z, angles in radians
+    # (k + 1, 6) poses, the start first, and (k, 6) corrections: X, Y, Z, angles in radians
     history: Floats
     corrections: Floats
     residuals: Floats  # (n, 2) given minus computed plate coordinates, and (n, 2, 6), at the last pose
     partials: Floats
-    converged: bool  # Whether the criterion was met
+    converged: bool  # Whether the convergence criterion was met
 
 
 Solved = tuple[_Iterated, list[Message]]
 
 
 def _strictly(grid: Grid, observed: Observed) -> Solved:
-    """Adjust to strict convergence; from a direct solution where the approximations lead nowhere."""
+    """Adjust to strict convergence, from a direct solution if the approximations fail."""
     starts = [grid.initial] if grid.initial is not None else []
     messages = []
     for start in [*starts, None]:
@@ -300,7 +297,7 @@ def _strictly(grid: Grid, observed: Observed) -> Solved:
 def _as_published(grid: Grid, observed: Observed) -> Solved:
     if grid.initial is None:
         raise InputError(phrase("projector.no-approximations"))
-    # Parameters are REAL*4 words, angles in minutes: what is cut off comes back as a last correction.
+    # Parameters are REAL*4 words, angles in minutes: truncated digits return as a last correction.
     units = np.array([1.0, 1.0, 1.0, *[MINUTES_PER_RADIAN] * 3])
     history: list[Floats] = [single(grid.initial * units) / units]
     corrections: list[Floats] = []
@@ -327,7 +324,7 @@ def _as_published(grid: Grid, observed: Observed) -> Solved:
 def _calibrated(
     grid: Grid, weight: Floats, unknown: tuple[str, ...]
 ) -> tuple[Grid, _Iterated, list[Message], Floats, Floats]:
-    """Determine pose and interior together: the pose is solved anew wherever the interior has gone."""
+    """Estimate pose and interior together; the pose is solved again for each interior."""
     chosen = [INTERIOR.index(name) for name in unknown]
     interior = np.array([grid.principal_distance, 0.0, 0.0])
     own = grid
@@ -443,8 +440,8 @@ def _result(
 def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats, Floats]:
     """Project the plate points onto the heights of the model points.
 
-    The ray of (x, y, -c) has the direction e = M^T (x, y, -c) and meets the height Z where X = Xc + t e, t =
-    (Z - Zc) / e_Z.
+    The ray of (x, y, -c) has the direction e = M^T (x, y, -c). It reaches the height Z at X = Xc + t e, with
+    t = (Z - Zc) / e_Z.
     """
     to_photo = rotation_matrix(attitude[np.newaxis])[0]
     plate = np.column_stack([grid.plate_xy, np.full(len(grid.ids), -grid.principal_distance)])
@@ -463,10 +460,10 @@ def _tests(
     to_model: Floats,
     residual: Floats,
 ) -> tuple[Floats, Floats]:
-    """Redundancy numbers, and residuals in the model / their standard deviations for unit weight.
+    """Return redundancy numbers, and standardized residuals in the model for unit weight.
 
-    The residuals on the plate have the cofactors P^-1 - A Q A^T; both sides turned into the model, the
-    quotient of their diagonals is the part of an error of X or Y that shows in its residual.
+    The residuals on the plate have the cofactors P^-1 - A Q A^T. After transformation of P^-1 and of the
+    cofactors to the model, the quotient of their diagonals is the visible part of an error of X or Y.
     """
     observed = np.eye(2) / weight[:, np.newaxis, np.newaxis]
     residuals = observed - partials @ cofactors @ partials.transpose(0, 2, 1)
