@@ -34,7 +34,7 @@ PLOTS: dict[str, Callable[[Any], Plot]] = {
 
 
 class _Method(Generic[P]):
-    """A function of a result as a method of `Plots`: with the docstring and arguments of the function."""
+    """A function of a result as a method of `Plots`, with the docstring and arguments of the function."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], Plot]) -> None:
         self._function = function
@@ -72,7 +72,7 @@ class Plots:
         """Return the plots for which the result has data, by name.
 
         Plots are omitted if the result has no data for them: correlations and distortion of fixed cameras,
-        redundancy and tests without covariances, features and films of a block that has none.
+        redundancy and tests without covariances, features and films of a block without them.
         """
         plots = {name: sketch_of(self._result, name) for name in PLOTS}
         return {name: plot for name, plot in plots.items() if plot is not None}
@@ -83,16 +83,16 @@ class Plots:
         Parameters
         ----------
         folder
-            Where to.
+            Output folder.
         ending
-            Of the names, and so the format: `png`, `svg`, `pdf`.
+            File name extension, which defines the format: `png`, `svg`, `pdf`.
 
         Raises
         ------
         InputError
-            An ending that names no format.
+            If the extension is unknown.
         ModuleNotFoundError
-            matplotlib, which all formats but `svg` need, is absent (`pip install 'photogram[plots]'`).
+            If matplotlib is not installed (`pip install 'photogram[plots]'`); only `svg` does not need it.
         """
         from photogram.io.writing import write_whole
 

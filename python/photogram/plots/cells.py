@@ -1,4 +1,4 @@
-"""Means over the cells of a frame: what many image points have in common."""
+"""Means over the cells of a frame, which reveal common errors of image points."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a frame that have image points."""
+    """Cells of a frame with image points."""
 
-    columns: int  # How many cells there are across and up
+    columns: int  # Numbers of cells across and up
     rows: int
     edges: Floats  # (2, 2) lower left and upper right corner of the frame
     own: Indices  # (m,) the cell of each image point, row by row from the lower left
@@ -32,7 +32,7 @@ class Cells:
         return found
 
     def means(self, values: Floats) -> Floats:
-        """Return (rows columns,) means of (m,) values; NaN where a cell has none."""
+        """Return (rows columns,) means of (m,) values; NaN for empty cells."""
         known = np.isfinite(values)
         sums = np.bincount(self.own[known], values[known], minlength=len(self.counts))
         counts = np.bincount(self.own[known], minlength=len(self.counts))

@@ -1,4 +1,4 @@
-"""Correlations of the parameters of cameras, as matrices."""
+"""Correlation matrices of camera parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.words import phrase
 
 MAX_CAMERAS = 4
-MAX_WRITTEN_PARAMETERS = 14  # Coefficients of more parameters are not written into the matrix
+MAX_WRITTEN_PARAMETERS = 14  # Matrices of more parameters are drawn without coefficients
 SHADES = Shades(-1.0, 1.0, "correlation, -1 to 1", "signed")
 
 
@@ -23,7 +23,7 @@ def correlations(result: Any) -> Plot:
     Raises
     ------
     InputError
-        No camera has two estimated parameters, or there are no covariances.
+        If no camera has two estimated parameters, or covariances are missing.
     """
     cameras = result._plot_data().correlations
     if not cameras:

@@ -1,4 +1,4 @@
-"""Curves of radial distortion with what is known of them."""
+"""Curves of radial distortion with standard deviations."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MAX_CAMERAS = 3
 def distortion(result: Any) -> Plot:
     """Plot the radial distortion of cameras: the curve, its balanced form, and their standard deviations.
 
-    Bands are one standard deviation to either side. Dashed lines are beyond all images.
+    Bands show one standard deviation to either side. Dashed lines are beyond all observations.
 
     Raises
     ------
     InputError
-        No camera has radial distortion.
+        If no camera has radial distortion.
     """
     cameras = result._plot_data().distortion[:MAX_CAMERAS]
     if not cameras:
@@ -37,7 +37,7 @@ def distortion(result: Any) -> Plot:
 
 
 def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:
-    """Return the panels of cameras, a column for each: its curves below each other, and their deviations."""
+    """Return the panels of cameras, one column each: curves, and their standard deviations below."""
     columns = [_column(each) for each in cameras]
     rows = max(map(len, columns))
     return [own[row] if row < len(own) else None for row in range(rows) for own in columns]
@@ -61,7 +61,7 @@ def _column(curves: Curves) -> list[Panel]:
             colour = COLOURS[taken % len(COLOURS)]
             taken += 1
             marks.append(band(curves.radii, low, high, colour, 0.3, label=f"± sd of the {name}"))
-            # Bands are thin on curves of hundreds of micrometres: once more by themselves.
+            # Bands are thin on curves of hundreds of micrometres, and are therefore also drawn separately.
             deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
             sizes.append(factor * sd)
         marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), Level(0.0, FAINT)]
@@ -76,7 +76,7 @@ def _column(curves: Curves) -> list[Panel]:
 
 
 def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
-    """Return what a panel shows of a curve; single photos whose curves go astray do not set its scale."""
+    """Return the limits of a curve; extreme curves of single photos do not affect the scale."""
     factor, _ = curves.shown_as
     if not len(curves.others):
         bands = (factor * (curve.values + sign * sd) for sd in curve.bands.values() for sign in (-1, 1))

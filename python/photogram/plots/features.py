@@ -1,4 +1,4 @@
-"""How far points are from the features that are fitted to them."""
+"""Distances of points from the features fitted to them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ MAX_POINT_NAMES = 40
 
 
 def features(result: Any) -> Plot:
-    """Plot the deviations of points from the features that are fitted to them, with U to either side.
+    """Plot the deviations of points from fitted features, with U to either side.
 
     Raises
     ------
     InputError
-        No feature has deviations.
+        If no feature has deviations.
     """
     every = result._plot_data().deviations
     if not every:
@@ -38,7 +38,7 @@ def _panel(each: Deviations, said: str) -> Panel:
     factor, unit = each.shown_as
     places, count = np.arange(len(each.points)), len(each.directions)
     values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
-    # Side by side, so that bars do not hide each other.
+    # Side by side, so that bars do not overlap.
     across = places[:, np.newaxis] + 0.2 * (np.arange(count) - (count - 1) / 2)
     marks: list[Mark] = [Level(0.0, FAINT, 0.8)]
     for k, direction in enumerate(each.directions):

@@ -14,8 +14,8 @@ from photogram.show.style import FAINT, INK, round_length
 from photogram.words import phrase
 
 MAX_FIELDS = 6
-MARGIN = 0.14  # Around the places, as a part of their extent
-LONGEST_VECTOR = 0.11  # As a part of the extent of the places
+MARGIN = 0.14  # Margin around the points, as a part of their extent
+LONGEST_VECTOR = 0.11  # Longest vector, as a part of the extent of the points
 
 
 def films(result: Any) -> Plot:
@@ -24,7 +24,7 @@ def films(result: Any) -> Plot:
     Raises
     ------
     InputError
-        No marks and no patterns.
+        If there are neither marks nor patterns.
     """
     every = result._plot_data().films
     if not every:

@@ -1,4 +1,4 @@
-"""The network in plan: photos and what they show, points, control and check points, error ellipses."""
+"""The network in plan: photos, footprints, points, control and check points, error ellipses."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PLANES = {"XY": (0, 1, 2), "XZ": (0, 2, 1), "YZ": (1, 2, 0)}
 
 
 def network(result: Any, *, plane: str | None = None) -> Plot:
-    """Plot photos, footprints, points by number of rays, control and check points, and error ellipses.
+    """Plot photos, footprints, points by number of rays, control, check points and error ellipses.
 
     The plot shows a part of a large network, and its notes state which part.
 
@@ -53,7 +53,7 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
     Raises
     ------
     InputError
-        `plane` is another text.
+        If `plane` is another text.
     """
     drawn = result._plot_data()
     plan = drawn.plan
@@ -80,7 +80,7 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
 
 
 def view_of_plan(plan: Plan) -> tuple[Panel, tuple[int, int, int]]:
-    """Return a panel of the plane in which the points spread most, and which axes it has."""
+    """Return a panel of the plane with the largest extent of the points, and its axes."""
     seen = _plane(plan, None)
     return _frame(plan, seen, _limits(plan, seen)), seen
 
@@ -92,7 +92,7 @@ def _frame(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> Panel:
 
 
 def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
-    """Return the axes to the right, up, and out of the picture."""
+    """Return the axes to the right, upwards, and out of the plot."""
     if plane is not None:
         one_of("plane", plane, tuple(PLANES))
         return PLANES[plane]
@@ -101,21 +101,21 @@ def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
         return PLANES["XY"]
     of_points, of_all = _areas(known), _areas(np.concatenate([known, plan.photos]))
     there = {name: of_all[name] for name in PLANES if of_points[name] >= MIN_AREA * max(of_points.values())}
-    # From above, unless that hides most.
+    # In plan, unless this hides most.
     above = there.get("XY", 0.0) >= MIN_AREA * max(there.values())
     return PLANES["XY" if above else max(there, key=lambda name: there[name])]
 
 
 def _areas(places: Floats) -> dict[str, float]:
-    """Return what nearly all of (k, 3) places cover in each plane."""
+    """Return the area of nearly all of (k, 3) points in each plane."""
     extent = np.ptp(np.quantile(places, [1 - CENTRAL, CENTRAL], axis=0), axis=0)
     return {name: float(extent[a] * extent[b]) for name, (a, b, _) in PLANES.items()}
 
 
 def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = None) -> Floats:
-    """Return (2, 2) lower and upper limits of the picture: all stations and control, and nearly all points.
+    """Return (2, 2) lower and upper limits: all stations and control, and nearly all points.
 
-    Footprints are within them, too, unless they are far larger than the network.
+    They include footprints, unless these are far larger than the network.
     """
     axes = list(seen[:2])
     points = plan.points[np.isfinite(plan.points).all(axis=1)][:, axes]
@@ -145,9 +145,9 @@ def _size(limits: Floats) -> tuple[float, float]:
 
 
 def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
-    """Return which of many things are drawn, and what the picture says of it.
+    """Return the rows to draw among many, and a remark.
 
-    They are taken at random, and always the same: of regular networks every n-th would make patterns.
+    Rows are random but reproducible, because every n-th row of a regular network would form patterns.
     """
     if len(rows) <= most:
         return rows, ""
@@ -204,7 +204,7 @@ def _class(number: int, rays: Indices) -> str:
 def _ellipses(
     drawn: Pictured, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
 ) -> list[ScaleBar]:
-    """Add error ellipses of points, the median one of each cell where they are many; return their scale."""
+    """Add error ellipses of points, for many points the median one of each cell; return their scale."""
     plan, pair = drawn.plan, list(seen[:2])
     inside = ((plan.points[:, pair] >= limits[0]) & (plan.points[:, pair] <= limits[1])).all(axis=1)
     rows = np.flatnonzero(inside)
@@ -245,7 +245,7 @@ def _ellipses(
 
 
 def _of_cells(places: Floats, sizes: Floats, side: float) -> Indices:
-    """Return of each square cell the place whose size is the median."""
+    """Return the point with the median size in each square cell."""
     cells = np.floor((places - places.min(axis=0)) / side).astype(np.int64)
     key = cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1]
     order = np.lexsort((sizes, key))
@@ -256,9 +256,9 @@ def _of_cells(places: Floats, sizes: Floats, side: float) -> Indices:
 def _vectors(
     plan: Plan, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
 ) -> tuple[list[ScaleBar], Floats]:
-    """Add control and check points with the differences of their coordinates.
+    """Add control and check points with their coordinate differences.
 
-    Return scale bars, and (k, 2) places on the arrows, which names should not cover.
+    Returns scale bars, and (k, 2) positions on the arrows, which names should not cover.
     """
     pair = list(seen[:2])
     there = np.isfinite(plan.points).all(axis=1)
@@ -275,7 +275,7 @@ def _vectors(
         drawn.append(chosen)
     if not drawn:
         return [], NOWHERE
-    # One scale for both kinds: that of the larger differences.
+    # One scale for both types: the scale of the larger differences.
     size = max(_usual(plan.differences[rows]) for rows in drawn)
     if size == 0:
         return [], NOWHERE
@@ -299,7 +299,7 @@ def _vectors(
 
 
 def _usual(differences: Floats) -> float:
-    """Return a size that nine tenths of (k, 3) differences do not exceed; 0 where there are none."""
+    """Return a size that nine tenths of (k, 3) differences do not exceed; 0 without differences."""
     sizes = np.sqrt(np.nansum(differences**2, axis=1))
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
 

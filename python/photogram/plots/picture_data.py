@@ -1,6 +1,6 @@
-"""The data of plots: arrays that every adjusted network has, in metric axes.
+"""The data of plots: arrays of any adjusted network, in metric axes.
 
-A plot knows no class of results: their method `_plot_data` returns a `Pictured`.
+Plots do not depend on classes of results; the method `_plot_data` of a result returns a `Pictured`.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ class Plan:
     photo_ids: Sequence[str]
     photos: Floats  # (P, 3) stations
     point_ids: Sequence[str]
-    points: Floats  # (n, 3) positions; NaN for points that did not take part
-    rays: Indices  # (n,) numbers of images
+    points: Floats  # (n, 3) positions; NaN for unused points
+    rays: Indices  # (n,) numbers of image observations
     kinds: NDArray[np.str_]  # (n,) `control`, `check` or `pass`
     differences: Floats  # (n, 3) adjusted minus given coordinates of control and check points; NaN for others
 
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """The m image observations that took part."""
+    """The m used image observations."""
 
     unit: str  # Of image coordinates: `mm` or `px`
     photos: Indices  # (m,) rows of photos and of points
@@ -43,18 +43,18 @@ class Images:
     redundancy: Floats  # (m, 2) redundancy numbers; NaN without covariances
     cameras: Indices  # (m,) rows of cameras
     names: Sequence[str]  # Of the cameras
-    down: bool  # Whether y counts downwards, as rows of pixels
-    # (m,) whether coordinates are sample and line of a scanner. Their residuals are in its focal plane. Such
-    # images have cameras of their own.
+    down: bool  # Whether y increases downwards, like rows of pixels
+    # (m,) True for sample and line of a scanner, whose residuals refer to its focal plane. Such observations
+    # have separate cameras.
     scanned: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def of_scanner(self, camera: int) -> bool:
-        """Whether the images of a camera are samples and lines."""
+        """Whether the observations of a camera are samples and lines."""
         return bool(self.scanned.any() and self.scanned[self.cameras == camera].any())
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """The factor of residuals in plots, and their unit."""
+        """Factor of residuals in plots, and their unit."""
         return _enlarged(self.unit)
 
 
@@ -69,7 +69,7 @@ class Correlated:
     camera: str  # Its name
     names: Sequence[str]  # The parameters
     coefficients: Floats  # (k, k)
-    remark: str = ""  # What the coefficients are, where that is not plain
+    remark: str = ""  # Meaning of the coefficients, if not obvious
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +78,24 @@ class Curve:
 
     name: str
     values: Floats  # (r,)
-    bands: dict[str, Floats]  # (r,) standard deviations by their names
+    bands: dict[str, Floats]  # (r,) standard deviations by name
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
     """Radial distortion of a camera over r radii, in the unit of image coordinates."""
 
-    camera: str  # Its name, and what kind of lens it has
+    camera: str  # Its name, and the type of its lens model
     unit: str  # Of image coordinates: `mm` or `px`
     radii: Floats  # (r,) from 0
-    observed: float  # The largest radius with an image; curves beyond are extrapolated
-    curves: Sequence[Curve]  # The curve as it is, then other forms of it, each in a panel of its own
+    observed: float  # The largest radius of an observation; curves beyond are extrapolated
+    curves: Sequence[Curve]  # The curve, then other forms of it, each in a separate panel
     # (q, r) curves of single photos, drawn faintly
     others: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """The factor of the curves in plots, and their unit."""
+        """Factor of the curves in plots, and their unit."""
         return _enlarged(self.unit)
 
 
@@ -103,16 +103,16 @@ class Curves:
 class Deviations:
     """Distances of n points from a feature that is fitted to them."""
 
-    title: str  # What the feature is
+    title: str  # Name of the feature
     unit: str  # Of lengths
     points: Sequence[str]  # The names of the points
-    directions: Sequence[str]  # What d deviations of each point are
+    directions: Sequence[str]  # Names of the d deviations of each point
     values: Floats  # (n, d) deviations, and k times their standard deviations
     expanded: Floats
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """The factor of deviations in plots, and their unit."""
+        """Factor of deviations in plots, and their unit."""
         largest = float(np.abs(self.values).max(initial=0.0))
         small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
         return small[self.unit] if self.unit in small and largest < 1.0 else (1.0, self.unit)
@@ -122,10 +122,10 @@ class Deviations:
 class VectorField:
     """Small vectors over the frame of a camera."""
 
-    title: str  # What they are
+    title: str  # Meaning of the vectors
     places: Floats  # (n, 2) both, mm
     vectors: Floats
-    labels: Sequence[str] = ()  # What the places are called, or nothing
+    labels: Sequence[str] = ()  # Names of the points, or nothing
 
 
 class Pictured(Protocol):
@@ -140,7 +140,7 @@ class Pictured(Protocol):
         """The network."""
 
     def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN if there are none."""
+        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN if missing."""
 
     @property
     def footprints(self) -> Floats:
@@ -151,23 +151,23 @@ class Pictured(Protocol):
 
     @property
     def images(self) -> Images:
-        """The image observations that took part."""
+        """The used image observations."""
 
     @property
     def tested(self) -> Sequence[Tested]:
-        """All observations with their standardized residuals, by kind."""
+        """All observations with their standardized residuals, by type."""
 
     @property
     def outlying(self) -> list[Bools]:
-        """Which components of these are outliers of the verdict."""
+        """Masks of components that are outliers of the verdict."""
 
     @property
     def unit_weight(self) -> float:
-        """The root of the variance of unit weight; 1 if there is none."""
+        """The root of the variance of unit weight; 1 if undefined."""
 
     @property
     def correlations(self) -> list[Correlated]:
-        """Cameras with two or more estimated parameters; none without covariances."""
+        """Cameras with two or more estimated parameters; empty without covariances."""
 
     @property
     def distortion(self) -> list[Curves]:

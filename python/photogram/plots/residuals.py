@@ -17,7 +17,7 @@ from photogram.show.style import FAINT, INK, MARKED, round_length
 MAX_SINGLE_IMAGES = 900  # More image points of a camera are drawn as means of cells
 MAX_CELLS = 16  # Along the longer side of the frame
 MEAN_IMAGES_OF_CELL = 12
-MAX_CAMERAS = 6  # Those with the most images
+MAX_CAMERAS = 6  # Cameras with the most observations
 MIN_IMAGES = 8
 MARGIN = 0.06  # Around the frame, as a part of its longer side
 LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut short
@@ -25,9 +25,9 @@ LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
 def residuals(result: Any) -> Plot:
-    """Plot image residuals over the frame of each camera: one by one, or means of cells if they are many.
+    """Plot image residuals over the frame of each camera; means of cells if they are many.
 
-    Means that errors by chance would hardly give (1 percent for all cells together) are coloured.
+    Significant means are coloured (1 percent for all cells together).
     """
     images = result._plot_data().images
     cameras, left_out = largest_cameras(images)
@@ -38,7 +38,7 @@ def residuals(result: Any) -> Plot:
     extent = np.ptp(images.xy[shown], axis=0) if shown.any() else np.ones(2)
     across, up = np.maximum(extent + 2 * MARGIN * extent.max(), 1e-12)
     many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > MAX_SINGLE_IMAGES
-    # Title, scale and labels; where means are drawn, also what they are.
+    # Title, scale and labels; for means, also an explanation.
     beside = 1.95 if many else 1.25
     high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
     found = [_field(images, camera, left_out if camera == cameras[-1] else "") for camera in cameras]
@@ -46,7 +46,7 @@ def residuals(result: Any) -> Plot:
 
 
 def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int], str]:
-    """Return the cameras with the most images, in their order, and what is to be said of the others."""
+    """Return the cameras with the most observations, in their order, and a remark on the others."""
     counts = np.bincount(images.cameras, minlength=len(images.names))
     there = int((counts > 0).sum())
     chosen = np.sort(np.argsort(-counts, kind="stable")[: min(most, there)]).tolist()
@@ -55,9 +55,9 @@ def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int],
 
 
 def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
-    """Return a panel of the frame of a camera: equal scales, room around it, y as the camera counts it.
+    """Return a panel of the frame of a camera with equal scales and a margin, y as in the camera.
 
-    Of a scanner they are samples and lines, upwards: so residuals point as they do in its focal plane.
+    Samples and lines of a scanner increase upwards, so that residuals have the direction of its focal plane.
     """
     margin = MARGIN * float((edges[1] - edges[0]).max())
     limits = edges + margin * np.array([[-1.0], [1.0]])

@@ -30,15 +30,15 @@ MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
 def tests(result: Any) -> Plot:
-    """Plot test values w of all observations: their histogram, and their quantiles, against the normal.
+    """Plot test values w of all observations: histogram and quantiles against the normal.
 
-    w = residual / (standard deviation x root of redundancy number) is standard normal where the given
-    standard deviations are right and there are no gross errors.
+    w = residual / (standard deviation x root of redundancy number) is standard normal if the given standard
+    deviations are correct and the data are free of gross errors.
 
     Raises
     ------
     InputError
-        The adjustment gave no test values (`covariance=False`).
+        If test values were not computed (`covariance=False`).
     """
     drawn = result._plot_data()
     groups = [_speaking(each) for each in drawn.tested]
@@ -51,7 +51,7 @@ def tests(result: Any) -> Plot:
 
 
 def _speaking(group: Tested) -> Tested:
-    """Return a group without the components that weigh nothing: at 0 they would be a spike, and no test."""
+    """Return a group without components of negligible size, which would be a peak at 0."""
     sizes = np.nan_to_num(np.abs(group.values))
     silent = sizes.reshape(len(sizes), -1).max(axis=0, initial=0.0) < SPEAKING
     return replace(group, values=np.where(silent.reshape(sizes.shape[1:]), np.nan, group.values))
@@ -97,7 +97,7 @@ def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: flo
     order = np.argsort(values)
     every = values[order]
     ordered, beyond = every[rows], marked[order][rows]
-    # Of the order statistics of independent values, about; those of residuals are nearly so.
+    # Approximate, for order statistics of independent values; residuals are nearly independent.
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
     ends, places = expected[[0, -1]], np.column_stack([expected, ordered])
     marks: list[Mark] = [
@@ -130,7 +130,7 @@ def _quantiles(groups: Sequence[Tested], outlying: list[Bools], unit_weight: flo
 
 
 def _rows(n: int) -> Any:
-    """Return which of n ordered values are drawn: all of the ends, and as many between as there is room."""
+    """Return the rows of n ordered values to draw: all extreme ones, and a selection between."""
     if n <= MAX_QUANTILES:
         return np.arange(n)
     inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)

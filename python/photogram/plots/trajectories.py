@@ -1,4 +1,4 @@
-"""What the adjustment has moved a trajectory by, over time, with its standard deviation."""
+"""Corrections of a trajectory by the adjustment, over time, with standard deviations."""
 
 from __future__ import annotations
 
