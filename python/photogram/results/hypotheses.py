@@ -33,6 +33,10 @@ UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetecte
 EFFECTS = 32  # Groups with computed effects: those of the largest bias-to-noise ratios
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
+ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
+LENSES = frozenset(
+    {"camera-term", "bending"}
+)  # Errors that patterns of residuals reveal, or that have such a cause
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
@@ -105,6 +109,13 @@ class Hypothesis:
         size = max(abs(d) / p for d, p in zip(self.mdb, self.plausible, strict=True))
         return math.erf(size / math.sqrt(2))
 
+    def moves(self) -> bool:
+        """Whether the estimated error moves a point beyond the limit."""
+        if self.effect is None or self.error is None:
+            return False
+        share = float(np.linalg.norm(self.estimate) / np.linalg.norm(self.error))
+        return share * self.effect.ratio > LIMIT
+
     def is_harmful(self, points: int) -> bool:
         """Whether an undetected error moves too many of a number of points."""
         if self.effect is None or self.checked or self.code in UNGRADED:
@@ -124,6 +135,7 @@ class Hypotheses:
     point_ids: Sequence[str]
     axes: Sequence[str]
     units: Callable[[str], str]  # Unit of the errors of a type
+    single_odds: float  # Largest log odds of an error of a single observation, images among them
 
     @property
     def harmful(self) -> list[Hypothesis]:
@@ -168,10 +180,36 @@ class Hypotheses:
         """Errors of the datum that no independent source tests."""
         return [each for each in self.every if each.code in DATUM and each.redundancy < UNTESTED]
 
-    def candidates(self, level: float) -> list[Hypothesis]:
-        """Return the hypotheses that the tests do not exclude at a level, the most likely first."""
-        found = [each for each in self.every if each.probability < level / max(len(self.every), 1)]
-        return sorted(found, key=lambda each: -each.log_odds)
+    @property
+    def common(self) -> list[Hypothesis]:
+        """Detected errors of sets that explain more than any single observation, the most likely first."""
+        found = [
+            each
+            for each in self.every
+            if each.group is None and each.code not in LENSES and each.probability < DETECTION[0]
+        ]
+        found.sort(key=lambda each: -each.log_odds)
+        if not found or found[0].log_odds < self.single_odds:
+            return []
+        return [each for each in found if each.log_odds > found[0].log_odds - math.log(ALTERNATIVES)]
+
+    def common_errors(self) -> list[Phrase]:
+        """Return messages on these errors, the most likely first."""
+        found = self.common
+        return [
+            phrase(
+                "common.error" if each is found[0] else "common.alternative",
+                named=each.name,
+                size=_size(each, self.units(each.code)),
+                odds=math.exp(found[0].log_odds - each.log_odds),
+            )
+            for each in found
+        ]
+
+    @property
+    def common_is_harmful(self) -> bool:
+        """Whether the most likely of these errors moves a point beyond the limit."""
+        return any(each.moves() for each in self.common[:1])
 
     def tests(self) -> Table:
         """Return the declared table of all tests."""
@@ -238,6 +276,14 @@ def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
     )
 
 
+def _size(own: Hypothesis, unit: str) -> str:
+    """Return an estimate with its standard deviation; of several parameters the largest one."""
+    k = int(np.argmax(np.abs(own.estimate)))
+    sd = math.sqrt(max(own.cofactors[k * (len(own.estimate) + 1)], 0.0))
+    axis = f"{own.parameters[k]} " if len(own.estimate) > 1 else ""
+    return f"{axis}{own.estimate[k]:.4g}{unit} (sd {sd:.2g})"
+
+
 def _written(own: Hypothesis, values: Sequence[float]) -> str:
     names = own.parameters or [""] * len(values)
     return ", ".join(f"{name} {value:.4g}".lstrip() for name, value in zip(names, values, strict=False))
@@ -264,6 +310,9 @@ def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
         own = Hypothesis(**{**row, "effect": effect}, name=name(row))
         odds = _log_odds(own, numbers[own.code, own.component is None], estimated)
         every.append(replace(own, log_odds=odds, checked=_is_checked(result, effect)))
+    images = found.suspects.kinds == 0
+    largest = float(np.nanmax(found.tests.statistic[images & found.tests.active], initial=0.0))
+    of_images = largest / 2 - math.log(3) - math.log(max(np.count_nonzero(images), 1))
     return Hypotheses(
         every,
         correlations,
@@ -271,6 +320,7 @@ def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
         point_ids=result.given.point_ids,
         axes=[axis.name for axis in axes],
         units=lambda code: units.get(code, f" {length}"),
+        single_odds=max([of_images, *(each.log_odds for each in every if each.group is not None)]),
     )
 
 
@@ -349,11 +399,8 @@ def block_facts(result: Result) -> dict[str, Any]:
     _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
     own = np.unique(kinds[control])
     if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of: dict[int, int] = {kind: k for k, kind in enumerate(own.tolist())}
-        facts["control_sets"] = [
-            set_of[kind] if is_control else None
-            for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
-        ]
+        set_of = {int(kind): k for k, kind in enumerate(own)}
+        facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
     return facts
 
 

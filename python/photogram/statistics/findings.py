@@ -202,6 +202,9 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
+    # Detected errors that sets of observations have in common, and whether they forbid the use
+    common: Sequence[Text] = ()
+    common_is_harmful: bool = False
     # Errors that would remain undetected and move many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None
