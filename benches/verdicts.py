@@ -155,7 +155,9 @@ def observed(
         order.append(next(int(row) for row in np.argsort(-toward) if row not in order))
     rows = np.array(order[:control], dtype=int)
     others = np.setdiff1d(np.arange(len(points)), rows)
-    start = poses + rng.normal(size=poses.shape) * [0.3, 0.3, 0.3, 0.005, 0.005, 0.005] * (0.1 if control_sd < 0.01 else 1)
+    start = poses + rng.normal(size=poses.shape) * [0.3, 0.3, 0.3, 0.005, 0.005, 0.005] * (
+        0.1 if control_sd < 0.01 else 1
+    )
     return Survey(
         kind,
         start,
@@ -212,9 +214,21 @@ def _twice(survey: Survey, _: float) -> Survey:
 MISTAKES: dict[str, tuple[str, Callable[[Survey], bool], Mistake]] = {
     "one control height": ("control-point Z", lambda s: len(s.control) > 0, _control(0, [0, 0, 1])),
     "one control point in plan": ("control-point X", lambda s: len(s.control) > 0, _control(0, [1, 0, 0])),
-    "all control heights": ("control-heights", lambda s: len(s.control) > 0, _control(slice(None), [0, 0, 1])),
-    "all control shifted": ("control-shift", lambda s: len(s.control) > 0, _control(slice(None), [0.6, 0.6, 0.5])),
-    "GNSS shifted": ("gnss-shift", lambda s: s.gnss is not None, _gnss(lambda s, d: np.array([0.6, 0.6, 0.5]) * d)),
+    "all control heights": (
+        "control-heights",
+        lambda s: len(s.control) > 0,
+        _control(slice(None), [0, 0, 1]),
+    ),
+    "all control shifted": (
+        "control-shift",
+        lambda s: len(s.control) > 0,
+        _control(slice(None), [0.6, 0.6, 0.5]),
+    ),
+    "GNSS shifted": (
+        "gnss-shift",
+        lambda s: s.gnss is not None,
+        _gnss(lambda s, d: np.array([0.6, 0.6, 0.5]) * d),
+    ),
     "GNSS heights": ("gnss-heights", lambda s: s.gnss is not None, _gnss(lambda s, d: np.array([0, 0, d]))),
     "lever arm": (
         "lever-arm",
@@ -232,14 +246,16 @@ def surveys(rng: np.random.Generator, count: int) -> Iterator[Survey]:
     """Yield surveys of all kinds, small and large, controlled well and badly."""
     for k in range(count):
         if k % 3 == 2:
-            yield ring(rng, int(rng.integers(6, 20)), int(rng.choice([3, 4, 8])), int(rng.choice([0, 1, 2, 4])))
+            yield ring(
+                rng, int(rng.integers(6, 20)), int(rng.choice([3, 4, 8])), int(rng.choice([0, 1, 2, 4]))
+            )
         else:
             strips, length = int(rng.integers(1, 5)), int(rng.integers(4, 12))
             yield aerial(rng, strips, length, int(rng.choice([3, 4, 5, 7, 10])), bool(k % 2))
 
 
 def size_of(result: Result, hypothesis: str) -> float:
-    """Return the largest component of the minimal detectable bias of a mistake; NaN if any size is undetected."""
+    """Return the largest component of the MDB of a mistake; NaN if an error of any size is undetected."""
     code, _, axis = hypothesis.partition(" ")
     for each in result.reliability_summary.hypotheses.every if result.reliability_summary else ():
         component = None if not axis else "XYZ".index(axis)
@@ -290,10 +306,12 @@ def main() -> None:
                 off = moved(clean, result) if hypothesis else math.inf
                 counts[name, f"{size:g}"][result.verdict.code] += 1
                 if off > WRONG and result.verdict.code == "accepted":
-                    bad.append(f"block {number} ({survey.kind}, {len(survey.control)} control, {len(survey.bars)} bars), {name} {size:g}: {off:.1f} sd")
+                    of = f"{survey.kind}, {len(survey.control)} control, {len(survey.bars)} bars"
+                    bad.append(f"block {number} ({of}), {name} {size:g}: {off:.1f} sd")
+
     for (name, what), found in counts.items():
         print(f"{name:28s} {what:18s}", ", ".join(f"{code} {n}" for code, n in sorted(found.items())))
-    print(f"\n{len(bad)} results accepted without reserve although a point is wrong by more than {WRONG:g} standard deviations")
+    print(f"\n{len(bad)} results accepted without reserve; a point is wrong by more than {WRONG:g} sd")
     print(*bad[:30], sep="\n")
 
 

@@ -136,7 +136,7 @@ def _of_part(part: Part) -> Iterator[str]:
     elif isinstance(part, Text):
         yield part.text
     else:
-        yield part.caption
+        yield part.title if isinstance(part, Table) else part.caption
         if isinstance(part, Table):
             yield part.note
 

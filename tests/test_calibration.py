@@ -10,6 +10,7 @@ from golden_data import golden as golden_file
 from photogram import Block, Camera, InputError, adjust
 from photogram.network import project
 from photogram.results import calibrations, distortion_curve, lens_field
+from photogram.show.page import about
 
 FREE = np.inf
 NAMES = ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2")
@@ -256,8 +257,7 @@ def test_correlations_with_poses_name_parameter_component_and_photos(example):
     c, z = camera.names.index("c"), len(camera.names) + 2
     expected = abs(joint[c, z]) / np.sqrt(joint[c, c] * joint[z, z])
     assert heights.coefficient == pytest.approx(expected, abs=1e-6)
-    first = ", ".join(heights.photos[:3])
-    sentence = f"c and Z of photo {first} and 5 others are correlated by {heights.coefficient:.4f}"
+    sentence = about("correlated.pose", **vars(heights))
     (section,) = (section for section in result.document().sections if section.key == "cameras")
     assert any(sentence in each for part in section.parts for each in getattr(part, "sentences", ()))
     [member] = json.loads(result.to_json())["calibrations"]

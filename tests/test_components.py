@@ -20,7 +20,7 @@ from photogram import (
 )
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
-from photogram.results.components_document import statement
+from photogram.results.components import statement
 from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 

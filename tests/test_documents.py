@@ -13,10 +13,11 @@ import pytest
 import photogram
 from photogram.io import json as json_files
 from photogram.show import html, quantity
-from photogram.show.cells import page_table, written
+from photogram.show.cells import written
 from photogram.show.forms import record, summary, table_text, text, to_json
 from photogram.show.methods import Documented
 from photogram.show.page import (
+    Cell,
     Column,
     Document,
     Fact,
@@ -74,14 +75,14 @@ def test_a_table_is_declared_once_for_all_forms():
 
 def test_text_and_page_write_the_same_cells():
     declared = table()
-    written = page_table(declared.title, declared.columns, declared.note, declared.deviations)
-    heads, *rows = table_text(written)
+    cells = written(declared)
+    heads, *rows = table_text(cells)
     assert heads.split() == ["Point", "x", "m", "y", "m", "sd", "x", "m", "sd", "y", "m", "t"]
     assert [row.split() for row in rows] == [
         ["P1", "1.250", "-2.500", "0.010", "0.020", "0.5"],
         ["P2", "3.000", "4.000", "0.010", "-", "9.0*"],
     ]
-    by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [written], "In metres.")])
+    by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [cells], "In metres.")])
     by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
     pytest.importorskip("jinja2")
     assert html.page_html(by_hand) == html.page_html(by_key)
@@ -116,10 +117,10 @@ def test_the_report_has_every_part_of_a_document():
 def test_people_see_the_chosen_rows_and_components():
     whole = table()
     some = written(replace(whole, shown=np.array([1])))
-    assert [row[0] for row in some.rows] == ["P2"]
+    assert [row[0].text for row in some.rows] == ["P2"]
     components = written(replace(whole, shown=np.array([[0, 1], [1, 0]])))
     heads = [column.head for column in components.columns]
-    assert [(row[0], row[heads.index("Component")]) for row in components.rows] == [
+    assert [(row[0].text, row[heads.index("Component")].text) for row in components.rows] == [
         ("P1", "y"),
         ("P2", "x"),
     ]
@@ -131,8 +132,9 @@ def test_a_pdf_document_has_declared_tables():
     from photogram.show.pdf import page_pdf
 
     declared = table()
-    written = page_table(declared.title, declared.columns, declared.note, declared.deviations)
-    by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [written], "In metres.")])
+    by_hand = Document(
+        "Survey", "A", [], [], [], [Section("points", "Points", [written(declared)], "In metres.")]
+    )
     by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
     assert page_pdf(by_hand) == page_pdf(by_key)
 
@@ -157,8 +159,8 @@ def test_a_pdf_document_repeats_heads_of_tables_and_begins_annexes_on_pages():
     pytest.importorskip("typst")
     from photogram.show.pdf import page_pdf
 
-    rows = [[f"P{k}", 1.0] for k in range(150)]
-    long = Table("Points", [Column("Point", text=True), Column("x", "m", decimals=3)], rows)
+    rows = [[Cell(f"P{k}"), Cell("1.000", 1.0)] for k in range(150)]
+    long = Table("Points", [Column("Point", text=True), Column("x", "m")], rows)
     parts = [Section("note", "", [Text("One line.")]), Section("points", "Points", [long], annex=True)]
     pages = drawn_pages(page_pdf(Document("Survey", "A", [], [], [], parts)))
     # The rule below a head is the only line of this width.
@@ -174,7 +176,7 @@ def test_a_pdf_document_has_any_name(name):
     from photogram.show.pdf import page_pdf
 
     columns = [Column(name, text=True)] * 80
-    parts = [Table(name, [], []), Table(name, columns, []), Table("", columns, [[name] * 80] * 2, name)]
+    parts = [Table(name, [], []), Table(name, columns, []), Table("", columns, [[Cell(name)] * 80] * 2, name)]
     parts += [Facts(name, [Fact(name, name, name, name)]), Text(name), Remarks([name]), Layers("l", [*parts])]
     judgement = Judgement(name, name, [name], "bad", name)
     whole = Document(name, name, [judgement], [name], [Fact(name, name)], [Section("s", name, parts, name)])
@@ -213,7 +215,8 @@ def test_documents_of_several_things_are_layers_of_one():
     (section,) = whole.sections
     (layers,) = section.parts
     assert isinstance(layers, Layers)
-    assert (section.key, section.intro, layers.titles()) == ("points", "In metres.", ["A", "B"])
+    assert (section.key, section.intro) == ("points", "In metres.")
+    assert [layer.title for layer in layers.parts] == ["A", "B"]
     assert [(each.on, each.tone) for each in whole.judgements] == [("A", "good"), ("B", "bad")]
     assert whole.advice == ["Measure again.", "Look at A.", "Look at B."]
     assert [fact.name for fact in whole.highlights] == ["rms, A", "rms, B"]

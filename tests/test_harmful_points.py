@@ -3,6 +3,7 @@
 import json
 import pickle
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,16 @@ from message_codes import has_code
 from photogram import Block, adjust, diagnose, simulate, snoop
 from photogram.diagnosis.key_numbers import held_values
 from photogram.network import project
-from photogram.results.network_sections import weakest_photos, weakest_points
+from photogram.results import network_sections
 from photogram.words import Phrase
+
+
+def weakest_points(result):
+    return [SimpleNamespace(**row) for row in network_sections.weakest_points(result).record()]
+
+
+def weakest_photos(result):
+    return [SimpleNamespace(**row) for row in network_sections.weakest_photos(result).record()]
 
 
 @pytest.fixture(scope="module")

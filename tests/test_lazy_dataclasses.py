@@ -14,7 +14,7 @@ from photogram import Message, lazy_dataclasses
 
 
 def is_made(kind):
-    return not any(type(each).__name__ == "_Later" for each in vars(kind).values())
+    return type(vars(kind)["__init__"]).__name__ != "_Later"
 
 
 def family(dataclass):

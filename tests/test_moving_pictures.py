@@ -72,9 +72,9 @@ def test_footprints_are_of_pictures(drone, both):
 
 def test_distances_from_stations_that_are_none(strips, both, drone):
     """The place of a scanner at one time is not where it saw its points from."""
-    assert np.isnan([each.distance for each in weakest_points(strips)]).all()
-    assert np.isfinite([each.distance for each in weakest_points(both)]).all()
-    assert np.isfinite([each.distance for each in weakest_points(drone)]).all()
+    assert np.isnan([each["distance"] for each in weakest_points(strips).record()]).all()
+    assert np.isfinite([each["distance"] for each in weakest_points(both).record()]).all()
+    assert np.isfinite([each["distance"] for each in weakest_points(drone).record()]).all()
 
 
 def test_patterns_over_the_frame_are_in_the_focal_plane(both):

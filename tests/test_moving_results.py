@@ -41,7 +41,7 @@ from photogram.network import (
     Trajectory,
 )
 from photogram.network.subset import kept_images
-from photogram.results.trajectories import courses
+from photogram.results.trajectories import trajectories_table
 
 
 @pytest.fixture(scope="module")
@@ -189,14 +189,14 @@ def test_many_coefficients_do_not_flood_the_report():
 
 def test_largest_corrections(scan):
     """They are those of the basis at all times of the table, not of its coefficients."""
-    for each in courses(scan):
-        own = next(one for one in scan.block.trajectories if one.name == each.trajectory)
-        basis = getattr(own, each.what)
-        values = [unknown(scan, f"{own.name} {each.what} {k}").position for k in range(basis.count)]
+    for each in trajectories_table(scan).record():
+        own = next(one for one in scan.block.trajectories if one.name == each["trajectory"])
+        basis = getattr(own, each["what"])
+        values = [unknown(scan, f"{own.name} {each['what']} {k}").position for k in range(basis.count)]
         curve = BSpline(basis.knots, np.array(values), basis.degree)
-        largest = np.linalg.norm(curve(np.linspace(each.first, each.last, 5001)), axis=1).max()
-        assert each.largest == pytest.approx(largest, rel=1e-3)
-        assert each.largest == pytest.approx(np.linalg.norm(curve(each.at)), rel=1e-9)
+        largest = np.linalg.norm(curve(np.linspace(each["first"], each["last"], 5001)), axis=1).max()
+        assert each["largest"] == pytest.approx(largest, rel=1e-3)
+        assert each["largest"] == pytest.approx(np.linalg.norm(curve(each["at"])), rel=1e-9)
 
 
 def test_a_photo_is_its_trajectory_at_its_time(scan):

@@ -3,9 +3,11 @@
 import ast
 import inspect
 import re
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
+from types import FunctionType
 
 import pytest
 
@@ -75,3 +77,26 @@ def test_tests_import_public_names_where_there_are_any():
             name for name, value in values.items() if callable(value) and inspect.unwrap(value) in public
         ]
     assert found == []
+
+
+def described(kind):
+    """Return what of a public class needs a docstring: itself, its methods and properties."""
+    yield kind.__qualname__, kind
+    for name in {*dir(kind)} - {*getattr(kind, "__dataclass_fields__", ())}:
+        home = next(each for each in kind.__mro__ if name in vars(each) or each is object)
+        value = inspect.getattr_static(kind, name, None)
+        own = home.__module__.startswith("photogram.") and not name.startswith("_")
+        if own and isinstance(value, property | cached_property | classmethod | staticmethod | FunctionType):
+            yield f"{kind.__qualname__}.{name}", value
+
+
+def test_public_names_have_docstrings():
+    found = {}
+    for home in map(import_module, public_api.packages()):
+        for value in (getattr(home, name) for name in home.__all__):
+            if inspect.isclass(value):
+                found |= described(value)
+            elif inspect.isfunction(value):
+                found[value.__qualname__] = value
+    assert len(found) > 1000
+    assert [name for name, value in found.items() if not (value.__doc__ or "").strip()] == []

@@ -12,10 +12,10 @@ from photogram.formats.adjusted import excel_file, table_files
 from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
-from photogram.show.cells import page_table
+from photogram.show.cells import written
 from photogram.show.forms import MAX_ROWS, fact_lines, record, summary, text
 from photogram.show.html import page_html
-from photogram.show.page import Cell, Document, Fact, Layers, Section, probability_written
+from photogram.show.page import Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -26,8 +26,8 @@ SD = Quantity(np.array([1e-5, 0.0, 17.1]), AXES, "deviation", head="sd", words={
 
 
 def test_components_of_different_units_share_a_column_each_with_its_own_decimals():
-    table = page_table("", [component(AXES, OF)[0], VALUES, SD], by=SD.values)
-    rows = [[column.written(cell.value) for column, cell in row] for row in table.cells()]
+    table = written(Table("", "", [component(AXES, OF)[0], VALUES, SD], deviations=SD.values))
+    rows = [[cell.text for cell in row] for row in table.rows]
     # Two figures of 2.1 seconds of arc, of degrees four more; significant figures where nothing is known.
     assert rows[0] == ["omega, ″", "28.64789", "2.06"]
     assert rows[1] == ["s, mm / m", "0.250000", "held"]
@@ -37,8 +37,7 @@ def test_components_of_different_units_share_a_column_each_with_its_own_decimals
 def test_what_is_to_be_looked_at_is_marked():
     marked = np.array([False, True])
     tests = Quantity(np.array([1.0, -6.6]), head="t", decimals=2, marked=marked)
-    cells = page_table("", [tests]).rows
-    assert [cell.tone for (cell,) in cells if isinstance(cell, Cell)] == ["", "look"]
+    assert [cell.tone for (cell,) in written(Table("", "", [tests])).rows] == ["", "look"]
 
 
 def test_facts_are_lines():
@@ -65,9 +64,9 @@ def test_an_attribute_of_many_things_is_a_quantity():
         of_each(things, "probability", member="p", head="p", decimals=2),
     ]
     assert records(table)[1] == {"name": "y^2", "sd_um": 0.25, "p": 0.05}
-    page = page_table("", table)
+    page = written(Table("", "", table))
     assert [(column.head, column.unit) for column in page.columns] == [("Term", ""), ("sd", "µm"), ("p", "")]
-    assert [cell.value for _, cell in next(iter(page.cells()))] == ["x^2", 0.5, None]
+    assert [(cell.text, cell.number) for cell in page.rows[0]] == [("x^2", None), ("0.500", 0.5), ("", None)]
 
 
 def test_documents_take_arrays_however_they_lie_and_data_classes():

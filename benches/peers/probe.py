@@ -43,6 +43,7 @@ class Clock:
 
 def watched() -> Clock:
     """Put the clock on the phases of the command."""
+    from photogram.cli.documents import Documents
     from photogram.cli.job import Job
     from photogram.diagnosis import after_adjustment
     from photogram.show.methods import Judged
@@ -55,10 +56,10 @@ def watched() -> Clock:
     clock.watch(after_adjustment, "diagnosed", "verdict")
     # A property that is kept when it is first read: what computes it is watched.
     clock.watch(vars(Judged)["verdict"], "func", "verdict")
-    clock.watch(command, "_files", "tables")
+    clock.watch(command, "_project_files", "tables")
     clock.watch(Job, "write", "tables")
     clock.watch(import_module("photogram.show.forms"), "text", "report")
-    clock.watch(import_module("photogram.cli.documents"), "html_files", "page with pictures")
+    clock.watch(Documents, "page", "page with pictures")
     return clock
 
 

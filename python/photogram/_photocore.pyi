@@ -1359,6 +1359,57 @@ class NetworkTrial:
         its standard deviation (a priori unit weight), in the units of the observations. NaN for what is out.
         """
 
+    def hypotheses(
+        self,
+        *,
+        velocities: _Floats,
+        times: list[float],
+        position_sets: list[int],
+        control_sets: list[int | None],
+        readouts: list[list[float] | None],
+        widths: list[float],
+        checks: list[int],
+        centre: list[float] | None,
+        estimated: tuple[float, float] | None,
+        detection: tuple[float, float],
+        limit: float,
+        effects: int,
+    ) -> tuple[list[dict[str, Any]], _Floats]:
+        """Test errors that sets of observations have in common, and errors of groups except images.
+
+        Parameters
+        ----------
+        velocities, times
+            (P, 3) velocities of photos in the object space by time, and (P,) times; empty if unknown.
+        position_sets, control_sets
+            The set (strip, file) of the position of each photo, and of each control point; empty for none.
+        readouts
+            For each camera a, b, c: the line x, y is read at a x + b y + c of the readout time, -1/2 to 1/2.
+        widths
+            Width of the image of each camera in its unit; NaN if unknown.
+        checks
+            Points whose changes are returned with each effect.
+        centre
+            Centre of scale, rotation and bending; None for the middle of the network.
+        estimated
+            Sum of squares and degrees of freedom if the unit weight is estimated.
+        detection
+            Significance level and power of the minimal detectable bias (MDB).
+        limit
+            Standard deviations from which on points are counted.
+        effects
+            Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
+
+        Returns
+        -------
+        For each hypothesis a dictionary: `code`, `group` (type as in `suspects`, None for sets), `index`,
+        `component`, `parameters`, `observations`, `plausible` (sizes), `rank`, `statistic` T, `probability`,
+        `estimate`, its `cofactors`, `redundancy` r, `noncentrality`, `mdb`, `error`, `bias_to_noise`, and
+        `effect`: points beyond the limit, the same without points of the group, the largest change in standard
+        deviations, its point and coordinate, the largest change, and the changes of `checks`. Then the (s, s)
+        correlations of the scores of sets.
+        """
+
     def predictions(
         self, suspects: list[int]
     ) -> list[tuple[float, list[int], list[float], list[float]] | None]:

@@ -14,6 +14,11 @@ from typing import TYPE_CHECKING, Any
 __all__ = ["asdict", "dataclass", "field", "fields", "replace"]
 
 MAKING = RLock()
+APART = {
+    "__repr__",
+    "__eq__",
+    "__hash__",
+}  # Methods that are made later than the others: few classes need them
 
 
 class _Later:
@@ -24,11 +29,19 @@ class _Later:
 
     def __get__(self, instance: object, owner: type) -> Any:
         with MAKING:
-            waiting = [name for name, own in vars(self.of).items() if isinstance(own, _Later)]
-            for name in waiting:
-                delattr(self.of, name)
-            if waiting:
-                dataclasses.dataclass(**self.options)(self.of)
+            waiting = {name for name, own in vars(self.of).items() if isinstance(own, _Later)}
+            if self.name in waiting & APART:
+                named = [(each.name, each.type, each) for each in dataclasses.fields(self.of)]
+                eq, unsafe_hash = self.options["eq"], self.options["frozen"]
+                other = dataclasses.make_dataclass(
+                    self.of.__name__, named, init=False, eq=eq, unsafe_hash=unsafe_hash
+                )
+                for name in waiting & APART:
+                    setattr(self.of, name, vars(other)[name])
+            elif self.name in waiting:
+                for name in waiting - APART:
+                    delattr(self.of, name)
+                dataclasses.dataclass(**(self.options | {"repr": False, "eq": False}))(self.of)
         made = vars(self.of)[self.name]
         return made.__get__(instance, owner) if hasattr(made, "__get__") else made
 

@@ -18,7 +18,7 @@ from photogram.network.refraction import Air, Water
 from photogram.results import datum as datums
 from photogram.results.covariance import adjusted
 from photogram.results.features import KINDS as FORMS
-from photogram.results.features_report import through
+from photogram.results.features import through
 from photogram.results.group_sums import observables
 from photogram.results.observation_kinds import named_observation, parts_of
 from photogram.results.statement import budget

@@ -234,7 +234,7 @@ def test_it_is_an_option_of_the_command(folder, tmp_path):
     (clock,) = [line.split() for line in report.splitlines() if re.match(r"clock +of b", line)]
     assert float(clock[-4]) == pytest.approx(0, abs=1e-6), clock
     assert float(clock[-6]) == 1e-6
-    assert "54 points held where given, which nothing tests" in " ".join(report.split())
+    assert "54 points are fixed and not listed" in " ".join(report.split())
     for words, said in (
         (["--offset", "b=0"], "the camera b does not have an offset; --sync offset "),
         (["--sync", "offset", "--offset", "b=x"], "must be CAMERA=S or CAMERA=S,SD"),

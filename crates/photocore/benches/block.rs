@@ -1,10 +1,10 @@
-//! A block of parallel strips adjusted, as a whole and phase by phase, beside the machine's dense matrix product.
+//! Adjustment of a block of parallel strips, in total and per phase, compared with a dense matrix product.
 //!
-//! The size is that of the environment: `STRIPS=50 PHOTOS=100 cargo bench --package photocore --bench block`. Criterion's
-//! elements are multiply-adds where they are counted, so that the phases' rates stand against that of `dense/product`; those of
-//! `linearize` are image points, those of `adjust` photographs.
+//! Environment variables define the size: `STRIPS=50 PHOTOS=100 cargo bench --package photocore --bench block`. Criterion's elements are
+//! multiply-adds if counted, so that the rates of the phases compare with `dense/product`. The elements of `linearize` are image
+//! observations, the elements of `adjust` are photographs.
 
-// A benchmark that cannot run has nobody to report to.
+// Panics are acceptable in a benchmark.
 #![allow(clippy::expect_used, missing_docs)]
 
 use std::fmt::Debug;
@@ -22,25 +22,25 @@ use photocore::normals::{
     Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions, System,
 };
 
-/// Rows and columns of the dense product.
+/// Number of rows and columns of the dense product.
 const DENSE: usize = 1024;
 
-/// Wide-angle photographs from 4,500 m, 60 % forward and 30 % side overlap, a hundred points on each.
+/// Wide-angle photographs from 4,500 m, 60 % forward and 30 % side overlap, a hundred points per photograph.
 const PRINCIPAL_DISTANCE: f64 = -152.74;
 const FLYING_HEIGHT: f64 = 4500.0;
 const HALF_FRAME: f64 = 115.0;
 const BASE: f64 = 2710.0;
 const SEPARATION: f64 = 4743.0;
-/// Between ground points: four columns to a base, seven rows to a separation.
+/// Distance between ground points in metres: four columns per base, seven rows per strip separation.
 const SPACING: f64 = 677.5;
-/// No photograph sees a point farther away than this along or across the strip.
+/// Visibility limit of a photograph along or across the strip, in metres.
 const REACH: f64 = 1.2 * FLYING_HEIGHT * HALF_FRAME / -PRINCIPAL_DISTANCE;
 const IMAGE_SD: f64 = 0.01;
-/// One point in so many is control.
+/// Number of points per control point.
 const CONTROL: usize = 50;
 const CONTROL_SD: f64 = 0.05;
 
-/// The block of the size that the environment asks for, and a name for it.
+/// Returns the block of the size given by the environment, and its name.
 fn block() -> (Network, String) {
     let number = |name: &str, default: usize| {
         std::env::var(name).map_or(default, |text| text.parse().expect("a number of strips or photographs"))
@@ -49,7 +49,7 @@ fn block() -> (Network, String) {
     (strips(count, photos), format!("{count}x{photos}"))
 }
 
-/// A flawless block, but for initial stations that lie off by some ten metres and some milliradians.
+/// Returns an error-free block with initial stations wrong by about ten metres and some milliradians.
 fn strips(strips: usize, photos_per_strip: usize) -> Network {
     let (space, sense) = (ObjectSpace::Rectangular, RotationSense::GroundToPhoto);
     let true_photos: Vec<([f64; 3], [f64; 3])> = (0..strips * photos_per_strip)
@@ -109,19 +109,19 @@ fn strips(strips: usize, photos_per_strip: usize) -> Network {
     block
 }
 
-/// The block with one camera for all photographs, its focal length and two radial terms free.
+/// Returns the block with one camera for all photographs, with free focal length and two free radial terms.
 fn with_shared_camera(block: &Network) -> Network {
     let camera = Bal { focal_length: -PRINCIPAL_DISTANCE, radial: [0.0; 2] };
     Network { cameras: vec![Camera::new(camera.into(), vec![f64::INFINITY; 3])], ..block.clone() }
 }
 
-/// The observation equations of a block, ready-made, so that the phases of the normal equations are timed without the model.
+/// Precomputed observation equations of a block, so that the phases of the normal equations are timed without the model.
 struct Linear {
     projections: Vec<geometry::Projection>,
 }
 
 impl Linear {
-    /// At the positions and attitudes that the block starts from and the true positions of its points.
+    /// Linearizes at the initial positions and attitudes of the block and the true positions of its points.
     fn new(block: &Network) -> Self {
         let photos: Vec<geometry::View> = block
             .photos
@@ -154,7 +154,7 @@ impl Equations for Linear {
     }
 }
 
-/// The normal equations of a block.
+/// Normal equations of a block.
 struct Phases {
     threads: Threads,
     system: System,
@@ -166,7 +166,7 @@ impl Phases {
     fn new(block: &Network) -> Self {
         let mut start = vec![0];
         for (group, image) in block.images.iter().enumerate() {
-            // The images stand point by point.
+            // The observations are sorted by point.
             start.resize(image.point + 1, group);
         }
         start.push(block.images.len());
@@ -196,10 +196,10 @@ impl Phases {
         ))
     }
 
-    /// Multiply-adds of the formation with its reduction, and of the cofactors of points and image points, from the numbers of
-    /// photographs that the points are on. An image point takes 146 besides the reduction: the point's normal matrix and right-hand
-    /// side (20), the coupling and its triangular solution (72), the photograph's own block and right-hand side (54). H Q_oo
-    /// takes 3 (6 k)^2 for k photographs, the redundancy numbers of an image point about 100.
+    /// Returns the multiply-adds of the formation with its reduction, and of the cofactors, from the numbers of rays of the points. In
+    /// addition to the reduction an observation needs 146. These are 20 for the normal matrix and right-hand side of the point, 72 for the
+    /// coupling and triangular solution, 54 for block and right-hand side of the photograph. H Q_oo needs 3 (6 k)^2 for k photographs, the
+    /// redundancy numbers of an observation about 100.
     fn operations(&self) -> (f64, f64) {
         let layout = self.system.layout();
         let reduction = self.system.symbolic().operations(layout).reduction;
@@ -221,12 +221,12 @@ fn done<T, E: Debug>(result: Result<T, E>) -> T {
     result.expect("a result")
 }
 
-/// Multiply-adds as criterion's elements.
+/// Converts multiply-adds to criterion's elements.
 fn elements(operations: f64) -> Throughput {
     Throughput::Elements(operations as u64)
 }
 
-/// The rate that all others are judged by: a dense matrix product on all processors.
+/// Measures the reference rate: a dense matrix product on all processors.
 fn product(criterion: &mut Criterion) {
     let matrix =
         |shift: usize| Mat::from_fn(DENSE, DENSE, |i, j| ((7 * i + 3 * j + shift) % 11) as f64 - 5.0);
@@ -239,8 +239,8 @@ fn product(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The whole adjustment, with all cofactors and redundancy numbers, the camera held or one for all; the collinearity equations and
-/// their partials alone, on one thread.
+/// Measures the complete adjustment with all cofactors and redundancy numbers, for a fixed and for a shared free camera. Also measures the
+/// linearization of the collinearity equations on one thread.
 fn adjust(criterion: &mut Criterion) {
     let (block, size) = block();
     let threads = threads();
@@ -274,7 +274,7 @@ fn adjust(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The phases of the normal equations, each once.
+/// Measures each phase of the normal equations once.
 fn phases(criterion: &mut Criterion) {
     let (block, size) = block();
     let phases = Phases::new(&block);
@@ -296,7 +296,7 @@ fn phases(criterion: &mut Criterion) {
             done(system.solve(threads, &factor, equations, prior, &SolveOptions::default(), &mut go))
         });
     });
-    // Formation, reduction and factorisation go together, front by front; so do the selected inverse and the cofactors.
+    // Formation, reduction and factorization are interleaved, front by front, as are selected inverse and cofactors.
     group.throughput(elements(formation + predicted.factor));
     group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
     group.throughput(elements(predicted.inverse + cofactors));

@@ -1,7 +1,7 @@
-//! Reduced normal equations that are full, as those of collections in which everything sees everything: their factor beside a plain
-//! dense Cholesky factorisation of the same size by `faer`.
+//! Factorization of full reduced normal equations, as in collections with complete overlap, compared with a dense Cholesky factorization of
+//! the same size by `faer`.
 
-// A benchmark that cannot run has nobody to report to.
+// Panics are acceptable in a benchmark.
 #![allow(clippy::expect_used, missing_docs)]
 
 use std::ops::ControlFlow;
@@ -14,12 +14,12 @@ use faer::{Mat, Par};
 use photocore::Threads;
 use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, System};
 
-/// Unknowns of a photograph.
+/// Number of unknowns of a photograph.
 const DIM: usize = 9;
-/// Points, each on every photograph: few, so that the formation takes little time.
+/// Number of points, each visible on every photograph: few, so that the formation is fast.
 const POINTS: usize = 5;
 
-/// Equations of no meaning.
+/// Arbitrary equations.
 struct Anything;
 
 impl Equations for Anything {
@@ -42,7 +42,7 @@ fn system(photos: usize) -> (System, Prior) {
     )
 }
 
-/// Time of the factorisation alone.
+/// Returns the time of the factorization without the formation.
 fn factor(threads: &Threads, system: &System, prior: &Prior) -> Duration {
     let start = Instant::now();
     let done = system

@@ -1,5 +1,5 @@
-//! Small algebra by hand, which stays so because it is faster or says more, beside the same by `nalgebra`: three linear equations,
-//! solved for every point that is intersected, and the rotation of three angles, formed for every photo.
+//! Hand-written small algebra, retained because it is faster or clearer, compared with `nalgebra`. The cases are three linear equations
+//! (per intersected point) and the rotation of three angles (per photo).
 
 #![allow(missing_docs)]
 
@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Rotation3;
 use photocore::geometry::{Matrix3, Vector3, cramer, rotation};
 
-/// Determinants below this part of the largest possible value count as zero.
+/// Relative size of a determinant that counts as zero.
 const TOLERANCE: f64 = 1e-8;
 
 fn equations(criterion: &mut Criterion) {
@@ -34,7 +34,7 @@ fn angles(criterion: &mut Criterion) {
     group.bench_function("written out", |bencher| bencher.iter(|| rotation(black_box(angles))));
     group.bench_function("nalgebra, product", |bencher| {
         bencher.iter(|| {
-            // M turns the axes, nalgebra's rotations turn vectors.
+            // M rotates the axes, nalgebra's rotations rotate vectors.
             let [omega, phi, kappa] = black_box(angles).map(|angle| -angle);
             let turns = [Vector3::z_axis(), Vector3::y_axis(), Vector3::x_axis()];
             let [mz, my, mx] = [(kappa, 0), (phi, 1), (omega, 2)]

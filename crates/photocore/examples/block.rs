@@ -1,4 +1,4 @@
-//! A small aerial block: eight photos in two strips over four control points, and how well every station is known.
+//! A small aerial block: eight photos in two strips over four control points, with the precision of every station.
 
 use std::error::Error;
 
@@ -12,13 +12,13 @@ const PRINCIPAL_DISTANCE: f64 = -150.0;
 /// Standard deviation of image coordinates in millimetres.
 const IMAGE_SD: f64 = 0.005;
 
-/// A number between -1 and 1 for each index, the same on every machine.
+/// Returns a reproducible number between -1 and 1 for each index.
 fn noise(index: usize) -> f64 {
     let turned = (index as f64 + 1.0) * 0.618_033_988_749_895;
     2.0 * turned.fract() - 1.0
 }
 
-/// Photos 600 m apart from 1,500 m above ground, points every 300 m, of which the corners are control.
+/// Returns a block with photos every 600 m from 1,500 m above ground and points every 300 m; the corners are control points.
 fn block() -> Network {
     let station = |i: usize| [600.0 * (i % 4) as f64, 900.0 * (i / 4) as f64, 1500.0];
     let ground = |i: usize| [300.0 * (i % 7) as f64, 300.0 * (i / 7) as f64, 20.0 * noise(i)];

@@ -1,5 +1,5 @@
-//! Photos of unknown cameras from a file in the format of "Bundle Adjustment in the Large": poses, focal lengths and distortions from far
-//! starts, with their covariances.
+//! Photos of unknown cameras from a file in the format of "Bundle Adjustment in the Large". Poses, focal lengths and distortions are
+//! adjusted from coarse initial values, with covariances.
 //!
 //! `cargo run --release --example collection -- problem.txt`
 
@@ -10,7 +10,7 @@ use photocore::adjustment::{self, Method, Stop};
 use photocore::geometry::{Bal, CameraModel, PoseNumbers};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Solution, Start};
 
-/// Reads numbers of photos, points and images, the images (photo, point, x, y), nine numbers of each photo and three of each point.
+/// Reads the numbers of photos, points and observations, the observations (photo, point, x, y), nine values per photo and three per point.
 pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
     let values = text.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>()?;
     let short = || Box::<dyn Error>::from("the file ends too early");
@@ -48,7 +48,7 @@ pub fn read(text: &str) -> Result<Network, Box<dyn Error>> {
     })
 }
 
-/// Adjusts a network from a far start; nothing gives it a datum, so that unknowns are held for one.
+/// Adjusts a network from coarse initial values; as the datum is undefined, some unknowns are fixed.
 pub fn adjusted(network: &Network) -> Result<Solution, Box<dyn Error>> {
     let adjustment =
         adjustment::Options { method: Method::TrustRegion(Stop::Decrease(1e-9)), ..Default::default() };

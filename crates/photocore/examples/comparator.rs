@@ -1,5 +1,4 @@
-//! Calibration of a measuring comparator: a plate of 25 points in four placements gives its scales and how far its axes are from a right
-//! angle.
+//! Calibration of a measuring comparator: a plate of 25 points in four placements gives the scales and the nonorthogonality of the axes.
 
 use std::error::Error;
 use std::f64::consts::FRAC_PI_2;
@@ -9,16 +8,16 @@ use photocore::programs::comparator::{
     Basis, Calibration, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
 
-/// Without polynomials.
+/// Basis without polynomials.
 const BASIS: Basis = Basis { degree: 1, centre: [125e3, 130e3], half_range: [120e3, 110e3] };
-/// Scales, and the lack of orthogonality in radians.
+/// True scales, and the nonorthogonality in radians.
 pub const TRUTH: ([f64; 2], f64) = ([1.0 - 5e-6, 1.0 + 22e-6], 5e-5);
 
 fn comparator(scale: [f64; 2], nonorthogonality: f64) -> Comparator {
     Comparator { scale, nonorthogonality, basis: BASIS, coefficients: [vec![], vec![]] }
 }
 
-/// All lengths in micrometres; the plate is known to a quarter of one, measurements are rounded to whole ones.
+/// Returns the data in micrometres; the plate has a standard deviation of 0.25, measurements are rounded to integers.
 fn calibration() -> Calibration {
     let truth = comparator(TRUTH.0, TRUTH.1);
     let xy = |i: usize| [5e4 * (i % 5) as f64 - 1e5, 5e4 * (i / 5) as f64 - 1e5];
@@ -43,7 +42,7 @@ pub fn adjusted() -> Result<Solution, Box<dyn Error>> {
     Ok(calibration.adjust(&Options::default())?)
 }
 
-/// Prints what the comparator is like.
+/// Prints the parameters of the comparator.
 pub fn main() -> Result<(), Box<dyn Error>> {
     let solution = adjusted()?;
     for (k, name) in ["scale of x", "scale of y", "lack of orthogonality (rad)"].into_iter().enumerate() {

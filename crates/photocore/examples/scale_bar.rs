@@ -1,4 +1,4 @@
-//! A small object seen by five photos whose size comes from a scale bar alone: the first photo is the datum.
+//! A small object in five photos, scaled by a scale bar: the first photo is the datum.
 
 use std::error::Error;
 
@@ -12,7 +12,7 @@ const CAMERA: Perspective = Perspective { principal_distance: -50.0 };
 /// Length of the bar between points 0 and 1, and its standard deviation, in metres.
 pub const BAR: (f64, f64) = (1.0, 2e-5);
 
-/// Points of the object; the first two are the ends of the bar.
+/// Returns the points of the object; the first two are the ends of the bar.
 pub fn place(i: usize) -> [f64; 3] {
     match i {
         0 | 1 => [i as f64 - 0.5, 0.0, 0.0],
@@ -20,13 +20,13 @@ pub fn place(i: usize) -> [f64; 3] {
     }
 }
 
-/// Photos from 3 m above, tilted towards the middle.
+/// Returns photos from 3 m above, tilted towards the centre.
 fn pose(i: usize) -> [f64; 6] {
     let [x, y] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]][i];
     [x, y, 3.0, -f64::atan2(y, 3.0), f64::atan2(x, 3.0), 0.4 * i as f64]
 }
 
-/// The bar's length is observed; poses are known to some centimetres but for the first, which is held.
+/// Returns the network: the length of the bar is observed, poses are weighted with some centimetres, the first is fixed.
 fn network() -> Network {
     let mut images = vec![];
     for photo in 0..5 {

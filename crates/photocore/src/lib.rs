@@ -1,13 +1,13 @@
 //! Photogrammetric least-squares adjustment with the covariance of every result.
 //!
-//! Four floors; each knows only the ones below it:
+//! The crate has four layers; each layer uses only the layers below it:
 //!
-//! * [`network`]: cameras, photos, points and images adjusted together; [`programs`]: the other photogrammetric models;
-//! * [`adjustment`]: iteration, weights, convergence, statistics; knows no photograph;
-//! * [`normals`]: block normal equations, ordered, reduced, factored, solved, selectively inverted; knows no observation;
-//! * [`geometry`]: poses, cameras, projection, ellipsoid, refraction: pure functions with their partial derivatives.
+//! * [`network`]: simultaneous adjustment of cameras, photos, points and observations, and [`programs`]: other photogrammetric models;
+//! * [`adjustment`]: iteration, weights, convergence and statistics, independent of photogrammetry;
+//! * [`normals`]: ordering, reduction, factorisation, solution and selected inverse of block normal equations;
+//! * [`geometry`]: poses, cameras, projection, ellipsoid and refraction as pure functions with partial derivatives.
 //!
-//! Vectors and matrices are those of [`nalgebra`]. The crate reads no files, prints nothing and has no global state.
+//! Vectors and matrices are [`nalgebra`] types. The crate does not read files, print or use global state.
 
 pub mod adjustment;
 pub mod geometry;
@@ -21,7 +21,7 @@ mod threads;
 pub use nalgebra;
 pub use threads::{Stopped, Threads};
 
-/// What the README shows is compiled and run.
+/// Compiles and runs the example in the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,30 +1,29 @@
-//! Loops that several threads share.
+//! Loops over several threads.
 //!
-//! What rayon makes of a loop is large, and is compiled anew for every type of closure: a program of a hundred such loops is rayon for a
-//! fifth. Here it is given closures behind references (`&dyn Fn`), which are of one type. What is left for each loop is called once for
-//! every number or every part of them, so that a number that is a part must be worth some microseconds.
+//! Rayon generates much code for every type of closure. These functions pass closures to it by reference (`&dyn Fn`), which is a single
+//! type, so it is compiled only once. Each iteration costs one dynamic call and should do some microseconds of work.
 //!
-//! Results are in the order of the numbers, and no bit of them depends on which thread has found what.
+//! Results are in the order of the indices and are bitwise identical for any number of threads.
 
 use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-/// Parts for each thread: one that is done early takes over what others have left.
+/// Parts per thread; a thread that finishes early continues with the remaining parts of others.
 const PARTS: usize = 4;
 
-/// Locks what is never held while anything can panic on purpose: a panic elsewhere is passed on by the threads.
+/// Locks a mutex, poisoned or not: rayon propagates the panic of another thread.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Does the work for every number below `count`.
+/// Calls `work` with every index below `count`.
 pub(crate) fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().for_each(work);
 }
 
-/// Hands every item over to the work, with its number.
+/// Passes every item to `work`, with its index.
 pub(crate) fn each_of<I: Send>(items: Vec<I>, work: &(dyn Fn(usize, I) + Sync)) {
     let items: Vec<Mutex<Option<I>>> = items.into_iter().map(|item| Mutex::new(Some(item))).collect();
     each(items.len(), &|number| {
@@ -35,12 +34,12 @@ pub(crate) fn each_of<I: Send>(items: Vec<I>, work: &(dyn Fn(usize, I) + Sync)) 
     });
 }
 
-/// Does the work on chunks of so many elements, with the number of each; the last may be shorter.
+/// Passes chunks of `size` elements to `work`, with their indices; the last chunk may be shorter.
 pub(crate) fn each_chunk<T: Send>(all: &mut [T], size: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
     each_of(all.chunks_mut(size.max(1)).collect(), &|number, chunk| work(number, chunk));
 }
 
-/// What is found for parts of the numbers below `count`, neighbours in each and at least so many, put together.
+/// Concatenates the results of `part` for consecutive ranges of the indices below `count`, each of at least `at_least` indices.
 pub(crate) fn by_parts<T: Send>(
     count: usize,
     at_least: usize,
@@ -59,12 +58,12 @@ pub(crate) fn by_parts<T: Send>(
     all
 }
 
-/// What is made of every number below `count`, at least so many by one thread: for work that is much the same for all of them.
+/// Maps every index below `count`, at least `at_least` per thread: for work of nearly equal cost.
 pub(crate) fn map<T: Send>(count: usize, at_least: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     by_parts(count, at_least, &|numbers| numbers.map(&of).collect())
 }
 
-/// The same where much is made: it is written where it stays, and so is never there twice. Rayon is compiled for each type of it.
+/// Maps indices like [`map`], but writes large results directly to the final vector. Rayon is compiled for each result type.
 pub(crate) fn map_in_place<T: Send>(
     count: usize,
     at_least: usize,
@@ -73,7 +72,7 @@ pub(crate) fn map_in_place<T: Send>(
     (0..count).into_par_iter().with_min_len(at_least).map(of).collect()
 }
 
-/// What is made of every item, one by one: for work that is large, and more for some than for others.
+/// Maps every item separately: for large work of unequal cost.
 pub(crate) fn map_each<I: Send, T: Send>(items: Vec<I>, of: &(dyn Fn(I) -> T + Sync)) -> Vec<T> {
     let mut found: Vec<Option<T>> = items.iter().map(|_| None).collect();
     let pairs: Vec<(I, &mut Option<T>)> = items.into_iter().zip(&mut found).collect();
@@ -81,7 +80,7 @@ pub(crate) fn map_each<I: Send, T: Send>(items: Vec<I>, of: &(dyn Fn(I) -> T + S
     found.into_iter().flatten().collect()
 }
 
-/// The same with room for what is computed on the way: made when there is none to spare, used by one item after the other.
+/// Maps items like [`map_each`] with a scratch value, which is created on demand and reused for later items.
 pub(crate) fn map_each_with<R: Send, I: Send, T: Send>(
     items: Vec<I>,
     room: impl Fn() -> R + Sync,
@@ -97,7 +96,7 @@ pub(crate) fn map_each_with<R: Send, I: Send, T: Send>(
     })
 }
 
-/// Does both.
+/// Runs both closures, possibly in parallel.
 pub(crate) fn join(first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
     rayon::join(first, second);
 }
@@ -107,7 +106,7 @@ mod tests {
     use super::*;
     use crate::Threads;
 
-    /// What is found for so many numbers, whatever the way.
+    /// Results of all loops for `count` indices.
     fn found(count: usize) -> Vec<Vec<usize>> {
         let mut chunks = vec![0; count];
         each_chunk(&mut chunks, 7, &|number, chunk| {

@@ -1,18 +1,17 @@
-//! Sorting where it is not what takes the time.
+//! Sorting functions for code in which speed is irrelevant.
 //!
-//! What the standard library makes of a sort is large, and is compiled anew for every type of items and closure. Here it is compiled
-//! once, for numbers of items.
+//! The sort of the standard library is compiled for every type of items and closure. These functions compile it once, for indices of items.
 
 use std::cmp::Ordering;
 
-/// Sorts items; those that compare equal stay in their order.
+/// Sorts a vector stably.
 pub(crate) fn sort_by<T>(items: &mut Vec<T>, compare: &dyn Fn(&T, &T) -> Ordering) {
     let order = order(items.len(), &|a, b| compare(&items[a], &items[b]));
     let mut taken: Vec<Option<T>> = items.drain(..).map(Some).collect();
     items.extend(order.into_iter().filter_map(|number| taken[number].take()));
 }
 
-/// The numbers below `count` in the order of what they stand for.
+/// Returns the indices below `count`, stably sorted by `compare`.
 pub(crate) fn order(count: usize, compare: &dyn Fn(usize, usize) -> Ordering) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| compare(a, b));

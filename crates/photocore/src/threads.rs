@@ -1,28 +1,28 @@
-//! The threads that work is done on, and why it may stop before its end.
+//! Worker threads of the engine, and reasons for an early end of their work.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use thiserror::Error;
 
-/// Threads of the engine's own; none of those that a process has in common is ever started. They wait for work until this is dropped.
+/// Private thread pool of the engine; the global pool of a process is never started. The threads wait for work until this is dropped.
 #[derive(Debug)]
 pub struct Threads(ThreadPool);
 
-/// Why work has ended before its end.
+/// Reason for an early end of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Stopped {
-    /// Whoever watched it said so.
+    /// The progress callback requested the stop.
     #[error("interrupted")]
     Interrupted,
-    /// An allocation of so many bytes failed.
+    /// An allocation of this number of bytes failed.
     #[error("there is no memory for an array of {0} bytes")]
     OutOfMemory(usize),
-    /// The system starts no more threads.
+    /// The operating system starts no more threads.
     #[error("threads cannot be started")]
     NoThreads,
 }
 
 impl Threads {
-    /// So many threads; 0 for one on each processor.
+    /// Starts `count` threads; 0 means one per processor.
     ///
     /// # Errors
     /// [`Stopped::NoThreads`].
@@ -30,7 +30,7 @@ impl Threads {
         ThreadPoolBuilder::new().num_threads(count).build().map(Self).map_err(|_| Stopped::NoThreads)
     }
 
-    /// Does work on them, and waits for it.
+    /// Runs work on the threads and returns its result.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         let (mut work, mut found) = (Some(work), None);
         self.run(&mut || found = work.take().map(|work| work()));
@@ -40,7 +40,7 @@ impl Threads {
         }
     }
 
-    /// What rayon gets is of one type, whatever the work is: all that it makes of it is compiled once.
+    /// Runs a closure behind a reference: rayon is compiled for one type only.
     fn run(&self, work: &mut (dyn FnMut() + Send)) {
         self.0.install(work);
     }
@@ -51,7 +51,7 @@ impl Threads {
 }
 
 impl From<ThreadPool> for Threads {
-    /// Threads that the caller has started in a way of its own.
+    /// Uses threads that the caller has started.
     fn from(pool: ThreadPool) -> Self {
         Self(pool)
     }

@@ -1,7 +1,7 @@
-//! Adjustment of a small problem that knows no photograph.
+//! Adjustment of a small problem without photographs.
 //!
-//! Points of a plane (local blocks of two) are measured in frames (retained blocks: shift and rotation) with a common scale
-//! and a common radial distortion (a block that all share).
+//! Points of a plane (local blocks of two) are measured in frames (retained blocks: shift and rotation) with a common scale and a common
+//! radial distortion (a shared block).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -28,14 +28,14 @@ struct Frames {
     frame_of: Vec<usize>,
 }
 
-/// Coordinates in a frame, with partials: point (2), frame (3), scale and distortion (2), for each of both.
+/// Returns coordinates in a frame, each with partials: point (2), frame (3), scale and distortion (2).
 fn measure(point: &[f64], frame: &[f64], common: &[f64]) -> ([f64; 2], [[f64; 7]; 2]) {
     let (sin, cos) = frame[2].sin_cos();
     let (dx, dy) = (point[0] - frame[0], point[1] - frame[1]);
     let (p, q) = (cos * dx + sin * dy, -sin * dx + cos * dy);
     let (scale, distortion) = (common[0], common[1]);
     let radial = 1.0 + distortion * (p * p + q * q);
-    // Partials with respect to p and q, which turn with the frame.
+    // Partials with respect to p and q, which rotate with the frame.
     let by_p = [scale * (radial + 2.0 * distortion * p * p), scale * 2.0 * distortion * p * q];
     let by_q = [scale * 2.0 * distortion * p * q, scale * (radial + 2.0 * distortion * q * q)];
     let values = [scale * p * radial, scale * q * radial];
@@ -74,7 +74,7 @@ impl Evaluated for At<'_> {
     }
 }
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 + 0.3).sin()
 }
@@ -85,7 +85,7 @@ fn truth() -> Vec<f64> {
     points.chain(frames).chain([2.0, 0.05]).collect()
 }
 
-/// Every point in every frame; all unknowns free, measured with a standard deviation of 0.001.
+/// Returns the problem with every point in every frame; all unknowns are free, the standard deviation is 0.001.
 fn problem() -> Problem<Frames> {
     let truth = truth();
     let (mut measured, mut frame_of) = (Vec::new(), Vec::new());
@@ -114,7 +114,7 @@ fn problem() -> Problem<Frames> {
     }
 }
 
-/// Gives unknowns their true values as observations.
+/// Adds the true values of unknowns as observations.
 fn hold(problem: &mut Problem<Frames>, unknowns: &[usize], sd: f64) {
     for &unknown in unknowns {
         problem.prior[unknown] = truth()[unknown];
@@ -221,7 +221,7 @@ fn corrections_lead_from_the_initial_to_the_adjusted_values() {
             let sum: f64 = adjusted.corrections().map(|all| all[i - 2 * POINTS]).sum();
             assert!((initial + sum - last).abs() < 1e-13);
         }
-        // One iteration less ends where the last one began.
+        // One iteration fewer ends at the start of the last iteration.
         let max_iterations = adjusted.iterations.len() - 1;
         let before = run(&problem, &Options { method, max_iterations, ..STRICT }).unwrap();
         for (i, correction) in adjusted.last_local_corrections.iter().enumerate() {
@@ -232,13 +232,13 @@ fn corrections_lead_from_the_initial_to_the_adjusted_values() {
 
 #[test]
 fn undetermined_unknowns_are_named() {
-    // Without a datum the plane shifts, turns and grows with all frames and the scale.
+    // Without a datum the plane is shifted, rotated and scaled with all frames and the scale.
     let Err(AdjustError::Undetermined(combinations)) = run(&problem(), &STRICT) else { panic!("determined") };
-    // Growth about the centre of one frame leaves that frame where it is.
+    // Scaling about the centre of a frame does not change this frame.
     let all: Vec<usize> = (0..FRAMES).collect();
     assert_eq!(combinations.iter().filter(|&blocks| *blocks == all).count(), 3);
     assert_eq!(combinations.iter().filter(|blocks| blocks.contains(&FRAMES)).count(), 1);
-    // A fixed scale leaves the shift and the turn.
+    // A fixed scale leaves the shift and the rotation undetermined.
     let mut problem = problem();
     hold(&mut problem, &[SCALE], 0.0);
     let Err(AdjustError::Undetermined(combinations)) = run(&problem, &STRICT) else { panic!("determined") };
@@ -323,7 +323,7 @@ fn without_covariance_there_is_none() {
     assert!(adjusted.prior_redundancy.is_none());
 }
 
-/// Which thread observes.
+/// Model that records the thread of its observations.
 #[derive(Debug)]
 struct Witness {
     frames: Frames,

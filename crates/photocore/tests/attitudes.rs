@@ -1,4 +1,4 @@
-//! Poses and attitudes in every representation: round trips, golden data where they are at hand.
+//! Poses and attitudes in every representation: round trips, and golden data if available.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -37,7 +37,7 @@ fn any_attitude() -> impl Strategy<Value = Matrix3> {
     )
 }
 
-/// Differences of the numbers of A Exp(rho) over those of A Exp(-rho): rho = K d(numbers).
+/// Returns the numerical derivatives of the numbers with respect to rho, by central differences: rho = K d(numbers).
 fn numeric_step(numbers: AttitudeNumbers, attitude: &Matrix3) -> Matrix3 {
     const STEP: f64 = 1e-5;
     Matrix3::from_columns(&[0, 1, 2].map(|k| {
@@ -72,7 +72,7 @@ proptest! {
         for numbers in ALL.map(|make| make()) {
             let found = numbers.numbers(&attitude);
             let Some(inverse) = numbers.rates(found).try_inverse() else { continue };
-            // Near a singular attitude, and where a rotation vector jumps at half a turn, differences say nothing.
+            // Differences are invalid near a singular attitude, and at the jump of a rotation vector at 180 degrees.
             let vector = Vector3::from(found).norm();
             let jumps = format!("{numbers:?}").starts_with("RotationVector") && vector > PI - 1e-3;
             if inverse.amax() < 30.0 && !jumps {
@@ -153,13 +153,13 @@ proptest! {
             let stepped = sense.stepped(angles, &Vector3::from(rho));
             let expected = local * angle_axis_rotation(&Vector3::from(rho));
             prop_assert!((numbers.attitude(stepped) - expected).amax() < 1e-14, "{stepped:?}");
-            // Away from where they turn about one axis the angles change as little as the attitude does.
+            // Outside of the gimbal lock the angles change as little as the attitude does.
             if phi.cos().abs() > 0.5 {
                 let small = sense.stepped(angles, &(1e-3 * Vector3::from(rho)));
                 prop_assert!((0..3).all(|k| (small[k] - angles[k]).abs() < 2e-3), "{angles:?} {small:?}");
             }
 
-            // Partials in a point some metres off, by differences.
+            // Partials at a point some metres away, by differences.
             let photo = Orientation::stepping(space, position, &local);
             let at = photo.centre() + Vector3::new(3.0, -5.0, 4.0);
             let point = Point::new(ObjectSpace::Rectangular, at.into());
@@ -170,11 +170,11 @@ proptest! {
                     Orientation::stepping(space, position, &turned).sight(&point).dot(&g)
                 });
                 let expected = (ends[0] - ends[1]) / 2e-5;
-                // Geocentric coordinates are good to a nanometre.
+                // Geocentric coordinates are accurate to a nanometre.
                 prop_assert!((partials[3 + k] - expected).abs() < 5e-4, "{k}: {} {expected}", partials[3 + k]);
                 prop_assert!(space != ObjectSpace::Rectangular || (partials[3 + k] - expected).abs() < 1e-8);
             }
-            // In angles it is K that stands between the two.
+            // In angles K relates the two.
             let rates = numbers.rates(angles);
             let (by_angles, _) = Orientation::from_angles(space, sense, position, angles).chain(&photo.sight(&point), &g, &point);
             let expected = rates.tr_mul(&Vector3::new(partials[3], partials[4], partials[5]));
@@ -228,7 +228,7 @@ fn attitudes_agree_with_the_golden_data() {
             assert_eq!(numbers.is_singular(found), singular, "{case} {name}");
             let near = if [11, 19].contains(&case) { 1e-8 } else { 1e-13 };
             let vector = name.starts_with("rotation_vector");
-            // Near half a turn either sign of a rotation vector will do.
+            // Near 180 degrees either sign of a rotation vector is valid.
             let flipped = vector
                 && Vector3::from(values).norm() > PI - 1e-6
                 && Vector3::from(found).dot(&Vector3::from(values)) < 0.0;

@@ -1,4 +1,4 @@
-//! Blocks with something wrong: positions far off, points behind cameras, unknowns hardly determined.
+//! Blocks with faults: distant positions, points behind cameras, nearly undetermined unknowns.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -12,19 +12,19 @@ const CAMERA: Perspective = Perspective { principal_distance: -150.0 };
 const POSES: PoseNumbers = PoseNumbers::Angles(RotationSense::GroundToPhoto);
 const SD: f64 = 0.005;
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 * index as f64 + 0.3).sin()
 }
 
-/// Where photos and points are, photos looking down from 1500 m.
+/// Returns a free photo with the given pose; photos look down from 1500 m.
 fn photo(position: [f64; 3], attitude: [f64; 3]) -> Photo {
     let [[x, y, z], [omega, phi, kappa]] = [position, attitude];
     let pose = [x, y, z, omega, phi, kappa];
     Photo::free(pose, 0)
 }
 
-/// A block of photos and points where they are, every point on every photo, with errors of the image coordinates.
+/// Returns a block with true photos and points, every point on every photo, with errors of the image coordinates.
 fn block(photos: Vec<Photo>, places: &[[f64; 3]]) -> Network {
     let space = ObjectSpace::Rectangular;
     let mut images = Vec::new();
@@ -60,7 +60,7 @@ const PLACES: [[f64; 3]; 8] = [
     [90.0, 500.0, 43.0],
 ];
 
-/// Four photos over fixed control and points of unknown place.
+/// Returns four photos over fixed control and free points.
 fn sound() -> Network {
     let stations = [[200.0, 300.0], [800.0, 300.0], [800.0, 700.0], [200.0, 700.0]];
     let photos = stations.iter().enumerate().map(|(i, &[x, y])| {
@@ -86,7 +86,7 @@ fn adjust(block: &Network) -> Result<Solution, NetworkError> {
     block.adjustment(&options).on(&threads).run()
 }
 
-/// A core that is called from Rust needs no room for what an interpreter loads; a caller that does says so.
+/// A core called from Rust needs no memory for an interpreter; `reserved` is set by callers that do.
 #[test]
 fn memory_is_that_of_the_adjustment_and_what_the_caller_takes() {
     let room = |memory, reserved| {
@@ -124,7 +124,7 @@ fn positions_too_large_for_double_precision_are_named() {
 fn a_photo_far_off_takes_no_digits_from_the_others() {
     let expected = adjust(&sound()).unwrap();
     let mut block = sound();
-    // Without images, fixed where rounding is a tenth of a millimetre: counted from the mean of all, the others would be rounded so.
+    // Fixed and without observations, at coordinates rounded to 0.1 mm: a local origin at the mean would round the other photos as well.
     let mut far = photo([1e12, 1e12, 1500.0], [0.0; 3]);
     far.sd = [0.0; 6];
     block.photos.push(far);
@@ -146,7 +146,7 @@ fn points_behind_a_camera_are_told() {
     for (photo, adjusted) in upward.photos.iter_mut().zip(&seen.photos) {
         (photo.pose, photo.sd) = (adjusted.pose, [0.0; 6]);
     }
-    // Turned about the x axis of the photo by half a turn it looks up.
+    // Rotated by 180 degrees about its x axis the photo looks up.
     upward.photos[2].pose[3] += std::f64::consts::PI;
     for (point, adjusted) in upward.points.iter_mut().zip(&seen.points) {
         *point = Point { coordinates: adjusted.unwrap().coordinates, sd: [0.0; 3] };
@@ -158,7 +158,7 @@ fn points_behind_a_camera_are_told() {
 
 #[test]
 fn what_is_hardly_determined_is_named_and_ends() {
-    // Stations on a line, their positions weighted: the roll about it hangs on the ten centimetres by which they leave it.
+    // Stations on a line, with weighted positions: the roll about it depends on their ten-centimetre deviation from the line.
     let stations = [[200.0, 500.0, 1500.0], [500.0, 500.1, 1500.0], [800.0, 500.0, 1500.0]];
     let photos = stations.iter().map(|&position| {
         let mut photo = photo(position, [0.0; 3]);

@@ -1,4 +1,4 @@
-//! Every model of cameras against the golden data of an independent program.
+//! All camera models against golden data of an independent program.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::golden::{golden, list, rows};
 
-/// Values by name in the order of a model; `more` are those that the golden data do not list. The names of the model differ in case.
+/// Returns values by name in the order of a model; `more` are missing in the golden data. The case of the names differs.
 fn values(model: &str, entry: &Value, names: &str, more: &[(&str, f64)]) -> (Vec<f64>, Vec<Option<usize>>) {
     let given: Vec<String> =
         entry[names].as_array().unwrap().iter().map(|name| name.as_str().unwrap().into()).collect();
@@ -21,13 +21,13 @@ fn values(model: &str, entry: &Value, names: &str, more: &[(&str, f64)]) -> (Vec
     Camera::model(model).unwrap().parameters.iter().map(value).unzip()
 }
 
-/// The columns of the golden data in a row of a model; what they do not list is left out.
+/// Returns the columns of a model's row that the golden data list.
 fn listed(row: &[f64], columns: &[Option<usize>], count: usize) -> Vec<f64> {
     let place = |k: usize| columns.iter().position(|&column| column == Some(k)).unwrap();
     (0..count).map(|k| row[place(k)]).collect()
 }
 
-/// Partials to 1e-10 of the largest of their row.
+/// Compares partials to 1e-10 of the largest of their row.
 fn assert_row(found: &[f64], expected: &[f64], what: &str) {
     let largest = expected.iter().fold(0.0f64, |most, value| most.max(value.abs()));
     assert_eq!(found.len(), expected.len(), "{what}");
@@ -45,7 +45,7 @@ fn backward_cameras_correct_as_the_golden_data() {
         let more = [&constants[..], &[("c", -28.5)]].concat();
         let (parameters, columns) = values(model, entry, "params", &more);
         let camera = Camera::named(model, &parameters).unwrap();
-        // Any direction: what is corrected does not depend on it.
+        // An arbitrary direction: the correction is independent of it.
         let u = Vector3::new(0.2, -0.1, -1.3);
         for point in entry["points"].as_array().unwrap() {
             let measured: [f64; 2] = list(&point["measured"]).try_into().unwrap();
@@ -64,7 +64,7 @@ fn backward_cameras_correct_as_the_golden_data() {
                 assert_row(&own, &by_parameters[row], &what);
                 assert!((image.by_parameters[row][0] - u[row] / u.z).abs() < 1e-15, "{what}");
             }
-            // The way back, and its partials: the image moves as the inverse of g.
+            // The inverse and its partials: the image changes as the inverse of g.
             let ray = Vector3::new(corrected[0], corrected[1], -28.5);
             let image = camera.linearize(&ray);
             for k in 0..2 {
@@ -83,7 +83,7 @@ fn backward_cameras_correct_as_the_golden_data() {
     }
 }
 
-/// Images to 1e-12 of their size, partials to 1e-10 of the largest of their row, and the way back from every image.
+/// Compares images to 1e-12 of their size, partials to 1e-10 of the largest of their row, and the inverse of every image.
 fn forward(model: &str, entry: &Value, ray: &str, axes: Vector3, more: &[(&str, f64)]) {
     let (parameters, columns) = values(model, entry, "params", more);
     let camera = Camera::named(model, &parameters).unwrap();
@@ -114,7 +114,7 @@ fn forward_cameras_see_as_the_golden_data() {
     let models = data["forward"].as_object().unwrap();
     assert_eq!(models.len(), 22);
     for (name, entry) in models {
-        // In small letters OpenCV itself.
+        // Lower-case names are the OpenCV models.
         let model = if name == "opencv_fisheye" { "opencv_fisheye_skew" } else { &name.to_lowercase() };
         forward(model, entry, "ray", vision, &[]);
     }
@@ -168,7 +168,7 @@ fn radial_parts_end_where_the_golden_data_say() {
     }
 }
 
-/// Beyond the largest radius of an image there is no direction; before it there is.
+/// No direction is returned beyond the largest radius of an image; inside of it there is one.
 #[test]
 fn a_lens_ends_where_its_radial_part_does() {
     for (name, parameters) in [
@@ -192,7 +192,7 @@ fn a_lens_ends_where_its_radial_part_does() {
         }
         assert_eq!(camera.direction([f64::NAN, 0.0]), None, "{name}");
     }
-    // One that corrects what is measured: its correction turns over.
+    // A backward camera, whose correction folds.
     let brown = [-30.0, 0.0, 0.0, -1e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let camera = Camera::named("brown", &brown).unwrap();
     let limit = camera.radial_limit().unwrap();
@@ -203,13 +203,13 @@ fn a_lens_ends_where_its_radial_part_does() {
     assert!(camera.image(&Vector3::new(1.01 * limit.distorted, 0.0, -30.0))[0].is_nan());
 }
 
-/// The terms of a small field of view by series, where the quotients would lose their digits.
+/// Series replace the terms for a small field of view, for which the quotients lose digits.
 #[test]
 fn series_continue_what_they_stand_for() {
     let ray = |r: f64| Vector3::new(0.6 * r, 0.8 * r, -1.0);
     for (name, more) in [("fov", &[0.8][..]), ("fisheye", &[])] {
         let camera = Camera::named(name, &[&[1.0, 1.0, 0.0, 0.0], more].concat()).unwrap();
-        // On both sides of the change.
+        // Radii on both sides of the switch.
         for (below, above) in [(0.99e-4, 1.01e-4), (1.1e-4, 1.3e-4)] {
             let [a, b] = [below, above].map(|r| camera.linearize(&ray(r)));
             for row in 0..2 {
@@ -219,7 +219,7 @@ fn series_continue_what_they_stand_for() {
             }
         }
     }
-    // atan has the sign that makes this less than one.
+    // The sign of atan makes this less than one.
     let near =
         Camera::named("fov", &[1.0, 1.0, 0.0, 0.0, 0.005]).unwrap().image(&Vector3::new(1.0, 0.0, -1.0));
     assert!((near[0] - 1.0 + 6.25e-6).abs() < 1e-9, "{near:?}");
@@ -234,7 +234,7 @@ fn series_continue_what_they_stand_for() {
     }
 }
 
-/// What lies beyond is folded back, and cameras that see more than half of the sphere have nothing behind them.
+/// Points beyond the limit are folded back; cameras with more than a hemisphere see points behind the projection centre.
 #[test]
 fn cameras_say_what_they_fold_and_where_they_look() {
     let aside = |tangent: f64| Vector3::new(0.6 * tangent, -0.8 * tangent, -1.0);
@@ -276,7 +276,7 @@ fn cameras_say_what_they_fold_and_where_they_look() {
     }
 }
 
-/// The last column is beside the first.
+/// The last column is adjacent to the first.
 #[test]
 fn residuals_of_a_panorama_are_wrapped() {
     let camera = Camera::named("equirectangular", &[1200.0, 600.0]).unwrap();
@@ -287,7 +287,7 @@ fn residuals_of_a_panorama_are_wrapped() {
     assert!((x + 0.5).abs() < 1e-9 && (y - 0.25).abs() < 1e-9, "{x} {y}");
 }
 
-/// Balancing is a scale, which the principal distance takes up.
+/// Balancing is a scale, which the principal distance absorbs.
 #[test]
 fn a_balanced_lens_is_one_with_another_principal_distance() {
     let (r0, c) = (13.5, -28.5);
@@ -305,7 +305,7 @@ fn a_balanced_lens_is_one_with_another_principal_distance() {
     }
 }
 
-/// The table in the documentation of `Camera` has all cameras with the names of their parameters in their order.
+/// The table in the documentation of `Camera` lists all cameras with the names of their parameters in order.
 #[test]
 fn the_documentation_lists_the_parameters_of_every_camera() {
     let listed =

@@ -1,4 +1,4 @@
-//! Cameras: partials against complex steps and differences, ways back, names.
+//! Cameras: partials against complex steps and differences, inverses, names.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -7,10 +7,10 @@ use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{Bal, Camera, CameraModel, Unit, Vector3};
 use proptest::prelude::*;
 
-/// A camera of the model, its parameters chosen by what they are measured in from numbers between -1 and 1.
+/// Returns a camera of the model; parameters are scaled by their units from numbers between -1 and 1.
 fn sample(name: &str, numbers: &[f64]) -> Camera {
     let parameters = Camera::model(name).unwrap().parameters;
-    // Terms of a lens, of which together a third at the most.
+    // Lens terms, which together contribute at most a third.
     let part = 0.3 / parameters.len() as f64;
     let value = |(&(parameter, unit), number): (&(&str, Unit), &f64)| match (parameter, unit) {
         ("cx" | "cy" | "xp" | "yp" | "r0" | "b1" | "b2" | "dx" | "dy" | "x0" | "y0", Unit::Image) => {
@@ -34,7 +34,7 @@ fn sample(name: &str, numbers: &[f64]) -> Camera {
     Camera::named(name, &values).unwrap()
 }
 
-/// The image written out once more for complex arguments: u, then the parameters; None for a model that is not here.
+/// Independent implementation of the image for complex arguments: u, then the parameters; None for other models.
 fn written_out(name: &str, v: &[C]) -> Option<[C; 2]> {
     let radial = |k1: C, k2: C| {
         let p = [-v[0] / v[2], -v[1] / v[2]];
@@ -86,7 +86,7 @@ proptest! {
                 let found: Vec<f64> = by_u.iter().chain(&image.by_parameters[row]).copied().collect();
                 prop_assert_eq!(found.len(), values.len());
                 let scale = by_u.norm().max(1.0);
-                // Constants are known.
+                // Constants are fixed.
                 for (k, partial) in found[..found.len() - camera.constants()].iter().enumerate() {
                     let size = size_of(&camera, k);
                     let (expected, near) = partial_of(name, &values, k, size, row);
@@ -103,7 +103,7 @@ proptest! {
     }
 }
 
-/// What an argument of a camera (u, then the parameters) is about as large as: it is what a unit of an image is at a thousand of these.
+/// Returns the typical size of an argument of a camera (u, then the parameters): 1, or the reciprocal power of 1000 image units.
 fn size_of(camera: &Camera, k: usize) -> f64 {
     match k.checked_sub(3).map(|parameter| camera.parameter_names()[parameter].1) {
         Some(Unit::PerImage(power)) => 1000f64.powi(-i32::from(power)),
@@ -111,7 +111,7 @@ fn size_of(camera: &Camera, k: usize) -> f64 {
     }
 }
 
-/// A partial by a complex step where the model is written out, else by a central difference; and how near it is.
+/// Returns a partial by a complex step for implemented models, else by a central difference, and its accuracy.
 fn partial_of(name: &str, values: &[f64], k: usize, size: f64, row: usize) -> (f64, f64) {
     const STEP: f64 = 1e-100;
     let mut stepped: Vec<C> = values.iter().map(|&value| C::new(value, 0.0)).collect();
@@ -147,7 +147,7 @@ fn a_camera_has_a_name_and_as_many_parameters_as_its_model() {
 #[test]
 fn a_lens_beyond_which_nothing_is_seen_says_so() {
     let barrel = Bal { focal_length: 1000.0, radial: [-0.3, 0.0] };
-    // r (1 - 0.3 r^2) rises to r = 1.054.
+    // r (1 - 0.3 r^2) increases to r = 1.054.
     let edge = 1000.0 * (1.0f64 / 0.9).sqrt() * 2.0 / 3.0;
     assert!(barrel.direction([edge - 1.0, 0.0]).is_some());
     assert!(barrel.direction([edge + 1.0, 0.0]).is_none());

@@ -1,4 +1,4 @@
-//! Photos around an object: attitudes that no three angles tell apart, where axes happen to lie so.
+//! Photos around an object: attitudes at the singularity of three angles, for some axes.
 
 #![allow(clippy::unwrap_used)]
 
@@ -15,20 +15,20 @@ use photocore::network::{Camera, Image, Network, NetworkError, Options, Photo, P
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 * index as f64 + 0.3).sin()
 }
 
-/// Axes x right, y up, z back, of a photo that looks from a place at another, `up` being up.
+/// Returns the axes x right, y up, z backward of a photo at `from` that looks at `to`.
 fn looking(from: Vector3, to: Vector3, up: Vector3) -> Matrix3 {
     let back = (from - to).normalize();
     let right = up.cross(&back).normalize();
     Matrix3::from_columns(&[right, back.cross(&right), back])
 }
 
-/// Eight photos on a circle of 6 m about an object of 2 m with four control points, level, the first from the direction of +X: phi is
-/// 90 degrees there, -90 opposite. `turned` turns everything; photos start `error` (radians, and as many metres) away from where they are.
+/// Returns eight level photos on a circle of 6 m about an object of 2 m with four control points. The first is in the direction of +X, with
+/// phi of 90 degrees; the opposite phi is -90. `turned` rotates the scene; initial poses are wrong by `error` (radians, metres).
 fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) -> Network {
     let space = ObjectSpace::Rectangular;
     let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
@@ -50,7 +50,7 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
             let xy = [x + image_error * noise(n), y + image_error * noise(n + 1)];
             images.push(Image { photo: index, point, xy, sd: [SD; 2] });
         }
-        // The same errors whatever the axes are.
+        // The errors are independent of the axes.
         let off = |first: usize| error * Vector3::from([0, 1, 2].map(|k| noise(6 * index + first + k)));
         let start = station + attitude * off(0);
         let [omega, phi, kappa] = numbers.numbers(&(attitude * angle_axis_rotation(&off(3))));
@@ -83,14 +83,14 @@ fn block(cofactors: &[f64], first: usize) -> Matrix3 {
     Matrix3::from_fn(|i, j| cofactors[6 * (first + i) + first + j])
 }
 
-/// Relative to the largest element.
+/// Compares relative to the largest element.
 fn assert_near(found: &Matrix3, expected: &Matrix3, tolerance: f64) {
     assert!((found - expected).amax() < tolerance * expected.amax(), "{found} {expected}");
 }
 
 #[test]
 fn a_block_around_an_object_does_not_depend_on_its_axes() {
-    // About Y: what looks along X then looks along Z, and phi is zero for all photos.
+    // About Y: a view along X becomes a view along Z, and phi is zero for all photos.
     let quarter = angle_axis_rotation(&Vector3::new(0.0, FRAC_PI_2, 0.0));
     for sense in [RotationSense::GroundToPhoto, RotationSense::PhotoToGround] {
         let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
@@ -118,7 +118,7 @@ fn a_block_around_an_object_does_not_depend_on_its_axes() {
             assert!((quarter * numbers.attitude(at.1) - numbers.attitude(turned.1)).amax() < 1e-9);
             let [p, q] = [a, b].map(|photo| block(photo.cofactors.as_slice(), 0));
             assert_near(&(quarter * p * quarter.transpose()), &q, 1e-7);
-            // The angles' cofactors are large where phi is near 90 degrees, and those of the rotation step are the same.
+            // The cofactors of the angles are large if phi is near 90 degrees; the cofactors of the rotation step agree.
             let [p, q] = [(a, at.1), (b, turned.1)].map(|(photo, angles)| {
                 let rates = numbers.rates(angles);
                 rates * block(photo.cofactors.as_slice(), 3) * rates.transpose()
@@ -132,7 +132,7 @@ fn a_block_around_an_object_does_not_depend_on_its_axes() {
 #[test]
 fn at_ninety_degrees_the_angles_are_not_given_and_all_else_is() {
     let sense = RotationSense::GroundToPhoto;
-    // From where everything is, without errors: phi stays at 90 degrees to the last digits.
+    // Start at the solution, without errors: phi remains 90 degrees to the last digits.
     let network = around(sense, &Matrix3::identity(), 0.0, 0.0);
     let solution = adjust(&network).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
@@ -164,11 +164,11 @@ fn weighted_angles_are_observations_of_the_angles() {
     for (sense, turned) in upright {
         let mut network = around(sense, &turned, SD, 0.02);
         for (index, photo) in network.photos.iter_mut().enumerate() {
-            // All three, one alone, or none.
+            // Three, one or zero weighted angles.
             let weighted = [3, 1, 0][index % 3];
             photo.sd[6 - weighted..].fill(0.002);
         }
-        // The program of its time has the angles themselves as unknowns.
+        // The historic program has the angles as unknowns.
         let mut published = Options::default();
         published.adjustment.method = Method::Full(Published::Percent(1e-10));
         published.adjustment.max_iterations = 30;

@@ -1,4 +1,4 @@
-//! Collections of photos: partials against complex steps, far starts, datum and redundancy.
+//! Collections of photos: partials against complex steps, coarse initial values, datum and redundancy.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use photocore::network::{
 use photocore::normals::Ordering;
 use proptest::prelude::*;
 
-/// The rotated vector by the exponential series of the cross product: no closed form to share a mistake with.
+/// Returns the rotated vector by the exponential series of the cross product, independent of closed forms.
 fn turned(w: [C; 3], v: [C; 3]) -> [C; 3] {
     let cross = |a: [C; 3], b: [C; 3]| -> [C; 3] {
         std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
@@ -37,7 +37,7 @@ fn image(unknowns: [C; 12]) -> [C; 2] {
     p.map(|value| f * (1.0 + k1 * square + k2 * square * square) * value)
 }
 
-/// A photo by nine parameters: angle-axis vector, translation, f, k1, k2.
+/// Returns a photo with nine parameters: rotation vector, translation, f, k1, k2.
 fn bal_photo([a, b, c, x, y, z, f, k1, k2]: [f64; 9]) -> geometry::View<Bal> {
     let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
     geometry::View { orientation, camera: Bal { focal_length: f, radial: [k1, k2] } }
@@ -96,7 +96,7 @@ fn the_rotation_is_orthogonal_and_turns_by_the_angle() {
             for j in 0..3 {
                 let product: f64 = (0..3).map(|k| r[(i, k)] * r[(j, k)]).sum();
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
-                // (R - I) w = 0 and J w = w
+                // (R - I) w = 0 and J w = w.
                 assert!((r[(i, j)] * w[j]).is_finite() && jacobian[(i, j)].is_finite());
             }
             let along: f64 = (0..3).map(|j| jacobian[(i, j)] * w[j]).sum();
@@ -107,12 +107,12 @@ fn the_rotation_is_orthogonal_and_turns_by_the_angle() {
     }
 }
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 * index as f64 + 0.3).sin()
 }
 
-/// Photos around a cloud of points; initial values are wrong by `coarseness`.
+/// Returns photos around a cloud of points; initial values are wrong by `coarseness`.
 fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
     let parameters = |i: usize| -> [f64; 9] {
         let around = -3.0 + 6.0 * i as f64 / photos as f64;
@@ -226,7 +226,7 @@ fn redundancy_numbers_sum_to_the_degrees_of_freedom_of_a_network_without_datum()
 #[test]
 fn redundancy_numbers_do_not_depend_on_the_datum() {
     let free = adjusted(&collection(9, 80, 0.3), None, 1);
-    // Another datum: two points and a coordinate fixed where the free network has put them.
+    // Another datum: two points and a coordinate fixed at their values in the free network.
     let mut held = collection(9, 80, 0.3);
     for ((photo, camera), adjusted) in held.photos.iter_mut().zip(&mut held.cameras).zip(&free.photos) {
         photo.pose = adjusted.pose;
@@ -289,7 +289,7 @@ fn points_without_initial_values_start_where_their_rays_meet() {
 
 #[test]
 fn cameras_of_both_kinds_and_held_ones_stand_in_one_network() {
-    // The exact photos with known cameras, the first a perspective of the same focal length without distortion.
+    // Exact photos with fixed cameras, the first a perspective of the same focal length without distortion.
     let mut network = collection(9, 80, 0.0);
     network.cameras.iter_mut().skip(1).for_each(|camera| *camera = Camera::held(camera.camera.clone()));
     network.cameras[0] = Camera::new(Perspective { principal_distance: -1000.0 }.into(), vec![f64::INFINITY]);
@@ -328,7 +328,7 @@ fn networks_that_contradict_themselves_are_refused() {
 fn a_point_that_runs_into_a_station_is_left_out_soon() {
     let sound = collection(9, 80, 0.3);
     let expected = adjusted(&sound, None, 1);
-    // One photo sees it somewhere, another at the station of the first: that is where it is to go.
+    // One photo sees the point at a finite position, another at the station of the first: the point converges to this station.
     let [first, second] = [0, 3].map(|photo| adjusted_photo(&expected, photo));
     let station = first.centre();
     let mut with_point = sound.clone();
@@ -341,7 +341,7 @@ fn a_point_that_runs_into_a_station_is_left_out_soon() {
     let found = adjusted(&with_point, None, 1);
     assert_eq!((found.adjustment.status, &found.state.collapsed[..]), (Status::Converged, &[point][..]));
     assert!(found.points[point].is_none());
-    // As soon as the stations stand still for the images: not after dozens of steps, each a little nearer.
+    // Convergence as soon as the stations are stable for the observations, instead of after dozens of small steps.
     let steps = [&found, &expected].map(|solution| solution.adjustment.iterations.len());
     assert!(steps[0] <= steps[1] + 8, "{steps:?}");
     assert!((sum(&found) - sum(&expected)).abs() < 1e-8 * sum(&expected));
@@ -357,7 +357,7 @@ fn adjusted_photo(solution: &Solution, photo: usize) -> geometry::View<Bal> {
 fn points_behind_a_camera_are_counted() {
     let sound = collection(9, 80, 0.0);
     assert!(adjusted(&sound, None, 1).points.iter().flatten().all(|point| point.behind == 0));
-    // Everything held, one photo turned about its station by half a turn: what it saw is behind it.
+    // All unknowns fixed, one photo rotated by 180 degrees about its station: its points are behind it.
     let mut turned = sound.clone();
     turned.points.iter_mut().for_each(|point| point.sd = [0.0; 3]);
     turned.photos.iter_mut().for_each(|photo| photo.sd = [0.0; 6]);
@@ -367,7 +367,7 @@ fn points_behind_a_camera_are_counted() {
     pose[1] += std::f64::consts::PI;
     let translation = -(angle_axis_rotation(&[pose[0], pose[1], pose[2]].into()) * centre);
     (0..3).for_each(|k| pose[3 + k] = translation[k]);
-    // Something must be free to adjust.
+    // At least one unknown must be free.
     turned.cameras[0].sd[0] = f64::INFINITY;
     let found = adjusted(&turned, None, 1);
     let seen = sound.images.iter().filter(|image| image.photo == 4).count();

@@ -30,8 +30,8 @@ fn comparator() -> Comparator {
     }
 }
 
-/// Equations 34, 36 and 63 written out once more, the inverse correction by fixed-point iteration, for complex arguments: unknowns
-/// are point, rotation, translation, scales, lack of orthogonality and coefficients.
+/// Independent implementation of equations 34, 36 and 63 for complex arguments; the inverse correction is a fixed-point iteration. Unknowns
+/// are point, rotation, translation, scales, nonorthogonality and coefficients.
 fn measure(unknowns: &[C]) -> [C; 2] {
     let [x, y, theta, tx, ty, sx, sy, alpha] = *unknowns.first_chunk().unwrap();
     let coefficients = [&unknowns[8..14], &unknowns[14..]];
@@ -84,7 +84,7 @@ proptest! {
     }
 }
 
-/// Four placements of a plate of 25 points, measured without error.
+/// Returns four placements of a plate of 25 points, measured without errors.
 fn calibration(left_handed: bool) -> Calibration {
     let truth = comparator();
     let xy = |i: usize| [5e4 * (i % 5) as f64 - 1e5, 5e4 * (i / 5) as f64 - 1e5];

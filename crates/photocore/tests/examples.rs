@@ -1,4 +1,4 @@
-//! The examples run, and come out as they should.
+//! Runs of the examples, compared with expected results.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, dead_code)]
 
@@ -65,7 +65,7 @@ fn a_scale_bar_gives_the_object_its_size() {
             assert!((found.coordinates[k] - scale_bar::place(index)[k]).abs() < 1e-8, "point {index}");
         }
     }
-    // Nothing checks the length of the bar.
+    // The length of the bar is not checked by other observations.
     let bar = solution.observations[0].as_ref().unwrap();
     assert!(bar.residual[0].abs() < 1e-9 && bar.redundancy[0].abs() < 1e-9);
     scale_bar::main().unwrap();

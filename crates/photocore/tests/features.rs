@@ -1,4 +1,4 @@
-//! Features through points: derivatives, known answers, invariance, spread, what cannot be.
+//! Features through points: derivatives, known results, invariance, dispersion, errors.
 
 use photocore::geometry::{Matrix3, Vector3, angle_axis_rotation};
 use photocore::nalgebra::{DMatrix, DVector};
@@ -6,7 +6,7 @@ use photocore::programs::features::{FeatureError, Form, Measured, distance, meas
 
 const FORMS: [Form; 5] = [Form::Line, Form::Plane, Form::Circle, Form::Sphere, Form::Cylinder];
 
-/// Numbers between -1 and 1, the same in every run.
+/// Reproducible generator of numbers between -1 and 1.
 struct Numbers(u64);
 
 impl Numbers {
@@ -15,7 +15,7 @@ impl Numbers {
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    /// A normal number, by the sum of twelve.
+    /// Returns a normally distributed number as the sum of twelve.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| 0.5 * self.uniform()).sum()
     }
@@ -25,7 +25,7 @@ impl Numbers {
     }
 }
 
-/// Points near a feature of diameter 2.4, in its frame.
+/// Returns points near a feature of diameter 2.4, in its frame.
 fn points(form: Form, count: usize, spread: f64, numbers: &mut Numbers) -> Vec<Vector3> {
     let turn = std::f64::consts::TAU / count as f64;
     (0..count)
@@ -52,7 +52,7 @@ fn some_turn() -> Matrix3 {
     angle_axis_rotation(&Vector3::new(0.4, -0.7, 0.3))
 }
 
-/// A full covariance matrix of so many points.
+/// Returns a full covariance matrix of `count` points.
 fn covariance(count: usize, sd: f64, numbers: &mut Numbers) -> DMatrix<f64> {
     let root = DMatrix::from_fn(3 * count, 3 * count, |_, _| numbers.uniform());
     let square = &root * root.transpose() / count as f64 + DMatrix::identity(3 * count, 3 * count);
@@ -67,7 +67,7 @@ fn all_deviations(found: &Measured) -> Vec<[f64; 2]> {
     found.deviations.iter().map(|each| [each.value, each.axial]).collect()
 }
 
-/// The values are functions of the points: their partials are those of differences, also where the form deviates by a tenth.
+/// The partials of the values with respect to the points agree with differences, even for form deviations of a tenth.
 #[test]
 fn covariances_follow_the_points() {
     for form in FORMS {
@@ -107,7 +107,7 @@ fn covariances_follow_the_points() {
     }
 }
 
-/// Points on a feature give it to all digits, wherever it is.
+/// Points on a feature determine it to all digits, at any position.
 #[test]
 fn exact_features_are_found() {
     let mut numbers = Numbers(3);
@@ -133,7 +133,7 @@ fn exact_features_are_found() {
     }
 }
 
-/// Rotation, shift, another unit and another order change nothing that they should not.
+/// Values are invariant or equivariant under rotation, shift, change of unit and change of order.
 #[test]
 fn values_go_with_the_points() {
     for form in FORMS {
@@ -158,13 +158,13 @@ fn values_go_with_the_points() {
     }
 }
 
-/// Standard deviations are those of repeated measurements, and the test of the form is chi-square.
+/// Standard deviations agree with repeated measurements, and the form test is chi-square distributed.
 #[test]
 fn draws_spread_as_predicted() {
     let draws = 1000;
     for form in FORMS {
         let mut numbers = Numbers(5);
-        // Deviations of the form are large beside the errors, so that the extreme points are the same in every draw.
+        // Form deviations are large compared with the errors, so that the extreme points are the same in every draw.
         let shaped = points(form, 9, 0.05, &mut numbers);
         let perfect = points(form, 9, 0.0, &mut numbers);
         let given = covariance(9, 2e-4, &mut numbers);
@@ -195,13 +195,13 @@ fn draws_spread_as_predicted() {
     }
 }
 
-/// The test is that of the weighted fit, which takes the covariance C_d of the deviations by its generalised inverse.
+/// The test equals the weighted fit with a generalised inverse of the covariance C_d of the deviations.
 #[test]
 fn a_free_datum_leaves_the_test_as_it_is() {
     let mut numbers = Numbers(21);
     let points = points(Form::Plane, 8, 1e-3, &mut numbers);
     let given = DMatrix::identity(24, 24) * 1e-6;
-    // Covariances in the datum of these points: shifts and rotations are taken out.
+    // Covariances in the datum of these points, without shifts and rotations.
     let mut motions = DMatrix::zeros(24, 6);
     for (k, p) in points.iter().enumerate() {
         motions.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(&Matrix3::identity());
@@ -219,7 +219,7 @@ fn distances_have_the_covariance_of_both_ends() {
     let ends = [Vector3::new(1.0, 2.0, 2.0), Vector3::zeros()];
     let mut given = DMatrix::identity(6, 6) * 1e-6;
     assert!((distance(&ends, &given).unwrap().quantities[0].sd - 2f64.sqrt() * 1e-3).abs() < 1e-15);
-    // What both share does not change it.
+    // Common errors do not change the distance.
     given.fixed_view_mut::<3, 3>(0, 3).copy_from(&(Matrix3::identity() * 1e-6));
     given.fixed_view_mut::<3, 3>(3, 0).copy_from(&(Matrix3::identity() * 1e-6));
     let found = distance(&ends, &given).unwrap();
@@ -255,7 +255,7 @@ fn what_points_leave_open_is_refused() {
         assert_eq!(refused(form, &ring), FeatureError::Undetermined(form), "{form:?}");
     }
     assert_eq!(refused(Form::Cylinder, &corners), FeatureError::Ambiguous(Form::Cylinder));
-    // A hair off the line, and errors as large: a plane that nobody knows.
+    // Nearly collinear points with errors as large as their deviation do not determine a plane.
     let hair: Vec<Vector3> =
         line.iter().enumerate().map(|(k, p)| p + Vector3::new(0.0, 0.0, 1e-3 * (k * k) as f64)).collect();
     let found = measure(Form::Plane, &hair, &(DMatrix::identity(24, 24) * 1e-4));

@@ -1,4 +1,4 @@
-//! First values of a ring of photos about an object: wrong images, wrong control, nothing but images.
+//! Initial values of a ring of photos about an object: wrong observations, wrong control, observations without control.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use photocore::programs::first_values::{
     FirstValues, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
 };
 
-/// Uniform in -1 to 1, the same in every run (Numerical Recipes' quick generator).
+/// Uniform generator in -1 to 1, reproducible (Numerical Recipes' quick generator).
 struct Random(u32);
 
 impl Random {
@@ -24,7 +24,7 @@ impl Random {
     }
 }
 
-/// Photos on a circle of radius 8, their axes level and through the middle.
+/// Returns photos on a circle of radius 8; their axes are level and pass through the centre.
 fn ring(photos: usize) -> Vec<Pose> {
     let pose = |k: usize| {
         let turn = std::f64::consts::TAU * k as f64 / photos as f64;
@@ -35,7 +35,7 @@ fn ring(photos: usize) -> Vec<Pose> {
     (0..photos).map(pose).collect()
 }
 
-/// The ring with some points, `control` of them known, and a part of the images wrong.
+/// Returns the ring with some points, `control` known points, and a fraction of wrong observations.
 fn given(seed: u32, photos: usize, control: usize, wrong: f64) -> (FirstValues, Vec<Pose>) {
     let mut random = Random(seed);
     let (poses, points) = (ring(photos), (0..60).map(|_| 2.0 * random.vector()).collect::<Vec<_>>());
@@ -79,7 +79,7 @@ fn control_and_wrong_images() {
     }
 }
 
-/// Photos resected from four points of which one is wrong must not stand in the way of all others.
+/// Photos resected from four points, one of them wrong, must not prevent the solution of the others.
 #[test]
 fn a_third_of_wrong_images_never_ends_in_wrong_poses() {
     let mut whole = 0;

@@ -1,4 +1,4 @@
-//! Networks without control, against dense algebra.
+//! Networks without control, compared with dense algebra.
 
 #![allow(clippy::unwrap_used)]
 
@@ -24,7 +24,7 @@ const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(RotationSense::G
 const PHOTOS: usize = 6;
 const POINTS: usize = 12;
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 * index as f64 + 0.3).sin()
 }
@@ -33,7 +33,7 @@ fn noises(index: usize) -> Vector3 {
     Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
 }
 
-/// Photos on a circle about points of unknown place; the third sees one point less than the others, the second all.
+/// Returns photos on a circle about free points; the third sees one point fewer than the others, the second all.
 fn around() -> Network {
     let space = ObjectSpace::Rectangular;
     let places: Vec<Vector3> = (0..POINTS).map(noises).collect();
@@ -91,7 +91,7 @@ fn in_datum(network: &Network, inner: &InnerConstraints) -> Result<Solution, Net
     network.adjustment(&options(FINE)).in_datum(inner).on(&threads()).run()
 }
 
-/// The design matrix at the adjusted values, to unit weight: points, then positions and rotation steps of the photos.
+/// Returns the design matrix at the adjusted values, for unit weight: points, then positions and rotation steps of the photos.
 fn design(network: &Network, solution: &Solution) -> Mat<f64> {
     let mut a = Mat::zeros(2 * network.images.len(), 3 * POINTS + 6 * PHOTOS);
     for (index, image) in network.images.iter().enumerate() {
@@ -110,7 +110,7 @@ fn design(network: &Network, solution: &Solution) -> Mat<f64> {
     a
 }
 
-/// S Q S^T with S = I - G (B^T G)^-1 B^T, Q the pseudo-inverse of A^T A and G its null space, `carriers` the rows of B.
+/// Returns S Q S^T with S = I - G (B^T G)^-1 B^T. Q is the pseudo-inverse of A^T A, G its null space, `carriers` the rows of B.
 fn dense(a: &Mat<f64>, carriers: &[usize]) -> Mat<f64> {
     let eigen = (a.transpose() * a).self_adjoint_eigen(Side::Lower).unwrap();
     let (values, vectors) = (eigen.S(), eigen.U());
@@ -126,7 +126,7 @@ fn dense(a: &Mat<f64>, carriers: &[usize]) -> Mat<f64> {
     &s * q * s.transpose()
 }
 
-/// The greatest difference of the cofactors of points and positions from dense ones, relative to the largest of the block.
+/// Returns the largest difference of the cofactors of points and positions from dense ones, relative to the largest of the block.
 fn apart(solution: &Solution, q: &Mat<f64>) -> f64 {
     let block = |first: usize, found: &dyn Fn(usize, usize) -> f64| {
         let largest = (0..3).map(|k| q[(first + k, first + k)]).fold(0.0, f64::max);
@@ -154,7 +154,7 @@ fn a_network_without_control_is_adjusted_by_any_method() {
     ] {
         let found = adjust(&network, method).unwrap();
         assert_eq!(found.adjustment.status, Status::Converged, "{method:?}");
-        // The second photo has most images; no coordinate of another differs more than the fourth's X.
+        // The second photo has most observations; the fourth photo's X has the largest difference among the other coordinates.
         assert_eq!(found.datum.held[..6], [0, 1, 2, 3, 4, 5].map(|unknown| (1, unknown)));
         assert_eq!(found.datum.held[6..], [(3, 0)]);
         let freedom = 2 * network.images.len() as i64 - (3 * POINTS + 6 * PHOTOS) as i64 + 7;
@@ -198,7 +198,7 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
         let apart = apart(&found, &dense(&a, &carriers));
         assert!(apart < 1e-9, "{apart:e}");
 
-        // The carriers cannot be brought nearer to where they were: no motion of them goes along what they have moved.
+        // The differences of the carriers from their initial positions have a zero component along every datum motion.
         let places =
             points.iter().map(|&i| (found.points[i].unwrap().coordinates, network.points[i].coordinates));
         let stations = photos.iter().map(|&i| {
@@ -213,7 +213,7 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
         let scale: f64 = moved.iter().map(|(at, by)| at.dot(by)).sum();
         assert!(shift.amax() < 1e-11 && turn.amax() < 1e-10 && scale.abs() < 1e-10, "{shift} {turn} {scale}");
 
-        // What no datum touches.
+        // Quantities that are invariant under a change of the datum.
         for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
             assert!((r - expected).abs() < 1e-9);
         }
@@ -225,7 +225,7 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
     }
 }
 
-/// Cofactors of every two of photos (position and rotation step) and points, in the order of [`design`].
+/// Returns the full cofactor matrix of photos (position and rotation step) and points, in the order of [`design`].
 fn whole(network: &Network, solution: &Solution, datum: Option<&NetworkDatum>) -> Mat<f64> {
     let (options, threads) = (options(FINE), threads());
     let mut go = |_| ControlFlow::Continue(());
@@ -236,10 +236,10 @@ fn whole(network: &Network, solution: &Solution, datum: Option<&NetworkDatum>) -
     Mat::from_fn(count, count, |i, j| found[i * count + j])
 }
 
-/// The greatest difference of two matrices, relative to their diagonals.
+/// Returns the largest difference of two matrices, relative to their diagonals.
 fn greatest(found: &Mat<f64>, expected: &Mat<f64>) -> f64 {
     let count = expected.nrows();
-    // What does not move has none.
+    // Fixed unknowns have zero cofactors.
     let largest = (0..count).map(|i| expected[(i, i)]).fold(0.0, f64::max);
     let sd = |i: usize| expected[(i, i)].max(1e-9 * largest).sqrt();
     let pairs = (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
@@ -252,7 +252,7 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     let minimal = adjust(&network, FINE).unwrap();
     let (points, photos): (Vec<usize>, Vec<usize>) = ((0..POINTS).collect(), (0..PHOTOS).collect());
     let step = |photo: &usize| 3 * POINTS + 6 * photo;
-    // Held: the second photo, and X of the fourth.
+    // Fixed: the second photo, and X of the fourth.
     let held: Vec<usize> = (step(&1)..step(&1) + 6).chain([step(&3)]).collect();
     let a = design(&network, &minimal);
     assert!(greatest(&whole(&network, &minimal, None), &dense(&a, &held)) < 1e-8);
@@ -270,7 +270,7 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     let apart = greatest(&whole(&network, &found, None), &expected);
     assert!(apart < 1e-8, "{apart:e}");
 
-    // Without adjusting again, from the minimum datum and from yet another one.
+    // Without another adjustment, from the minimal datum and from a third one.
     let mut go = |_| ControlFlow::Continue(());
     let (options, threads) = (options(FINE), threads());
     let datum = NetworkDatum::Inner(inner);
@@ -282,7 +282,7 @@ fn cofactors_of_everything_go_over_to_any_datum() {
         for (photo, expected) in there.photos.iter().zip(&found.photos) {
             let position = Vector3::from_column_slice(&photo.pose[..3]);
             assert!((position - Vector3::from_column_slice(&expected.pose[..3])).amax() < 1e-9);
-            // The same attitude has other angles where it has turned through phi of 90 degrees.
+            // The same attitude has other angles if it has passed phi of 90 degrees.
             let [one, other] = [photo, expected]
                 .map(|photo| NUMBERS.attitude([photo.pose[3], photo.pose[4], photo.pose[5]]));
             assert!((one - other).amax() < 1e-9);
@@ -302,7 +302,7 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     }
 }
 
-/// Relative to a photo: what holding it would have given, and for networks that are not free J Q J^T.
+/// Cofactors relative to a photo equal the result of a fixed photo, and J Q J^T for networks that are not free.
 #[test]
 fn cofactors_relative_to_a_photo_are_those_of_holding_it() {
     let network = around();
@@ -310,7 +310,7 @@ fn cofactors_relative_to_a_photo_are_those_of_holding_it() {
     let step = |photo: usize| 3 * POINTS + 6 * photo;
     let relative = whole(&network, &found, Some(&NetworkDatum::RelativeToPhoto(4)));
     assert!((0..6).all(|k| relative[(step(4) + k, step(4) + k)] == 0.0));
-    // The distance from the held to the other photo in X is held: not of the relative ones, whose scale it gives.
+    // The datum fixes the X distance from the fixed to another photo and so the scale; the relative cofactors do not fix it.
     let a = design(&network, &found);
     let (count, g) = (3 * POINTS + 6 * PHOTOS, rigid(&found));
     let b = Mat::from_fn(6, count, |i, j| if j == step(4) + i { 1.0 } else { 0.0 });
@@ -333,7 +333,7 @@ fn cofactors_relative_to_a_photo_are_those_of_holding_it() {
     assert!(of_points(&to_points) < of_points(&q));
 }
 
-/// How shifts and rotations move points, photos and their axes.
+/// Returns the displacements of points, photos and their axes by shifts and rotations.
 fn rigid(solution: &Solution) -> Mat<f64> {
     let mut g = Mat::zeros(3 * POINTS + 6 * PHOTOS, 6);
     let mut put = |first: usize, at: [f64; 3]| {
@@ -409,7 +409,7 @@ fn geographic_networks_are_free_to_move_too() {
     let ellipsoid = Ellipsoid::new(6_378_137.0, 6_356_752.314_2).unwrap();
     let space = ObjectSpace::Geographic(ellipsoid);
     let flat = around();
-    // A kilometre for a metre, on the ground at 9 degrees east, 48 north.
+    // Scaled from metres to kilometres, on the ground at 9 degrees east, 48 north.
     let place =
         |at: [f64; 3]| [0.157 + at[0] * 1e3 / 4.27e6, 0.838 + at[1] * 1e3 / 6.37e6, 500.0 + 100.0 * at[2]];
     let mut network = Network { space, images: vec![], ..flat.clone() };
@@ -430,7 +430,7 @@ fn geographic_networks_are_free_to_move_too() {
         }
         photo.pose = [longitude, latitude, height, angles[0], angles[1], angles[2]];
     }
-    // Geocentric coordinates are good to a nanometre.
+    // Geocentric coordinates are accurate to a nanometre.
     let minimal = adjust(&network, Method::default()).unwrap();
     assert_eq!((minimal.adjustment.status, minimal.datum.held.len()), (Status::Converged, 7));
     let inner = InnerConstraints {
@@ -445,7 +445,7 @@ fn geographic_networks_are_free_to_move_too() {
     for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
         assert!((r - expected).abs() < 1e-6);
     }
-    // Its points are better known than when one photo is held.
+    // Its points are more precise than with one fixed photo.
     let height = |solution: &Solution| {
         solution.points.iter().map(|point| point.unwrap().cofactors[(2, 2)]).sum::<f64>()
     };

@@ -1,4 +1,4 @@
-//! Free networks with common unknowns and rigs: these move along with the rest, and what is not determined is named.
+//! Free networks with shared parameters and rigs, which follow datum motions; undetermined parameters are reported.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -23,7 +23,7 @@ const FREE: f64 = f64::INFINITY;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto);
 const POINTS: usize = 14;
 
-/// Noise without a generator: incommensurable angles.
+/// Returns deterministic noise from incommensurable angles.
 fn noise(index: usize) -> f64 {
     (1.7 * index as f64 * index as f64 + 0.3).sin()
 }
@@ -32,7 +32,7 @@ fn noises(index: usize) -> Vector3 {
     Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
 }
 
-/// The images of points on photos of the given poses, with errors of so many standard deviations.
+/// Returns the observations of points on photos with the given poses, with errors of `errors` standard deviations.
 fn network(poses: &[Pose], places: &[Vector3], errors: f64) -> Network {
     let (mut photos, mut images) = (vec![], vec![]);
     for (photo, pose) in poses.iter().enumerate() {
@@ -57,7 +57,7 @@ fn network(poses: &[Pose], places: &[Vector3], errors: f64) -> Network {
     }
 }
 
-/// Places of which the first six are on a plane, and the next three on a line.
+/// Returns points; the first six are on a plane, the next three on a line.
 fn places() -> Vec<Vector3> {
     let mut all: Vec<Vector3> = (0..POINTS).map(noises).collect();
     let normal = rotation([0.3, -0.6, 0.2]).column(2).into_owned();
@@ -94,8 +94,8 @@ const PLANE: usize = 0;
 const INSTRUMENT: usize = 1;
 const SENSOR: usize = 2;
 
-/// A network whose place, orientation and scale nothing gives, with a plane, an instrument and a rig; `errors` are those of all
-/// observations in their standard deviations.
+/// Returns a network with a free datum, including the scale, with a plane, an instrument and a rig; `errors` are in standard deviations of
+/// the observations.
 fn free(errors: f64) -> Network {
     let places = places();
     let sensor = Pose { position: Vector3::new(0.4, 0.1, -0.1), attitude: rotation([0.1, -0.2, 0.15]) };
@@ -151,7 +151,7 @@ fn adjust(network: &Network) -> Result<Solution, NetworkError> {
 #[test]
 fn common_unknowns_move_with_a_free_network() {
     let mut network = free(1.0);
-    // Points off a plane by so many metres would rather be nearer to each other: something must give the scale.
+    // Deviations from a plane in metres decrease with the scale: another observation must define the scale.
     network.observations.push(base());
     let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
@@ -184,7 +184,7 @@ fn common_unknowns_move_with_a_free_network() {
             assert!((a.cofactors[k] - b.cofactors[k]).abs() < 1e-7 * scale);
         }
     }
-    // What observations say does not depend on the datum.
+    // Observable quantities are independent of the datum.
     let scaled = |solution: &Solution| {
         let at = |point: usize| Vector3::from(solution.points[point].unwrap().coordinates);
         let scale = solution.commons[INSTRUMENT].position[0];
@@ -213,7 +213,7 @@ fn the_base_of_a_rig_gives_the_scale() {
     let mut network = free(1.0);
     network.observations.push(base());
     assert_eq!(adjust(&network).unwrap().datum.held.len(), 6);
-    // Three points at one height give the tilts.
+    // Three points of equal height determine the tilts.
     let mut upright = network.clone();
     upright.commons.push(common(CommonKind::Level, Vector3::zeros(), Matrix3::identity()));
     let level = |point: usize| OnLevel { point, level: 3, difference: noise(point), sd: 1e-3 }.into();
@@ -221,7 +221,7 @@ fn the_base_of_a_rig_gives_the_scale() {
     assert_eq!(adjust(&upright).unwrap().datum.held.len(), 4);
 }
 
-/// Residuals of points on lines turn with the network where the axes of the lines do not: exact points, no residuals.
+/// Residuals of points on lines rotate with the network if the axes of the lines are fixed: exact points without residuals.
 #[test]
 fn points_on_lines_that_are_exact() {
     let places = places();
@@ -244,7 +244,7 @@ fn points_on_lines_that_are_exact() {
     assert_eq!(adjust(&at_the_end).unwrap().datum.held.len(), 6, "one point on a plumb line says nothing");
 }
 
-/// A strip along X, as uniform as asked for, with positions whose shift and drift are unknown.
+/// Returns a strip along X of given uniformity, with positions whose shift and drift are unknown.
 fn strip(wiggle: f64) -> Network {
     let places: Vec<Vector3> =
         (0..24).map(|k| Vector3::new(k as f64 * 0.9 - 2.0, 2.0 * noise(k), 0.3 * noise(k + 100))).collect();
@@ -297,7 +297,7 @@ fn a_lever_arm_and_a_shift_of_parallel_photos_are_named() {
         image.xy = [0, 1].map(|k| CAMERA.principal_distance * u[k] / u[2]);
     }
     network.commons.push(common(CommonKind::LeverArm, Vector3::zeros(), Matrix3::identity()));
-    // Control: the datum is given.
+    // Control points define the datum.
     for k in [0, 5, 23] {
         let place = [k as f64 * 0.9 - 2.0, 2.0 * noise(k), 0.3 * noise(k + 100)];
         network.points[k] = Point { coordinates: place, sd: [0.01; 3] };
@@ -311,12 +311,12 @@ fn a_lever_arm_and_a_shift_of_parallel_photos_are_named() {
     let refused = adjust(&network).err();
     let combination = Combination { commons: vec![0, 2], ..Combination::default() };
     assert_eq!(refused, Some(NetworkError::Undetermined(vec![combination; 3])));
-    // Headings that differ tell them apart.
+    // Different headings separate them.
     network.photos[3..].iter_mut().for_each(|photo| photo.sd[3..].fill(FREE));
     assert!(adjust(&network).is_err(), "they are still parallel");
 }
 
-/// A network adjusted, and the same starting from there: at other values points are not yet on planes and lines.
+/// Returns the solution, and the network with it as initial values: before the adjustment points are not on planes and lines.
 fn from_the_end(network: &Network) -> (Solution, Network) {
     let found = adjust(network).unwrap();
     let mut at_the_end = network.clone();
@@ -329,7 +329,7 @@ fn from_the_end(network: &Network) -> (Solution, Network) {
     (found, at_the_end)
 }
 
-/// What is open of a network without errors.
+/// Returns the datum defect of a network without errors.
 fn open_of_exact(network: &Network) -> usize {
     adjust(&from_the_end(network).1).unwrap().datum.held.len()
 }
@@ -347,14 +347,14 @@ fn a_boresight_of_photos_that_nothing_else_turns_is_named() {
     let mut one = network.clone();
     one.observations.push(observed.clone());
     one.observations.push(base());
-    // One attitude and its boresight say nothing together: the network turns, and the boresight back.
+    // One attitude with its boresight gives no information: the network and the boresight rotate in opposite directions.
     let Err(NetworkError::Undetermined(found)) = adjust(&one) else { panic!("determined") };
     assert_eq!(found.len(), 3);
     assert!(found.iter().any(|combination| combination.commons.contains(&3)), "{found:?}");
-    // Photos on one frame tell each other's attitude as one observation of both.
+    // For photos on one frame the attitude of one is an observation of both.
     let pose = Pose { position: Vector3::new(0.4, 0.1, -0.1), attitude: rotation([0.1, -0.2, 0.15]) };
     let mut network = free(0.0);
-    // Exact distances of an instrument with a scale of its own, and of points from a plane, give no scale.
+    // Exact distances by an instrument with a free scale, and of points from a plane, give no scale.
     assert_eq!(open_of_exact(&network), 7);
     let relative = Relative { photos: [0, 5], pose, precision: deviations(&[1e-3; 6]) };
     network.observations.push(relative.into());

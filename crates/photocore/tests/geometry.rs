@@ -1,4 +1,4 @@
-//! Geometry against complex-step derivatives, inverses, and figures of the GIANT sample listing.
+//! Geometry against complex-step derivatives, inverses, and values of the GIANT sample listing.
 
 #![allow(clippy::panic, clippy::unwrap_used)]
 
@@ -16,7 +16,7 @@ fn wgs84() -> Ellipsoid {
     Ellipsoid::new(WGS84.0, WGS84.1).unwrap()
 }
 
-/// A photo and an image point with its distance to the object: in rectangular space when `spheroid` is None.
+/// Photo and image point with its distance to the object, in rectangular space without `spheroid`.
 #[derive(Debug, Clone)]
 struct Case {
     spheroid: Option<(f64, f64)>,
@@ -37,7 +37,7 @@ impl Case {
         View::new(self.space(), self.sense, self.position, self.attitude, self.c)
     }
 
-    /// Coordinates of the point seen at `xy`.
+    /// Returns the coordinates of the point observed at `xy`.
     fn coordinates(&self) -> [f64; 3] {
         let ray = self.photo().ray(self.xy).unwrap();
         self.space().coordinates(ray.origin + self.distance * ray.direction)
@@ -101,7 +101,7 @@ proptest! {
         let (projected, direction) = (case.photo().project(&point), case.photo().ray(case.xy).unwrap().direction);
         prop_assert!((direction.iter().map(|v| v * v).sum::<f64>() - 1.0).abs() < 1e-14);
         for i in 0..2 {
-            // A rounding of 1e-9 m of the geocentric coordinates, seen from the distance of the point.
+            // Rounding of 1e-9 m of the geocentric coordinates, at the distance of the point.
             let tolerance = 1e-10 + 4.0 * 152.74 * 5e-9 / case.distance;
             prop_assert!((projected[i] - case.xy[i]).abs() < tolerance);
             prop_assert_eq!(projected[i].to_bits(), projection.xy[i].to_bits());
@@ -115,7 +115,7 @@ proptest! {
         let angles = [omega, phi * (1.0 - close.powi(8)), kappa];
         let m = rotation(angles);
         let back = rotation_angles(&m);
-        // omega and kappa lose digits as phi nears a right angle, the matrix does not.
+        // omega and kappa lose digits as phi approaches 90 degrees, the matrix does not.
         let loss = 1e-14 / angles[1].cos();
         for k in 0..3 {
             prop_assert!((angles[k] - back[k]).sin().abs() < loss);
@@ -131,14 +131,14 @@ proptest! {
         height in -1e5..5e7f64,
         low in any::<bool>(),
     ) {
-        // Half of the cases crowd towards a pole.
+        // Half of the cases are close to a pole.
         let pole = FRAC_PI_2.copysign(latitude);
         let latitude = if near < 0.5 { pole * (1.0 - near.powi(20)) } else { latitude };
         let height = if low { height / 5e4 } else { height };
         let ellipsoid = wgs84();
         let xyz = ellipsoid.geocentric([longitude, latitude, height]);
         let back = ellipsoid.geographic(xyz);
-        // Four roundings of a geocentric coordinate are all that may be lost: 4e-9 m near the ground.
+        // The tolerance is four roundings of a geocentric coordinate: 4e-9 m near the ground.
         let tolerance = 1e-9f64.max(4.0 * f64::EPSILON * (WGS84.0 + height));
         let again = ellipsoid.geocentric(back);
         for k in 0..3 {
@@ -167,7 +167,7 @@ fn rotations_with_a_right_angled_phi_still_give_the_matrix() {
 
 #[test]
 fn positive_omega_lifts_the_left_wing() {
-    // Image axis y turns towards z: the object vector +z appears on +y.
+    // Image axis y rotates towards z: the object vector +z appears on +y.
     let m = rotation([0.1, 0.0, 0.0]);
     assert!(m[(1, 2)] > 0.0 && m.row(0) == Vector3::x().transpose());
     assert!(rotation([0.0, 0.1, 0.0])[(2, 0)] > 0.0);
@@ -202,8 +202,7 @@ fn dms(degrees: f64, minutes: f64, seconds: f64) -> f64 {
     (degrees.abs() + minutes / 60.0 + seconds / 3600.0).copysign(degrees).to_radians()
 }
 
-/// Adjusted stations of the GIANT sample (pages 30 and 41): longitude, latitude, height, omega, phi, kappa
-/// photo-to-ground.
+/// Returns adjusted stations of the GIANT sample (pages 30 and 41): longitude, latitude, height, omega, phi, kappa photo-to-ground.
 fn sample_photo(frame: &str) -> View {
     let (position, attitude) = match frame {
         "SH9960" => (
@@ -224,7 +223,7 @@ fn sample_photo(frame: &str) -> View {
     View::new(space, RotationSense::PhotoToGround, position, attitude, -152.740)
 }
 
-/// Adjusted points of the GIANT sample (page 34).
+/// Returns adjusted points of the GIANT sample (page 34).
 fn sample_point(name: &str) -> Point {
     let coordinates = match name {
         "126!" => [dms(-94.0, 59.0, 38.7142), dms(29.0, 39.0, 54.7204), 3.374],

@@ -1,4 +1,4 @@
-//! Networks against golden figures of an independent program, read where they are at hand.
+//! Networks against golden data of an independent program, read if available.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -20,7 +20,7 @@ use crate::golden::{golden, list, rows};
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);
 
-/// The network of a file, without its scale bars if so asked, and the index of every block by name.
+/// Returns the network of a file, optionally without its scale bars, and the index of every block by name.
 fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
     let (mut photos, mut points) = (vec![], vec![]);
     let mut index = HashMap::from([("camera".to_owned(), 0)]);
@@ -78,7 +78,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
     let camera = match blocks.get("camera") {
         None => Camera::held(Perspective { principal_distance: -35.0 }.into()),
         Some(_) => {
-            // c, xp, yp, K1, K2, K3, P1, P2 with priors; b1, b2, r0 are none.
+            // c, xp, yp, K1, K2, K3, P1, P2 with priors; b1, b2, r0 are fixed at zero.
             let known = [0.0; 3];
             let given = [&list(&observed["camera prior"]["observed"][0])[..], &known].concat();
             let sd = [&deviations("camera prior")[..], &known].concat();
@@ -97,7 +97,7 @@ fn network(file: &Value, bars: bool) -> (Network, HashMap<String, usize>) {
     (network, index)
 }
 
-/// The attitude's part of a photo's cofactors taken from its angles to the rotation step: rho = K d(angles).
+/// Transforms the attitude part of a photo's cofactors from angles to the rotation step: rho = K d(angles).
 fn by_step(photo: &AdjustedPhoto) -> Matrix6<f64> {
     let [.., omega, phi, kappa] = photo.pose;
     let mut rates = Matrix6::identity();
@@ -131,7 +131,7 @@ fn adjust(network: &Network, datum: Option<&InnerConstraints>) -> Solution {
     }
 }
 
-/// Unknowns to a millionth of their standard deviations, figures of the whole and of every kind of observation.
+/// Compares unknowns to a millionth of their standard deviations, and global statistics and statistics per observation type.
 fn assert_solution(solution: &Solution, golden: &Value, index: &HashMap<String, usize>, what: &str) {
     let number = |name: &str| golden[name].as_f64().unwrap();
     assert_eq!(solution.degrees_of_freedom as f64, number("degrees_of_freedom"), "{what}");
@@ -218,7 +218,7 @@ fn a_block_that_calibrates_its_camera_with_priors() {
     let residuals = rows(&golden["kinds"]["image"]["residuals"]);
     for (own, expected) in solution.images.iter().zip(residuals) {
         let apart = (0..2).map(|k| (own.unwrap().residual[k] - expected[k]).abs());
-        // A millionth of the standard deviation of an image.
+        // A millionth of the standard deviation of an observation.
         assert!(apart.fold(0.0, f64::max) < 1e-9);
     }
     let sum = |kind: &str| golden["kinds"][kind]["sum_of_squares"].as_f64().unwrap();

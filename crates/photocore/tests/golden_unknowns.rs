@@ -1,4 +1,4 @@
-//! An aerial block with GNSS and IMU, and a rig, against golden figures of an independent program, read where they are at hand.
+//! Aerial block with GNSS and IMU, and a rig, against golden data of an independent program, read if available.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -23,7 +23,7 @@ const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);
 const FREE: f64 = f64::INFINITY;
 
-/// A network with the index of every block by name, without images and observations.
+/// Network with the index of every block by name, without observations.
 struct File<'a> {
     file: &'a Value,
     network: Network,
@@ -35,7 +35,7 @@ fn matrix(value: &Value) -> Matrix3 {
 }
 
 impl<'a> File<'a> {
-    /// Photos are the poses whose names begin so.
+    /// Photos are the poses with this name prefix.
     fn new(file: &'a Value, photo: &str, cameras: Vec<Camera>) -> Self {
         let (mut index, mut photos, mut points) = (HashMap::new(), vec![], vec![]);
         let blocks = file["inputs"]["initial"].as_object().unwrap();
@@ -60,7 +60,7 @@ impl<'a> File<'a> {
         Self { file, network, index }
     }
 
-    /// What the observations of a kind are of, what was observed, and their covariances.
+    /// Returns the objects, observed values and covariances of the observations of a type.
     fn observed(&self, kind: &str) -> Vec<(Vec<&'a str>, &'a Value, DMatrix<f64>)> {
         let own = &self.file["inputs"]["observations"][kind];
         let (all, each) = (&own["covariance"]["all"], own["covariance"]["each"].as_array());
@@ -156,7 +156,7 @@ fn assert_attitude(found: &Matrix3, expected: &Value, what: &str) {
     assert!(apart < 1e-11, "{what}: {apart:e}");
 }
 
-/// Unknowns, their cofactors, and the figures of the whole.
+/// Compares unknowns, cofactors, and global statistics.
 fn assert_solution(file: &File<'_>, solution: &Solution) {
     let golden = &file.file["solution"];
     let number = |name: &str| golden[name].as_f64().unwrap();
@@ -195,7 +195,7 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
     }
 }
 
-/// Cofactors of two blocks of unknowns with each other.
+/// Compares the cross-cofactors of two blocks of unknowns.
 fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
     let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
@@ -225,7 +225,7 @@ fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
     }
 }
 
-/// Residuals, redundancy numbers and standardized residuals of one kind.
+/// Compares residuals, redundancy numbers and standardized residuals of one observation type.
 fn assert_kind<'s>(
     file: &File<'_>,
     kind: &str,
@@ -355,7 +355,7 @@ fn a_rig_with_an_unknown_sensor() {
     assert_attitude(&NUMBERS.attitude(angles), &derived["matrix_photo_to_object"], "derived");
     assert_cofactors(by_step(own).as_slice(), &derived["cofactors"], "derived");
 
-    // The same by further right-hand sides.
+    // The same cofactors by further right-hand sides.
     let threads = Threads::new(2).unwrap();
     let mut go = |_| ControlFlow::Continue(());
     let photo = frames + file.index["frame3"];
@@ -368,14 +368,14 @@ fn a_rig_with_an_unknown_sensor() {
         assert!((a - b).abs() < 1e-8 * scale);
     }
 
-    // A frame without a photo of its own: that of the first is taken away, and its images with it.
+    // A frame without its own photo: the first frame loses its photo with all observations.
     let mut network = file.network.clone();
     network.images.retain(|image| image.photo != 0);
     let without = adjusted(&network);
     assert_eq!([0, frames].map(|photo| without.photos[photo].images > 0), [false, true]);
     assert!(without.photos[0].cofactors.iter().all(|value| value.is_finite()));
 
-    // A sensor that is known where it was found changes nothing in that.
+    // A sensor fixed at its estimate does not change the solution.
     let mut network = file.network.clone();
     let found = &solution.commons[0];
     network.commons[0] = Common {

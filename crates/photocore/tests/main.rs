@@ -1,4 +1,4 @@
-//! The tests of the crate, as one program: what they use is linked once, not once for each file.
+//! Tests of the crate as one program, so that dependencies are linked once instead of per file.
 
 #![allow(clippy::unwrap_used)]
 
@@ -38,7 +38,7 @@ mod stellar_dense;
 mod ties;
 mod trajectories;
 
-/// This file, and programs of their own: a table for the page, threads of the whole process.
+/// This file, and separate programs: a table for the page, global threads of the process.
 const OTHERS: [&str; 3] = ["main", "nist", "own_threads"];
 
 #[test]

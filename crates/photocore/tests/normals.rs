@@ -1,4 +1,4 @@
-//! The block normal equations against dense algebra.
+//! Block normal equations compared with dense algebra.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,11 +15,11 @@ use photocore::normals::{
 };
 use proptest::prelude::*;
 
-/// A system of given equations, dense.
+/// Dense system of given equations.
 #[derive(Debug)]
 struct Dense {
     layout: Layout,
-    /// Row by row, one row for each equation.
+    /// Coefficients, one row per equation.
     matrix: Mat<f64>,
     right: Vec<f64>,
     prior: Prior,
@@ -58,7 +58,7 @@ impl Equations for Dense {
 }
 
 impl Dense {
-    /// Numbers between -1 and 1 from a small generator, so that a case is a seed.
+    /// Fills the system with random numbers between -1 and 1, reproducible by seed.
     fn new(layout: Layout, seed: u64) -> Self {
         let mut state = seed.wrapping_mul(2).wrapping_add(1);
         let mut number = move || {
@@ -138,14 +138,14 @@ const ALL: [Ordering; 6] = [
     Ordering::DissectionByGraph,
 ];
 
-/// Random systems: local blocks of 1 to 3 unknowns, retained blocks of 1 to 7, with and without one that most groups share, several groups of
-/// a local block on the same retained block, up to two further blocks of a group besides, ties among up to three retained blocks and the shared one.
+/// Random systems: local blocks of 1 to 3 unknowns, retained blocks of 1 to 7, optionally a shared one. Observations of a local block may
+/// repeat a retained block and have two further ones; constraints join up to three blocks and the shared one.
 fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
     let blocks = (prop::collection::vec(1..8usize, 1..12), 0..4usize);
     let shape = (1..4usize, 1..3usize, blocks, 0..5usize);
     shape
         .prop_flat_map(|(l, rows, (retained, common), shared)| {
-            // Main blocks stand before the common ones, or after them.
+            // Main blocks precede or follow the common ones.
             let common = common.min(retained.len() - 1) as u32;
             let main = if l == 2 { 0..retained.len() as u32 - common } else { common..retained.len() as u32 };
             let start = if l == 2 { main.end } else { 0 };
@@ -165,7 +165,7 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
         .prop_map(|((l, rows, mut retained, shared), locals, ties, seed, ordering)| {
             let last = retained.len() as u32;
             retained.extend((shared > 0).then_some(shared));
-            // Not in the order of the blocks: ties and groups have an order of their own.
+            // Constraints and observations use an order different from the order of the blocks.
             let blocks = |own: BTreeSet<u32>, too: bool| -> Vec<u32> {
                 own.into_iter().rev().chain((shared > 0 && too).then_some(last)).collect()
             };
@@ -189,7 +189,7 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
         })
 }
 
-/// A strip or a block, large enough for several supernodes, subtrees and tiles; every group shares a last block of so many unknowns.
+/// Returns a block with several supernodes, subtrees and tiles; observations share a last block of `shared` unknowns.
 fn block(strips: usize, length: usize, shared: usize) -> Dense {
     let (mut ptr, mut retained) = (vec![0], Vec::new());
     for strip in 0..strips {
@@ -220,7 +220,7 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((actual - expected).abs() <= tolerance, "{what}: {actual:e} instead of {expected:e}");
 }
 
-/// Solution, every selected block, local cofactors and adjusted equations against the dense inverse.
+/// Compares solution, all selected blocks, local cofactors and adjusted equations with the dense inverse.
 fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let threads = threads(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
@@ -286,8 +286,8 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     }
 }
 
-/// A chord with equations of other coefficients: their own normal matrices L L^T eliminate the local blocks from the right-hand side, the
-/// factor does all else.
+/// Compares a chord step (modified Newton) with equations of other coefficients. Their own normal matrices L L^T eliminate the local blocks
+/// from the right-hand side; the rest uses the old factor.
 fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
     let chord = done(system.chord(&threads(2), factor, (&there, &there.prior), &mut go)).step;
@@ -311,7 +311,7 @@ fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     }
 }
 
-/// a Q a^T of every two equations of some local blocks; `adjusted` is A Q.
+/// Compares a Q a^T of all pairs of equations of some local blocks; `adjusted` is A Q.
 fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedInverse, adjusted: &Mat<f64>) {
     let layout = system.layout();
     let exact = adjusted * dense.matrix.transpose();
@@ -331,7 +331,7 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
     }
 }
 
-/// The logarithm of the determinant: that of the reduced normal equations, and those of the local blocks.
+/// Returns the logarithm of the determinant: the sum for the reduced normal equations and the local blocks.
 fn determinant(dense: &Dense, factor: &Factor) -> f64 {
     let (layout, normal) = (&dense.layout, dense.normal_matrix());
     let local = |local: usize| {
@@ -341,7 +341,7 @@ fn determinant(dense: &Dense, factor: &Factor) -> f64 {
     factor.log_determinant().unwrap() + (0..layout.locals()).map(local).sum::<f64>()
 }
 
-/// Further right-hand sides: some columns of the inverse, and all of them added up.
+/// Compares further right-hand sides: some columns of the inverse, and their sum.
 fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
     let unknowns = system.layout().unknowns();
     let columns: Vec<usize> = (0..unknowns).step_by(unknowns.div_ceil(20)).collect();
@@ -365,12 +365,12 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
     }
 }
 
-/// Cofactors of unknowns and of sums of them, every two of them and one kind with the other.
+/// Compares cofactors of unknowns and of their sums, all pairs and cross-cofactors.
 fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &Mat<f64>) {
     let (unknowns, threads) = (system.layout().unknowns(), threads(2));
     let several: Vec<Function> =
         (0..unknowns).rev().step_by(unknowns.div_ceil(40)).map(|unknown| vec![(unknown, 1.0)]).collect();
-    // One of them takes an unknown twice, and one takes all.
+    // One function contains an unknown twice, and one contains all.
     let all: Function =
         (0..unknowns).map(|unknown| (unknown, 1.0 + unknown as f64 / unknowns as f64)).collect();
     let few: Vec<Function> = vec![vec![(unknowns - 1, 0.5), (0, -2.0), (0, 1.0)], all];
@@ -450,7 +450,7 @@ fn strip_and_block_agree_with_dense_algebra() {
     }
 }
 
-/// Thirty cameras of ten unknowns in turn: every group touches those of one.
+/// Thirty cameras of ten unknowns in turn: every observation depends on one of them.
 #[test]
 fn cameras_in_turn_agree_with_dense_algebra() {
     let plain = block(5, 10, 0).layout;
@@ -465,8 +465,8 @@ fn cameras_in_turn_agree_with_dense_algebra() {
     }
 }
 
-/// A block whose photographs have a camera of three unknowns for each strip and share one of ten; `first` of the cameras stand before
-/// the photographs.
+/// Returns a block of photographs with one camera of three unknowns per strip and a shared one of ten; if `first`, the cameras precede the
+/// photographs.
 fn with_cameras(strips: usize, length: usize, first: bool) -> Layout {
     let (plain, photos) = (block(strips, length, 0).layout, strips * length);
     let shift = if first { strips + 1 } else { 0 };
@@ -499,7 +499,7 @@ fn shared_cameras_agree_with_dense_algebra() {
     }
 }
 
-/// Views of a target whose first points are held, by a lens of 60 knots: every group touches those about it, and some of another lens.
+/// Returns views of a target with fixed first points and a lens of 60 knots, on which each observation depends locally.
 fn target(views: usize, points: usize, held: usize) -> Dense {
     let (near, lens) = (|k: usize| views + k % 52, |k: usize| views + 60 + k % 2);
     let ptr: Vec<usize> = (0..=points).map(|point| point * views).collect();
@@ -528,7 +528,7 @@ fn groups_of_held_local_blocks_stand_apart() {
     }
 }
 
-/// What the equations of a held local block have to do with each other is found from them as functions.
+/// The cofactors of the equations of a fixed local block are computed as cofactors of functions.
 #[test]
 fn equations_of_a_held_local_block_are_functions() {
     let dense = target(12, 30, 20);
@@ -548,7 +548,7 @@ fn equations_of_a_held_local_block_are_functions() {
     }
 }
 
-/// The camera of the whole block is joined to everything: it goes last, and the others are ordered by the shape they have without it.
+/// The camera of the whole block is coupled to all blocks: it is eliminated last, and the others are ordered as without it.
 #[test]
 fn what_is_joined_to_everything_is_eliminated_last() {
     for (strips, length) in [(1, 200), (12, 40)] {
@@ -560,7 +560,7 @@ fn what_is_joined_to_everything_is_eliminated_last() {
             let cost = |layout: &Layout| {
                 System::new(layout.clone(), *ordering).unwrap().symbolic().operations(layout).factor
             };
-            // Thirteen more unknowns in every front, of twenty to a hundred.
+            // Thirteen additional unknowns in every front of twenty to a hundred.
             let (with, without) = (cost(&layout), cost(&plain));
             assert!(with < 4.0 * without, "{ordering:?}: {with} beside {without}");
         }
@@ -574,7 +574,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
     let camera = 24 + 3;
     dense.prior.weight[layout.retained_range(camera)].fill(0.0);
     dense.prior.weight[layout.retained_range(5)].fill(0.0);
-    // What the second unknown of the shared camera does, the first of photo 5 undoes: their sum alone is determined.
+    // The second unknown of the shared camera compensates the first of photo 5: only their sum is determined.
     let (photo, own) = (layout.retained_range(5).start, layout.retained_range(camera).start + 1);
     for row in 0..dense.right.len() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
@@ -631,7 +631,7 @@ fn what_the_equations_do_not_determine_is_named() {
     let mut dense = block(1, 12, 0);
     let layout = dense.layout.clone();
     dense.prior.weight[layout.retained_range(3)].fill(0.0);
-    // Photo 3 turns about one unknown as about another: only their sum is determined.
+    // Two unknowns of photo 3 have equal columns: only their sum is determined.
     let range = layout.retained_range(3);
     for row in 0..dense.right.len() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
@@ -724,7 +724,7 @@ fn slices_of_other_lengths_are_refused() {
 
 #[test]
 fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
-    // A chain of twenty photos: the first and the last have no point in common.
+    // Chain of twenty photos: the first and the last are not connected by a point.
     let dense = block(1, 20, 0);
     let count = dense.layout.unknowns();
     let inverse =
@@ -748,7 +748,7 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
         assert_close(*value, inverse[(i, j)], 1e-9 * scale, "pair");
     }
     assert_eq!(with_pair.cofactors.pairs.len(), 36);
-    // The inverse of a system in which the photos of a point are not coupled.
+    // Inverse of a system without coupling between the photos of a point.
     let count = dense.layout.groups();
     let groups: Vec<u32> = (0..count).map(|group| dense.layout.retained_of(group) as u32).collect();
     let apart = Dense::new(Layout::new(2, 3, &[6; 20], (0..=count).collect(), groups).unwrap(), 3);
@@ -761,7 +761,7 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     assert!(matches!(refused, Err(LayoutError::Block { .. })));
 }
 
-/// Two points at one height, and nothing else that joins two photos: a tie alone holds a network together.
+/// A network connected only by constraints, such as two points of equal height.
 #[test]
 fn ties_alone_are_a_system() {
     let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();

@@ -1,4 +1,4 @@
-//! Observations beside images: every kind in one close-range network against dense algebra, scale from one distance, refusals.
+//! Additional observations: every type in one close-range network against dense algebra, scale from one distance, errors.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -29,12 +29,12 @@ const PHOTOS: usize = 5;
 const POINTS: usize = 14;
 const FREE: [f64; 3] = [f64::INFINITY; 3];
 
-/// A number between -1 and 1 for each index, the same on every machine.
+/// Returns a reproducible number between -1 and 1 for each index.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
-/// Point 9 is above point 8, and points 10 to 12 are on a line.
+/// Point 9 is above point 8, and points 10 to 12 are collinear.
 fn place(k: usize) -> [f64; 3] {
     let along = |from: usize, way: [f64; 3]| [0, 1, 2].map(|i| place(from)[i] + way[i]);
     match k {
@@ -45,7 +45,7 @@ fn place(k: usize) -> [f64; 3] {
     }
 }
 
-/// Photos in an arc of 5 m about the object, looking at its middle.
+/// Returns photos in an arc of 5 m about the object, towards its centre.
 fn pose(k: usize) -> [f64; 6] {
     let turn = 0.5 * (k as f64 - 2.0);
     let back = Vector3::new(turn.sin(), -turn.cos(), 0.3 + 0.1 * noise(k)).normalize();
@@ -66,7 +66,7 @@ fn position(pose: &[f64; 6]) -> Vector3 {
     Vector3::new(pose[0], pose[1], pose[2])
 }
 
-/// A full covariance matrix of components with the given standard deviations.
+/// Returns a full covariance matrix of components with the given standard deviations.
 fn covariance(sd: &[f64]) -> Precision {
     let n = sd.len();
     let entry = |i: usize, j: usize| sd[i] * sd[j] * if i == j { 1.0 } else { 0.3 * noise(11 * (i + j)) };
@@ -77,7 +77,7 @@ fn sd(values: &[f64]) -> Precision {
     Precision::Deviations(values.to_vec())
 }
 
-/// Points on all photos, nothing else observed, all points and photos free.
+/// Returns a network of image observations of all points on all photos, with free points and photos.
 fn images_alone() -> Network {
     let mut images = vec![];
     for point in 0..POINTS {
@@ -121,7 +121,7 @@ fn distance(a: usize, b: usize) -> Observation {
     Distance { points: [a, b], length, sd: 1e-3, instrument: None }.into()
 }
 
-/// Every kind at once.
+/// Returns a network with all types of observations.
 fn network() -> Network {
     let mut network = images_alone();
     network.points[2] = Point { coordinates: place(2), sd: [0.002, 0.0, 0.003] };
@@ -196,7 +196,7 @@ fn network() -> Network {
     network
 }
 
-/// Common unknowns as they are drawn: numbers of the same in [`Network::commons`].
+/// Indices of the shared parameters in [`Network::commons`], as drawn.
 const LEVER_ARM: usize = 0;
 const SHIFT: usize = 1;
 const DRIFT: usize = 2;
@@ -207,14 +207,14 @@ const PLUMB_LINE: usize = 6;
 const LINE: usize = 7;
 const PLANE: usize = 8;
 const SENSOR: usize = 9;
-/// Photos on frames; that of the last has no images itself.
+/// Photos on frames; the last frame is not observed.
 const MOUNTED: [usize; 3] = [5, 6, 8];
 const FRAMES: [usize; 3] = [0, 1, 7];
-/// Those that a network without trajectories has.
+/// Number of types in a network without trajectories.
 const KINDS: usize = 10;
 const ALL: usize = 9;
 
-/// What a common unknown is, without errors.
+/// Returns the true value of a shared parameter.
 fn truth(common: usize) -> Pose {
     let position = match CommonKind::ALL[common] {
         CommonKind::LeverArm => [0.1, -0.3, 0.2],
@@ -242,7 +242,7 @@ fn truth(common: usize) -> Pose {
     Pose { position: position.into(), attitude }
 }
 
-/// The pose of a photo, on a frame or not.
+/// Returns the pose of a photo, on a frame or independent.
 fn seen(photo: usize) -> Pose {
     let own = |k: usize| Pose { position: position(&pose(k)), attitude: attitude(&pose(k)) };
     match MOUNTED.iter().position(|&mounted| mounted == photo) {
@@ -257,13 +257,13 @@ fn seen(photo: usize) -> Pose {
     }
 }
 
-/// The image of a point without errors.
+/// Returns the error-free image of a point.
 fn imaged(photo: usize, point: usize) -> [f64; 2] {
     let u = seen(photo).sight(&place(point).into());
     [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2])
 }
 
-/// Adds a rig, common unknowns of all types, and what is observed of them.
+/// Adds a rig, shared parameters of all types, and observations of them.
 fn with_commons(network: &mut Network) {
     let free = network.photos[0];
     for k in PHOTOS..ALL {
@@ -393,12 +393,12 @@ fn adjusted(network: &Network) -> Solution {
     solution
 }
 
-/// The equations once more, in complex numbers: vectors and matrices as arrays.
+/// Independent implementation of the equations in complex numbers: vectors and matrices as arrays.
 mod dense {
     use super::*;
 
     type V = [C; 3];
-    /// Columns.
+    /// Matrix as columns.
     type M = [V; 3];
 
     fn vector(v: &Vector3) -> V {
@@ -425,7 +425,7 @@ mod dense {
         std::array::from_fn(|k| a[k] - b[k])
     }
 
-    /// Turns the axes about one of them.
+    /// Returns the rotation of the axes about one of them.
     fn about(axis: usize, angle: C) -> M {
         let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut m = [[C::from(0.0); 3]; 3];
@@ -434,16 +434,16 @@ mod dense {
         m
     }
 
-    /// The rotation vector of a matrix that turns by little.
+    /// Returns the rotation vector of a small rotation.
     fn logarithm(r: &M) -> V {
         let w = [r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]].map(|value| value / 2.0);
-        // asin s / s in powers of s^2: the function itself would lose the imaginary part.
+        // asin s / s in powers of s^2: the library function would lose the imaginary part.
         let square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
         let factor = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0)));
         w.map(|value| value * factor)
     }
 
-    /// Exp of a rotation vector of less than a radian or so, in powers of its square: at zero, too.
+    /// Returns Exp of a rotation vector below about one radian, as a power series in its square, also valid at zero.
     fn exponential(r: &V) -> M {
         let square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
         let series = |first: f64| {
@@ -460,12 +460,12 @@ mod dense {
         })
     }
 
-    /// What is computed for all observations, in this order: images, held components, the others.
+    /// Dense equations of all observations, in this order: images, weighted components, others.
     pub struct Dense<'a> {
         pub network: &'a Network,
-        /// Covariance of everything that is observed.
+        /// Covariance of all observations.
         pub s: Mat<f64>,
-        /// The unknowns that are not fixed: those of points, then of photos, then common ones.
+        /// Free and weighted unknowns: points, then photos, then shared parameters.
         pub free: Vec<usize>,
     }
 
@@ -504,13 +504,13 @@ mod dense {
             Self { network, s, free }
         }
 
-        /// Where the unknowns of a common one start.
+        /// Returns the index of the first unknown of a shared parameter.
         pub fn first(&self, common: usize) -> usize {
             let before = self.network.commons[..common].iter().map(|common| common.sd.len());
             3 * self.network.points.len() + 6 * self.network.photos.len() + before.sum::<usize>()
         }
 
-        /// The unknown offsets of a common unknown, its position and its rotation.
+        /// Returns the unknown offsets of a shared parameter, its position and its rotation.
         fn common(&self, x: &[C], i: usize) -> (V, V, M) {
             let own = &self.network.commons[i];
             let mut six = [C::from(0.0); 6];
@@ -523,7 +523,7 @@ mod dense {
             ([a, b, c], position, turned)
         }
 
-        /// The pose of a photo.
+        /// Returns the pose of a photo.
         pub fn photo(&self, x: &[C], i: usize) -> (V, M) {
             let own = |i: usize| -> (V, M) {
                 let own = &x[3 * self.network.points.len() + 6 * i..][..6];
@@ -541,7 +541,7 @@ mod dense {
             (std::array::from_fn(|k| centre[k] + arm[k]), product(&a, &turn))
         }
 
-        /// Observed minus computed.
+        /// Returns observed minus computed.
         pub fn residuals(&self, x: &[C]) -> Vec<C> {
             let point = |i: usize| -> V { std::array::from_fn(|k| x[3 * i + k]) };
             let photo = |i: usize| self.photo(x, i);
@@ -648,7 +648,7 @@ mod dense {
             all
         }
 
-        /// Residuals, and partials of the computed by complex steps.
+        /// Returns the residuals, and the partials of the computed values by complex steps.
         pub fn linearized(&self, x: &[f64]) -> (Mat<f64>, Mat<f64>) {
             const STEP: f64 = 1e-100;
             let at: Vec<C> = x.iter().map(|&value| C::from(value)).collect();
@@ -665,7 +665,7 @@ mod dense {
         }
     }
 
-    /// Components of points that are weighted: unknown, value and standard deviation.
+    /// Returns the weighted components of points: unknown, value and standard deviation.
     fn held(network: &Network) -> impl Iterator<Item = (usize, f64, f64)> {
         let each = |(i, point): (usize, &Point)| {
             let Point { coordinates, sd } = *point;
@@ -675,7 +675,7 @@ mod dense {
         all.filter(|&(_, _, sd)| sd > 0.0 && sd.is_finite())
     }
 
-    /// Common unknowns that are weighted: which, its unknown and its standard deviation.
+    /// Returns the weighted shared parameters: index, component and standard deviation.
     pub fn held_commons(network: &Network) -> impl Iterator<Item = (usize, usize, f64)> {
         let each = |(i, common): (usize, &Common)| {
             let sd = common.sd.clone();
@@ -690,7 +690,7 @@ mod dense {
     }
 }
 
-/// All unknowns of a solution: points, then photos, then common ones.
+/// Returns all unknowns of a solution: points, then photos, then shared parameters.
 fn unknowns(solution: &Solution) -> Vec<f64> {
     let points = solution.points.iter().flat_map(|point| point.expect("takes part").coordinates);
     let photos = points.chain(solution.photos.iter().flat_map(|photo| photo.pose));
@@ -709,7 +709,7 @@ fn every_kind_agrees_with_dense_algebra() {
     let dense = dense::Dense::new(&network);
     let weights = dense.s.llt(Side::Lower).unwrap().inverse();
 
-    // From the solution a step of the dense adjustment is nothing.
+    // At the solution a step of the dense adjustment is zero.
     let x = unknowns(&solution);
     let (v, a) = dense.linearized(&x);
     let normal = (a.transpose() * &weights * &a).llt(Side::Lower).unwrap();
@@ -720,7 +720,7 @@ fn every_kind_agrees_with_dense_algebra() {
         dense.free.iter().enumerate().for_each(|(j, &column)| cofactors[(row, column)] = q[(i, j)]);
     }
 
-    // Cofactors.
+    // Cofactors of points, photos and shared parameters.
     let block = |first: usize, found: &[f64], n: usize| {
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let scale = (cofactors[(first + i, first + i)] * cofactors[(first + j, first + j)]).sqrt();
@@ -735,7 +735,7 @@ fn every_kind_agrees_with_dense_algebra() {
     for (i, photo) in solution.photos.iter().enumerate().filter(|(i, _)| !MOUNTED.contains(i)) {
         block(3 * POINTS + 6 * i, photo.cofactors.as_slice(), 6);
     }
-    // Of common unknowns rotations are those about the own axes; of photos on frames they are in angles.
+    // Rotations of shared parameters are about their own axes; rotations of photos on frames are in angles.
     let compare = |by_unknowns: &nalgebra::DMatrix<f64>, found: &nalgebra::DMatrix<f64>| {
         let all = nalgebra::DMatrix::from_fn(x.len(), x.len(), |i, j| cofactors[(i, j)]);
         let expected = by_unknowns * all * by_unknowns.transpose();
@@ -753,7 +753,7 @@ fn every_kind_agrees_with_dense_algebra() {
                 None => offset[component] = change,
             }
         }
-        // Offsets of lines and planes are along axes that turn.
+        // Offsets of lines and planes refer to rotating axes.
         let turning = matches!(kind, CommonKind::Line | CommonKind::Plane);
         let turns = geometry::angle_axis_with_jacobian(&r).1.transpose();
         let mut steps = nalgebra::DMatrix::zeros(common.change.len(), x.len());
@@ -834,7 +834,7 @@ fn every_kind_agrees_with_dense_algebra() {
     }
     assert_eq!(row, v.nrows());
 
-    // Sums.
+    // Sums of redundancy numbers and of squares.
     let freedom = (v.nrows() - dense.free.len()) as i64;
     assert_eq!(solution.degrees_of_freedom, freedom);
     total += solution.images.iter().flat_map(|image| image.unwrap().redundancy).sum::<f64>();
@@ -845,7 +845,7 @@ fn every_kind_agrees_with_dense_algebra() {
     close(solution.sums_of_squares.total(), square, square, 1e-9, "sum of squares");
     close(solution.variance_of_unit_weight.unwrap(), square / freedom as f64, 1.0, 1e-9, "variance");
     let names: Vec<&str> = solution.kinds(&network).iter().map(|sums| sums.kind).collect();
-    // Those that follow are of trajectories, and of cameras.
+    // The remaining types belong to trajectories and cameras.
     let kinds = photocore::network::observations::KINDS.iter().copied();
     assert_eq!(names, kinds.take_while(|&kind| kind != "velocity").collect::<Vec<&str>>());
     let counts: Vec<[usize; 2]> =
@@ -889,7 +889,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert!(weights.iter().any(|&weight| weight < 1.0), "{weights:?}");
 }
 
-/// The first photo is fixed, scale comes from a distance of the given length between points 3 and 4.
+/// Returns a network with a fixed first photo, scaled by a distance of the given length between points 3 and 4.
 fn scaled(length: f64) -> Network {
     let mut network = images_alone();
     network.photos[0].sd = [0.0; 6];
@@ -913,7 +913,7 @@ fn one_distance_gives_the_scale() {
         let adjusted = (from_centre(solution, 3) - from_centre(solution, 4)).norm();
         assert!((adjusted - length).abs() < 1e-9);
         assert!(own.redundancy[0].abs() < 1e-8 && own.standardized[0].is_nan(), "{own:?}");
-        // Two for each image, and the length; less three for each point and six for each photo but one.
+        // Two equations per image observation, and the length; minus three per point and six per photo except one.
         let freedom = 2 * PHOTOS * POINTS + 1 - 3 * POINTS - 6 * (PHOTOS - 1);
         assert_eq!(solution.degrees_of_freedom, freedom as i64);
     }
@@ -937,7 +937,7 @@ fn a_free_network_with_a_scale_holds_six_unknowns() {
 
 #[test]
 fn points_that_nothing_else_holds_are_named() {
-    // Photos are known, a point lies on the ray of the only photo that counts for it: another photo, the same ray.
+    // Fixed photos, and a point on the ray of its only valid photo: a second photo with the same ray.
     let mut network = images_alone();
     network.photos.iter_mut().enumerate().for_each(|(k, photo)| {
         (photo.pose, photo.sd) = (pose(k), [0.0; 6]);
@@ -956,7 +956,7 @@ fn points_that_nothing_else_holds_are_named() {
     let refused = adjust_with(&network, &Options::default(), 1).err();
     let (index, kind, fault) = (1, "equal height", Fault::Twice);
     assert_eq!(refused, Some(NetworkError::Observation { index, kind, fault }));
-    // Across the ray of a photo that looks along Y nothing is said by a difference in X.
+    // A difference in X determines the point along its ray, unless the photo looks along Y.
     let components = [Some(difference(0, 1)[0]), None, None];
     network.observations = vec![Difference { points: [0, 1], components, precision: sd(&[0.01]) }.into()];
     let solved = adjust_with(&network, &Options::default(), 1);

@@ -1,4 +1,4 @@
-//! Work is done by the threads of the threads that it is given: none of those that the process has in common is ever started.
+//! Computations use the given thread pool: the global pool of the process is never started.
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -19,7 +19,7 @@ use photocore::programs::stellar::{self, COMMON, Decentering, Form, Kind, Star, 
 
 const SPACE: ObjectSpace = ObjectSpace::Rectangular;
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
-/// More than all numbers from which on several threads are put to work.
+/// Number larger than all thresholds for parallel execution.
 const MANY: usize = 10_500;
 const FREE: f64 = f64::INFINITY;
 
@@ -27,17 +27,17 @@ fn go(_: Event) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Numbers in [-1, 1) without a generator.
+/// Returns deterministic numbers in [-1, 1).
 fn noise(index: usize) -> f64 {
     2.0 * ((index as f64 + 1.0) * 0.618_033_988_749_895).fract() - 1.0
 }
 
-/// A place in a grid of a hundred columns, counted from its corner.
+/// Returns a position in a grid of a hundred columns, relative to its corner.
 fn grid(index: usize) -> [f64; 2] {
     [(index % 100) as f64, (index / 100) as f64]
 }
 
-/// Strips of photos whose positions are observed, 26 in each, and two points beside a station.
+/// Returns strips of 26 photos with observed positions, and two points close to a station.
 fn block(strips: usize, points: usize) -> Network {
     let station = |i: usize| [300.0 * (i % 26) as f64, 300.0 * (i / 26) as f64, 1500.0];
     let mut places: Vec<[f64; 3]> =

@@ -1,4 +1,4 @@
-//! Systems cut into the nodes of a tree (Helmert blocking) against the same in one piece.
+//! Systems partitioned into the nodes of a tree (Helmert blocking) compared with the unpartitioned systems.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -14,7 +14,7 @@ use photocore::normals::{
 };
 use proptest::prelude::*;
 
-/// Numbers between -1 and 1 that a seed and two places give.
+/// Returns a number between -1 and 1, determined by a seed and two indices.
 fn number(seed: u64, i: usize, j: usize) -> f64 {
     let mut state = seed
         ^ (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -25,7 +25,7 @@ fn number(seed: u64, i: usize, j: usize) -> f64 {
     (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// The equations of a system, or of a node of it: local blocks, groups, ties and retained blocks as the whole system numbers them.
+/// Equations of a system or of one node: local blocks, observations, constraints and retained blocks have the numbers of the whole system.
 struct Piece<'a> {
     seed: u64,
     layout: Layout,
@@ -38,7 +38,7 @@ struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// The coefficients of blocks of unknowns, each with its number in the whole system.
+    /// Fills the coefficients of parameter blocks, each given by its number in the whole system.
     fn fill(&self, row: usize, target: &mut [f64], blocks: impl Iterator<Item = (usize, usize)>) {
         let columns = blocks.flat_map(|(block, dim)| (0..dim).map(move |k| 16 * block + k));
         target.iter_mut().zip(columns).for_each(|(value, column)| *value = number(self.seed, row, column));
@@ -82,7 +82,7 @@ impl Equations for Piece<'_> {
     }
 }
 
-/// A system in one piece.
+/// Returns an unpartitioned system.
 fn whole(layout: Layout, seed: u64) -> Piece<'static> {
     let unknowns = layout.unknowns();
     let weight: Vec<f64> = (0..unknowns).map(|i| 0.5 + 0.4 * number(seed, i, 11)).collect();
@@ -99,7 +99,7 @@ fn whole(layout: Layout, seed: u64) -> Piece<'static> {
     }
 }
 
-/// The retained blocks that each local block, then each tie, touches.
+/// Returns the retained blocks of each local block, then of each constraint.
 fn touched(layout: &Layout) -> Vec<Vec<usize>> {
     let of_local = |local| {
         let blocks: BTreeSet<usize> =
@@ -110,7 +110,7 @@ fn touched(layout: &Layout) -> Vec<Vec<usize>> {
     (0..layout.locals()).map(of_local).chain(ties).collect()
 }
 
-/// Node `p` of a system that is cut.
+/// Returns node `p` of a partitioned system.
 fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     let layout = &all.layout;
     let retained = cut.blocks(p);
@@ -164,7 +164,7 @@ fn done<T, E: Debug>(result: Result<T, E>) -> T {
     result.unwrap()
 }
 
-/// Every node of a tree, formed and eliminated from the leaves up.
+/// Forms and eliminates all nodes of a tree from the leaves up.
 fn upward<'a>(
     all: &Piece<'_>,
     cut: &Cut,
@@ -195,19 +195,19 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((actual - expected).abs() <= tolerance, "{what}: {actual:e} instead of {expected:e}");
 }
 
-/// The unknowns of a node as the whole system numbers them.
+/// Returns the unknowns of a node as numbered by the whole system.
 fn unknowns_of(all: &Piece<'_>, piece: &Piece<'_>) -> Vec<usize> {
     let locals = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
     locals.chain(piece.retained.iter().flat_map(|&block| all.layout.retained_range(block))).collect()
 }
 
-/// Right-hand sides at a time: more than go through the elimination of local blocks together.
+/// Number of right-hand sides: more than the elimination of local blocks processes together.
 const COLUMNS: usize = 9;
 
-/// What nodes are given, are over and were factored to.
+/// Equations, system and factor of each node.
 type Nodes<'a> = Vec<(Piece<'a>, System, Factor)>;
 
-/// Right-hand sides reduced from the leaves up, and the sum of their products.
+/// Returns right-hand sides reduced from the leaves up, and the sum of their products.
 fn reduced(
     rights: &[f64],
     (all, cut, nodes): (&Piece<'_>, &Cut, &Nodes<'_>),
@@ -236,7 +236,7 @@ fn reduced(
     (found, products)
 }
 
-/// Right-hand sides that go up and down again through a system that is cut against those of one piece.
+/// Compares forward and back substitution through a partitioned system with the unpartitioned one.
 fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let (system, count) = (System::new(all.layout.clone(), ordering).unwrap(), all.layout.unknowns());
     let rights: Vec<f64> = (0..COLUMNS * count).map(|i| number(all.seed, i, 17)).collect();
@@ -268,7 +268,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
     }
 }
 
-/// The chord to equations elsewhere, of a system that is cut against that of one piece.
+/// Compares the chord step with other equations between partitioned and unpartitioned systems.
 fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let elsewhere = whole(all.layout.clone(), all.seed.wrapping_add(1));
     let system = System::new(all.layout.clone(), ordering).unwrap();
@@ -306,7 +306,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     }
 }
 
-/// Solution, sums and cofactors of a system that is cut against those of one piece.
+/// Compares solution, sums and cofactors of a partitioned system with the unpartitioned one.
 fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
     let threads = threads(2);
     let cut = Cut::new(tree, &touched(&layout), node_of);
@@ -384,7 +384,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
 const ALL: [Ordering; 4] =
     [Ordering::Auto, Ordering::Input, Ordering::MinimumDegree, Ordering::DissectionByGraph];
 
-/// Systems of local blocks on one to three of some main blocks, with common ones and ties.
+/// Systems of local blocks on one to three of some main blocks, with common blocks and constraints.
 fn systems() -> impl Strategy<Value = (Layout, u64)> {
     let shape = (1..4usize, prop::collection::vec(1..8usize, 4..16), 0..3u32);
     let of_shape = |(l, retained, common): (usize, Vec<usize>, u32)| {
@@ -425,7 +425,7 @@ proptest! {
     }
 }
 
-/// A block of strips, with a camera for every strip.
+/// Returns a block of strips, with a camera for every strip.
 fn strips(count: usize, length: usize) -> Layout {
     let (mut ptr, mut retained, mut shared_ptr, mut further) = (vec![0], vec![], vec![0], vec![]);
     for strip in 0..count {
@@ -450,7 +450,7 @@ fn strips(count: usize, length: usize) -> Layout {
 fn a_block_with_cameras_in_seven_nodes_agrees_with_one_piece() {
     let (count, length) = (5, 24);
     let layout = strips(count, length);
-    // Four leaves across the strips; what they share goes up.
+    // Four leaves across the strips; shared blocks move up.
     let node_of = (0..count * length).map(|photo| [0, 1, 3, 4][4 * (photo % length) / length]);
     let node_of: Vec<usize> = node_of.chain([6; 5]).collect();
     compare(

@@ -1,5 +1,5 @@
-//! Refraction: partials against complex steps of an independent implementation, rays against Snell's law, the figures of the
-//! GIANT guide and of the standard atmosphere.
+//! Refraction: partials against complex steps of an independent implementation, rays against Snell's law, values of the GIANT guide and of
+//! the standard atmosphere.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 const WGS84: (f64, f64) = (6_378_137.0, 6_356_752.314_245_179);
 
-/// Refraction once more, for complex arguments: heights in metres, positions in the local frame of the camera.
+/// Independent implementation of refraction for complex arguments: heights in metres, positions in the local frame of the camera.
 mod bent {
     use super::{C, forward};
 
@@ -21,7 +21,7 @@ mod bent {
         13e-6 * (station - point) / 1e3 * (1.0 - 0.02e-3 * (2.0 * station + point))
     }
 
-    /// Pressure and density relative to sea level up to 32 km, by the formulas and constants of the handbooks.
+    /// Returns pressure and density relative to sea level up to 32 km, by handbook formulas and constants.
     fn standard_air(z: C) -> (C, C) {
         let pressure = if z.re < 11e3 {
             (1.0 - 0.0065 * z / 288.15).powf(5.255_876_113_278_518)
@@ -45,18 +45,18 @@ mod bent {
         (pressure, pressure * 288.15 / temperature)
     }
 
-    /// Saastamoinen's form.
+    /// Returns K_a in Saastamoinen's form.
     pub fn air_standard(station: C, point: C) -> C {
         let (low, high) = (standard_air(point), standard_air(station));
         277e-6 * (288.15 / 0.034_163_194_736_310_36 * (low.0 - high.0) / (station - point) - high.1)
     }
 
-    /// The apparent depth by Fermat's principle: the ray from `height` above the water to `depth` below it, `across` away,
-    /// meets the surface where its optical length is least.
+    /// Returns the apparent depth by Fermat's principle. The ray from `height` above the water to `depth` below it, `across` away, crosses
+    /// the surface at the minimum of the optical length.
     pub fn apparent_depth(across: C, height: C, depth: C, n: f64) -> C {
         let sine = |a: C, b: C| a / (a * a + b * b).sqrt();
         let slope = |a: C, b: C| b * b / (a * a + b * b).powf(1.5);
-        // The optical length is convex in the place; bisection first, for Newton converges only near the root.
+        // The optical length is convex; bisection precedes Newton's method, which converges only near the root.
         let (mut low, mut high) = (0.0, across.re);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
@@ -68,17 +68,17 @@ mod bent {
             let value = sine(place, height) - n * sine(across - place, depth);
             place -= value / (slope(place, height) + n * slope(across - place, depth));
         }
-        // The air ray goes on straight to below the point.
+        // The ray in air is extended to the vertical of the point.
         height * (across - place) / place
     }
 
-    /// The depth of a point, rounded off at the surface.
+    /// Returns the depth of a point, smoothed at the surface.
     fn rounded(depth: C, height: C) -> C {
         let shore = 3e-5 * height;
         if depth.re >= shore.re { depth } else { (depth + shore) * (depth + shore) / (4.0 * shore) }
     }
 
-    /// The point in the local frame of the camera, as seen.
+    /// Returns the apparent point in the local frame of the camera.
     pub fn seen(case: &super::Case, position: [C; 3], point: [C; 3]) -> [C; 3] {
         let heights = [position[2], point[2]].map(|height| case.metres * (height + case.datum));
         let k_air = match case.air {
@@ -105,7 +105,7 @@ mod bent {
                 k_water = ((height + depth) / (height + shallow) - 1.0) / (1.0 + tangent * tangent);
             }
             Some(super::WaterModel::Snell) => {
-                // Up at the point is where its height grows.
+                // Up at the point is the direction of increasing height.
                 let camera = forward::local(case.spheroid, point, position);
                 let across = case.metres * (camera[0] * camera[0] + camera[1] * camera[1]).sqrt();
                 let height = case.metres * camera[2] - depth;
@@ -121,8 +121,8 @@ mod bent {
     }
 }
 
-/// A photo and a point below it: in rectangular space when `spheroid` is None. Lengths in units of `metres`, the third
-/// coordinate counted from `datum`.
+/// Photo and a point below it, in rectangular space without `spheroid`. Lengths are in units of `metres`, the third coordinate is relative
+/// to `datum`.
 #[derive(Debug, Clone)]
 struct Case {
     spheroid: Option<(f64, f64)>,
@@ -171,13 +171,13 @@ prop_compose! {
     ) -> Case {
         let (geographic, to_ground, positive, feet) = switches;
         let metres = if feet { 0.3048 } else { 1.0 };
-        // Nearer than this, roundings of geocentric coordinates (1e-9 m) exceed the tolerance.
+        // At smaller distances the rounding of geocentric coordinates (1e-9 m) exceeds the tolerance.
         let flying_height = if geographic { flying_height.max(1000.0) } else { flying_height };
         let spheroid = geographic.then_some((WGS84.0 / metres, WGS84.1 / metres));
         let datum = if geographic { 0.0 } else { datum };
         let scale = if geographic { flying_height / 6.4e6 } else { flying_height / metres };
         let start = if geographic { [PI * unit[0], 1.2 * unit[1]] } else { [1e5 * unit[0], 1e5 * unit[1]] };
-        // Half of the points are near the surface, where the depth is rounded off.
+        // Half of the points are near the surface, within the smoothed depth.
         let depth = shore.map_or(depth, |part| 3e-5 * flying_height * part);
         let height = |above: f64| (level + above) / metres - datum;
         Case {
@@ -221,7 +221,7 @@ proptest! {
         };
         let expected = project(unknowns.map(C::from));
         for (computed, expected) in projection.xy.iter().zip(expected) {
-            // Roundings of 1e-9 m of geocentric coordinates, seen from the distance of the point.
+            // Rounding of 1e-9 m of geocentric coordinates, at the distance of the point.
             let drop = case.metres * (case.position[2] - case.point[2]);
             let tolerance = 1e-10 + 1e-8 * 152.74 / drop * (1.0 + computed.abs() / 152.74).powi(2);
             prop_assert!((computed - expected.re).abs() <= tolerance, "{computed} {expected}");
@@ -243,11 +243,11 @@ proptest! {
         let water = Water::new(WaterModel::Snell, 0.0, index).unwrap();
         let lift = lift_of(&Refraction { air: None, water: Some(water), metres_per_unit: 1.0, datum: 0.0 },
             [0.0, 0.0, height], [across, 0.0, -depth]);
-        // The camera sees the lifted point straight on: the ray meets the surface on that line.
+        // The line from the camera to the lifted point crosses the surface at the refraction point.
         let surface = across * height / (height + depth - lift[2]);
         let (above, below) = (surface.hypot(height), (across - surface).hypot(depth));
         prop_assert!((surface / above - index * (across - surface) / below).abs() <= 1e-9);
-        // Any other place of passage makes the way optically longer.
+        // Any other crossing point increases the optical length.
         let optical = |x: f64| x.hypot(height) + index * (across - x).hypot(depth);
         for other in [0.99 * surface, 0.9 * surface + 0.1 * across] {
             prop_assert!(optical(other) >= optical(surface) * (1.0 - 1e-15));
@@ -256,7 +256,7 @@ proptest! {
     }
 }
 
-/// The lift of a point in rectangular space.
+/// Returns the lift of a point in rectangular space.
 fn lift_of(refraction: &Refraction, station: [f64; 3], point: [f64; 3]) -> [f64; 3] {
     let space = ObjectSpace::Rectangular;
     let photo = View::new(space, RotationSense::GroundToPhoto, station, [0.0; 3], -152.74);
@@ -268,7 +268,7 @@ fn air_only(model: AirModel) -> Refraction {
     Refraction { air: Some(model), water: None, metres_per_unit: 1.0, datum: 0.0 }
 }
 
-/// K_a from the lift at nadir, in microradians.
+/// Returns K_a from the lift at nadir, in microradians.
 fn microradians(model: AirModel, station: f64, point: f64) -> f64 {
     1e6 * lift_of(&air_only(model), [0.0, 0.0, station], [0.0, 0.0, point])[2] / (station - point)
 }
@@ -305,7 +305,7 @@ fn the_air_is_that_of_the_standard_atmosphere() {
 
 #[test]
 fn the_standard_model_is_that_of_saastamoinen() {
-    // Manual of Photogrammetry: valid below 11 km; its constants have four digits, and so does what they give.
+    // Manual of Photogrammetry: valid below 11 km; its constants, and therefore its results, have four digits.
     let manual = |station: f64, point: f64| {
         let at = |height: f64, power: f64| (1.0 - 0.02257 * height / 1e3).powf(power);
         2335.0 / (station - point) * 1e3 * (at(point, 5.256) - at(station, 5.256))
@@ -335,7 +335,7 @@ fn what_no_model_covers_is_left_alone() {
     for model in [WaterModel::Giant, WaterModel::Snell] {
         let water = Water::new(model, 10.0, 1.34).unwrap();
         let refraction = Refraction { air: None, water: Some(water), metres_per_unit: 1.0, datum: 0.0 };
-        // Above the water, and a camera in it.
+        // A point above the water, and a camera below its level.
         assert_eq!(lift_of(&refraction, [0.0, 0.0, 100.0], [50.0, 0.0, 10.003]), [0.0; 3]);
         assert!(lift_of(&refraction, [0.0, 0.0, 100.0], [50.0, 0.0, 10.0])[2] < 2.5e-4);
         assert_eq!(lift_of(&refraction, [0.0, 0.0, 9.0], [50.0, 0.0, 5.0]), [0.0; 3]);

@@ -4,7 +4,7 @@ use photocore::geometry::{Matrix3, Pose, Vector3, rotation};
 use photocore::programs::relative_orientation::{five_points, over_plane, relative_orientation};
 use proptest::prelude::*;
 
-/// Uniform in -1 to 1, the same in every run (Numerical Recipes' quick generator).
+/// Uniform generator in -1 to 1, reproducible (Numerical Recipes' quick generator).
 struct Random(u32);
 
 impl Random {

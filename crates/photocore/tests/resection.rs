@@ -20,7 +20,7 @@ const STRICT: Options = Options {
     threads: 0,
 };
 
-/// Numbers in [-1, 1) without a generator.
+/// Returns deterministic numbers in [-1, 1).
 fn noise(index: usize) -> f64 {
     let mut state = (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     for shift in [30, 27, 31] {
@@ -37,7 +37,7 @@ fn photo(pose: &Pose) -> View {
     View::new(ObjectSpace::Rectangular, RotationSense::GroundToPhoto, pose.position, pose.attitude, C)
 }
 
-/// Points seen from a pose, with errors of the image coordinates of the given size.
+/// Returns points observed from a pose, with errors of the image coordinates of the given size.
 fn resection(pose: &Pose, points: &[[f64; 3]], error: f64) -> Resection {
     let photo = photo(pose);
     let control = |(index, &coordinates): (usize, &[f64; 3])| {
@@ -97,7 +97,7 @@ fn three_points_give_every_place_they_are_seen_from() {
         let found = three_points(&rays, &points);
         assert!((1..=4).contains(&found.len()), "case {case}: {} places", found.len());
         for (order, place) in found.iter().enumerate() {
-            // The first one is exact; near the danger cylinder others may be nearly solutions only.
+            // The first solution is exact; near the danger cylinder others may be approximate.
             let least = if order == 0 { 1.0 - 1e-9 } else { 0.95 };
             for (ray, point) in rays.iter().zip(&points) {
                 let u = place.to_photo * (point - place.centre);
@@ -113,7 +113,7 @@ fn three_points_give_every_place_they_are_seen_from() {
 
 #[test]
 fn symmetric_triangles_are_no_exception() {
-    // Isosceles and equilateral, seen from the axis: determinants of the cones vanish.
+    // Isosceles and equilateral triangles seen from the axis: determinants of the cones vanish.
     let root = 3f64.sqrt() / 2.0;
     let points = [[1.0, 0.0, 0.0], [-0.5, root, 0.0], [-0.5, -root, 0.0]].map(Vector3::from);
     for height in [0.5_f64, 1.0, 3.0] {
@@ -124,7 +124,7 @@ fn symmetric_triangles_are_no_exception() {
     }
 }
 
-/// The coefficients of the report as its listing has them (specification, section 3), angles first there.
+/// Returns the coefficients of the report's listing (specification, section 3), which has the angles first.
 fn published(pose: &Pose, point: &[f64; 3], [px, py]: [f64; 2]) -> [[f64; 6]; 2] {
     let [(so, co), (sp, cp), (sk, ck)] = pose.attitude.map(f64::sin_cos);
     let m = rotation(pose.attitude);
@@ -187,7 +187,7 @@ fn the_rule_of_the_report_takes_full_steps_until_the_position_moves_little() {
     let steps: Vec<f64> = solution.history.windows(2).map(|pair| apart(&pair[1], &pair[0])).collect();
     let (last, before) = steps.split_last().unwrap();
     assert!(*last < 1e-3 && before.iter().all(|step| *step >= 1e-3), "{steps:?}");
-    // The fixed point is that of the report, A^T L = 0 with its own A: near least squares, but not there.
+    // The fixed point is the report's, A^T L = 0 with its own A: close to least squares, but different.
     let strict = adjust(&resection(&POSE, &POINTS, 0.02), &STRICT).unwrap();
     let size = apart(&solution.pose, &strict.pose);
     assert!(size > 1e-5 && size < 0.05, "{size}");
@@ -218,7 +218,7 @@ fn degenerate_configurations_are_named() {
 
 #[test]
 fn poses_that_fit_as_well_are_told() {
-    // Over the middle of a triangle three points have four solutions.
+    // Above the centre of a triangle three points have four solutions.
     let circle = [0.0f64, 1.8, 3.9].map(|t| [100.0 * t.cos(), 100.0 * t.sin(), 0.0]);
     let pose = Pose { position: [0.0, 0.0, 300.0], attitude: [0.02, 0.03, 0.2] };
     let solution = adjust(&resection(&pose, &circle, 0.0), &STRICT).unwrap();
@@ -231,7 +231,7 @@ fn poses_that_fit_as_well_are_told() {
 
 #[test]
 fn points_behind_the_camera_are_told_and_no_start_of_our_own_ends_there() {
-    // Below the points and looking up where they were seen from above: the equations hold.
+    // Below the points and looking up, with images from above: the equations are satisfied.
     let mut start = POSE;
     start.position[2] = -900.0;
     let given = Resection { start: Some(start), ..resection(&POSE, &POINTS, 0.0) };

@@ -1,4 +1,4 @@
-//! Cameras with unknown parameters that several photos share, against an adjustment with dense matrices, partials by complex steps.
+//! Shared cameras with unknown parameters, compared with a dense adjustment with partials by complex steps.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,15 +21,15 @@ const PHOTOS: usize = 14;
 const POINTS: usize = 40;
 const IMAGE_SD: f64 = 0.5;
 const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
-/// Two that several photos share, one of one photo, one that is held, one with a principal distance alone, and a backward one.
+/// Two cameras of several photos, one of a single photo, a fixed one, one with only a principal distance, and a backward one.
 const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4, 5, 5, 5];
 
-/// A number between -1 and 1 for each index, the same on every machine.
+/// Returns a reproducible number between -1 and 1 for each index.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
-/// c, xp, yp, K1, K2, K3, P1, P2, b1, b2 and the radius where it is balanced.
+/// c, xp, yp, K1, K2, K3, P1, P2, b1, b2 and the balancing radius.
 const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e-4, -2e-4, 300.0];
 
 fn cameras() -> Vec<Camera> {
@@ -48,7 +48,7 @@ fn cameras() -> Vec<Camera> {
     ]
 }
 
-/// The rotated vector by the exponential series of the cross product.
+/// Returns the rotated vector by the exponential series of the cross product.
 fn turned(w: &[C], v: [C; 3]) -> [C; 3] {
     let cross = |b: [C; 3]| -> [C; 3] {
         std::array::from_fn(|k| w[(k + 1) % 3] * b[(k + 2) % 3] - w[(k + 2) % 3] * b[(k + 1) % 3])
@@ -61,7 +61,7 @@ fn turned(w: &[C], v: [C; 3]) -> [C; 3] {
     sum
 }
 
-/// A measured position as the backward camera corrects it.
+/// Returns a measured position as corrected by the backward camera.
 fn corrected(camera: &[C], measured: [f64; 2]) -> [C; 2] {
     let [xp, yp, k1, k2, k3, p1, p2, b1, b2] = std::array::from_fn(|k| camera[1 + k]);
     let (dx, y) = (measured[0] - xp, measured[1] - yp);
@@ -74,7 +74,7 @@ fn corrected(camera: &[C], measured: [f64; 2]) -> [C; 2] {
     ]
 }
 
-/// Observed minus computed.
+/// Returns observed minus computed.
 fn misclosure(pose: &[C], camera: &[C], point: &[C], measured: [f64; 2]) -> [C; 2] {
     let (computed, observed) = match camera.len() {
         11 => (image(pose, &camera[..1], point), corrected(camera, measured)),
@@ -83,7 +83,7 @@ fn misclosure(pose: &[C], camera: &[C], point: &[C], measured: [f64; 2]) -> [C; 
     [0, 1].map(|k| observed[k] - computed[k])
 }
 
-/// The position whose misclosure is nothing, by steps that shrink with the distortion.
+/// Returns the position with zero misclosure by fixed-point iteration.
 fn exact(pose: &[C], camera: &[C], point: &[C]) -> [f64; 2] {
     let mut measured = [0.0; 2];
     for _ in 0..30 {
@@ -93,7 +93,7 @@ fn exact(pose: &[C], camera: &[C], point: &[C]) -> [f64; 2] {
     measured
 }
 
-/// The image of a point: f or -c, and radial terms or none.
+/// Returns the image of a point: f or -c, with or without radial terms.
 fn image(pose: &[C], camera: &[C], point: &[C]) -> [C; 2] {
     let r = turned(&pose[..3], [point[0], point[1], point[2]]);
     let p = [0, 1].map(|k| -(r[k] + pose[3 + k]) / (r[2] + pose[5]));
@@ -118,7 +118,7 @@ fn complex(values: &[f64]) -> Vec<C> {
     values.iter().map(|&value| C::new(value, 0.0)).collect()
 }
 
-/// Photos around a cloud of points, of which the first are observed, and two lengths: the points at their ends are kept.
+/// Returns photos around a cloud of points with weighted first points, and two observed lengths: their end points are retained.
 fn network() -> Network {
     let cameras = cameras();
     let mut images = Vec::new();
@@ -171,7 +171,7 @@ fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
     network.adjustment(&options(method)).on(&threads).run()
 }
 
-/// The same network with full matrices: poses, parameters of all cameras, points; those that are fixed have an equation of their own.
+/// The same network with full matrices: poses, parameters of all cameras, points; fixed unknowns have a separate equation.
 struct Dense<'a> {
     network: &'a Network,
     first_parameter: Vec<usize>,
@@ -197,7 +197,7 @@ impl<'a> Dense<'a> {
         self.first_point + 3 * point..self.first_point + 3 * point + 3
     }
 
-    /// Values and standard deviations of unknowns that are observed or fixed.
+    /// Returns values and standard deviations of observed or fixed unknowns.
     fn observed(&self) -> (Vec<f64>, Vec<f64>) {
         let Network { photos, cameras, points, .. } = self.network;
         let poses = photos.iter().flat_map(|photo| photo.pose);
@@ -208,7 +208,7 @@ impl<'a> Dense<'a> {
         (values.collect(), sd.chain(points.iter().flat_map(|point| point.sd)).collect())
     }
 
-    /// Observed minus computed and partials, of unit weight: images, lengths, unknowns.
+    /// Returns observed minus computed and partials, for unit weight: images, lengths, unknowns.
     fn equations(&self, x: &[f64]) -> (Mat<f64>, Mat<f64>) {
         const STEP: f64 = 1e-100;
         let Network { images, photos, .. } = self.network;
@@ -227,7 +227,7 @@ impl<'a> Dense<'a> {
                 let (camera, point) = rest.split_at(camera.len());
                 let misclosure = misclosure(pose, camera, point, each.xy);
                 for row in 0..2 {
-                    // What is fixed has its own equation alone.
+                    // A fixed unknown appears only in its own equation.
                     let partial = if sd[column] == 0.0 { 0.0 } else { -misclosure[row].im / STEP };
                     a[(2 * i + row, column)] = partial / IMAGE_SD;
                     left[(2 * i + row, 0)] = misclosure[row].re / IMAGE_SD;
@@ -253,7 +253,7 @@ impl<'a> Dense<'a> {
         (a, left)
     }
 
-    /// Adjusted unknowns and the inverse normal matrix.
+    /// Returns the adjusted unknowns and the inverse normal matrix.
     fn adjust(&self) -> (Vec<f64>, Mat<f64>) {
         let (mut x, _) = self.observed();
         for _ in 0..20 {
@@ -264,7 +264,7 @@ impl<'a> Dense<'a> {
         }
         let (a, _) = self.equations(&x);
         let mut inverse = (a.transpose() * &a).llt(Side::Lower).unwrap().inverse();
-        // Fixed ones have none.
+        // Fixed unknowns have zero cofactors.
         let (_, sd) = self.observed();
         (0..x.len()).filter(|&i| sd[i] == 0.0).for_each(|i| inverse[(i, i)] = 0.0);
         (x, inverse)
@@ -346,7 +346,7 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
     assert!((solution.sums_of_squares.total() - total).abs() < 1e-9 * total);
 }
 
-/// Everything with everything, and a part of it with another, from where the adjustment ended.
+/// Compares the full cofactor matrix and cross-cofactors at the end of the adjustment with dense matrices.
 #[test]
 fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     let network = network();
@@ -381,12 +381,12 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         }
     };
     compare(&all, &unknowns(&of), &unknowns(&of));
-    // The same bits with any number of threads.
+    // Bit-identical results for any number of threads.
     let one = in_threads(1);
     let again = network.covariances(&options, &solution.state, None, &one, &mut go).unwrap();
     let again = again.cofactors(&of, None, &one, &mut go).unwrap();
     assert!(all.iter().zip(&again).all(|(a, b)| a.to_bits() == b.to_bits()));
-    // A camera with everything, everything with a camera, a few points with others.
+    // Cross-cofactors: one camera and all unknowns, all unknowns and one camera, some points and others.
     for (rows, columns) in [
         (vec![Of::Camera(0)], of.clone()),
         (of.clone(), vec![Of::Camera(1)]),
@@ -395,7 +395,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         let found = covariances.cofactors(&rows, Some(&columns), &threads, &mut go).unwrap();
         compare(&found, &unknowns(&rows), &unknowns(&columns));
     }
-    // A distance, as a function.
+    // A distance as a function of two points.
     let ends = [Of::Point(3), Of::Point(22)];
     let [p, r] = [3, 22].map(|point| solution.points[point].unwrap().coordinates);
     let length = (0..3).map(|k| (r[k] - p[k]).powi(2)).sum::<f64>().sqrt();
@@ -437,7 +437,7 @@ fn what_has_no_cofactors_is_refused() {
     assert_eq!(found, Some(NetworkError::State));
 }
 
-/// Without control: what the datum holds are photos, and redundancy numbers add up to the degrees of freedom.
+/// Without control: the datum fixes photos, and redundancy numbers sum to the degrees of freedom.
 #[test]
 fn redundancy_numbers_of_a_free_network_add_up() {
     let mut network = network();
@@ -456,7 +456,7 @@ fn redundancy_numbers_of_a_free_network_add_up() {
     assert!((total - expected as f64).abs() < 1e-7 * expected as f64, "{total} of {expected}");
 }
 
-/// Vertical photos of a plane: a longer principal distance is a greater flying height.
+/// Vertical photos of a plane: a longer principal distance is equivalent to a greater flying height.
 #[test]
 fn a_camera_that_is_not_determined_is_named_with_its_photos() {
     let camera = Perspective { principal_distance: -1000.0 };
@@ -480,7 +480,7 @@ fn a_camera_that_is_not_determined_is_named_with_its_photos() {
     }
     let combination = Combination { photos: vec![0, 1, 2], cameras: vec![1], ..Combination::default() };
     assert_eq!(adjust(&network, TIGHT).unwrap_err(), NetworkError::Undetermined(vec![combination]));
-    // A weight is enough.
+    // A weight is sufficient.
     network.cameras[1].sd = vec![0.1];
     let solution = adjust(&network, TIGHT).unwrap();
     assert!((solution.cameras[1].cofactors[0].sqrt() - 0.1).abs() < 1e-9);
@@ -497,7 +497,7 @@ fn constants_of_a_camera_are_never_unknown() {
     }
 }
 
-/// The same with poses in angles: what takes part is named.
+/// The same with poses in angles: the members of the combination are reported.
 #[test]
 fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
     let sense = RotationSense::GroundToPhoto;
@@ -529,14 +529,14 @@ fn what_is_not_determined_is_named_by_parameters_and_parts_of_poses() {
     };
     let [found] = &combinations(&[0])[..] else { panic!("one combination") };
     assert_eq!((&found.parameters[..], &found.poses[..]), (&[(0, 0)][..], &[PosePart::Along][..]));
-    // The principal point and the positions across, x and y.
+    // The principal point and the horizontal positions, x and y.
     let found = combinations(&[1, 2]);
     let parameters: Vec<_> = found.iter().flat_map(|one| one.parameters.clone()).collect();
     assert_eq!(parameters, [(0, 1), (0, 2)]);
     assert!(found.iter().all(|one| one.poses == [PosePart::Across]), "{found:?}");
 }
 
-/// The same weights one by one and as a matrix; correlated ones against what a free camera and the prior make together.
+/// Separate weights and a diagonal matrix agree; correlated weights agree with the combination of a free camera and the prior.
 #[test]
 fn parameters_may_be_observed_with_their_covariance() {
     let deviations = |of: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(of).map(|sd| sd * sd));
@@ -566,7 +566,7 @@ fn parameters_may_be_observed_with_their_covariance() {
         free.cameras[camera].sd = vec![FREE; 3];
         let before = adjust(&free, TIGHT).unwrap().cameras[camera].clone();
         let q = before.cofactors.clone();
-        // As good as the images, and correlated otherwise.
+        // As precise as the observations, with different correlations.
         let sd: Vec<f64> = (0..3).map(|k| q[(k, k)].sqrt()).collect();
         let s = DMatrix::from_fn(3, 3, |i, j| {
             sd[i] * sd[j] * if i == j { 1.0 } else { 0.6 - 0.5 * (i + j) as f64 / 3.0 }
@@ -582,7 +582,7 @@ fn parameters_may_be_observed_with_their_covariance() {
         let together = (q.clone().try_inverse().unwrap() + &w).try_inverse().unwrap();
         let expected = &found + &together * &w * (&given - &found);
         for k in 0..3 {
-            // The network is not quite linear over deviations as large as these.
+            // The network is slightly nonlinear over such large deviations.
             assert!(
                 (after.parameters[k] - expected[k]).abs() < 0.02 * sd[k],
                 "{} {}",

@@ -1,4 +1,4 @@
-//! Absolute orientation: recovery at any attitude, statistics, refusals, interruption.
+//! Absolute orientation: recovery at any attitude, statistics, errors, interruption.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -28,7 +28,7 @@ fn run(stations: &[Station], options: &Options) -> Result<Solution, SimilarityEr
     orient_on(stations, options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
-/// Places in the unit square with some relief; the first two far apart.
+/// Positions in the unit square with some relief; the first two are far from each other.
 const PLACES: [[f64; 3]; 8] = [
     [-0.5, -0.4, 0.02],
     [0.5, 0.45, -0.06],
@@ -40,7 +40,7 @@ const PLACES: [[f64; 3]; 8] = [
     [-0.02, 0.5, -0.04],
 ];
 
-/// Stations of a similarity without errors; `known` says which coordinates of each are.
+/// Returns stations of an error-free similarity; `known` selects the known coordinates of each.
 fn stations(truth: &Parameters, known: impl Fn(usize) -> [bool; 3]) -> Vec<Station> {
     let model = |x: &[f64; 3]| truth.scale * (truth.rotation * Vector3::from(*x)) + truth.translation;
     let station = |(i, place): (usize, &[f64; 3])| {
@@ -65,7 +65,7 @@ fn truth(angles: [f64; 3], scale: f64) -> Parameters {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
-    /// Angles are uniform, so that phi comes near and beyond 90 degrees.
+    /// Angles are uniform, so that phi approaches and exceeds 90 degrees.
     #[test]
     fn any_attitude_is_recovered(
         angles in prop::array::uniform3(-3.2..3.2),

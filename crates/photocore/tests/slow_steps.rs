@@ -1,11 +1,11 @@
-//! Steps that fall slowly because second derivatives times residuals are as large as the normal matrix.
+//! Slowly decreasing steps: second derivatives times residuals are as large as the normal matrix.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use photocore::adjustment::{Adjustment, Evaluated, Model, Options, Problem, Status};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
 
-/// Observed as zero, of each unknown x: 1 + x and x - 1 + bend x^2. At the solution, x = 0, the normal matrix is 2, and residuals times
+/// Observations of zero for each unknown x: 1 + x and x - 1 + bend x^2. At the solution x = 0 the normal matrix is 2, and residuals times
 /// second derivatives are -2 bend: a Gauss-Newton step leads from x to bend x.
 struct Bent(Vec<f64>);
 
@@ -38,7 +38,7 @@ impl Evaluated for At<'_> {
     }
 }
 
-/// From x = 0.1, a local unknown being held.
+/// Adjusts from x = 0.1 with a fixed local unknown.
 fn adjusted(bends: &[f64]) -> Adjustment {
     let count = bends.len();
     let layout = Layout::new(2 * count, 1, &[count], vec![0, 1], vec![0]).unwrap();
@@ -61,7 +61,7 @@ fn steps_that_swing_or_creep_learn_what_they_leave_out() {
         let iterations = adjusted.iterations.len();
         assert!(iterations <= most, "{bends:?}: {iterations}");
         let farthest = adjusted.unknowns[1..].iter().fold(0.0f64, |most, x| most.max(x.abs()));
-        // The last step is a plain one of 1e-5 standard deviations at the most: 1 - bend of what is left.
+        // The last plain step is at most 1e-5 standard deviations and covers the fraction 1 - bend of the error.
         let least = bends.iter().fold(1.0f64, |least, bend| least.min(1.0 - bend));
         assert!(farthest < 1e-5 / least, "{bends:?}: {farthest}");
     }
@@ -71,7 +71,7 @@ fn steps_that_swing_or_creep_learn_what_they_leave_out() {
 fn chords_take_the_place_of_steps_that_fall() {
     let adjusted = adjusted(&[0.1]);
     let lengths: Vec<f64> = adjusted.iterations.iter().map(|each| each.largest_change).collect();
-    // A plain step leaves a tenth of the one before: five more of them would be needed.
+    // A plain step has a tenth of the previous length: five more would be needed.
     assert!(lengths.len() == 2 && lengths[1] < 1e-5, "{lengths:?}");
     assert_eq!(adjusted.status, Status::Converged);
 }

@@ -1,4 +1,4 @@
-//! The splined camera: against golden data computed by mrcal, complex steps, and its way back.
+//! The splined camera: against golden data computed by mrcal, complex steps, and its inverse.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
@@ -18,7 +18,7 @@ fn pairs(values: &[f64]) -> Arc<[[f64; 2]]> {
     values.as_chunks().0.into()
 }
 
-/// The number behind a key in a name of mrcal: `LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170`.
+/// Returns the number after a key in an mrcal model name: `LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170`.
 fn constant(model: &str, key: &str) -> f64 {
     let (_, rest) = model.split_once(&format!("_{key}=")).unwrap();
     rest.split('_').next().unwrap().parse().unwrap()
@@ -35,14 +35,14 @@ fn golden_camera(entry: &Value) -> Camera {
     Camera::named(NAME, &parameters).unwrap().with_knots(pairs(&knots)).unwrap()
 }
 
-/// The numbers behind the key of a `.cameramodel`.
+/// Returns the numbers of the key `intrinsics` in a `.cameramodel`.
 fn intrinsics(text: &str) -> Vec<f64> {
     let (_, rest) = text.split_once("'intrinsics': [").unwrap();
     let (numbers, _) = rest.split_once(']').unwrap();
     numbers.split(',').filter_map(|number| number.trim().parse().ok()).collect()
 }
 
-/// Partials of a column or row by all parameters of mrcal: fx, fy, cx, cy, then knots.
+/// Returns the partials of a column or row with respect to all parameters of mrcal: fx, fy, cx, cy, then knots.
 fn by_all(camera: &Camera, u: &Vector3, row: usize) -> Vec<f64> {
     let parameters = camera.parameters();
     let mut all = vec![0.0; 4 + 2 * camera.knots().unwrap().len()];
@@ -66,7 +66,7 @@ fn images_and_partials_are_those_of_mrcal() {
     let Some(data) = golden_of("targets", "splined.json") else { return };
     for entry in data["projections"].as_array().unwrap() {
         let (camera, model) = (golden_camera(entry), entry["model"].as_str().unwrap());
-        // The text of the largest has ten digits, mrcal the binary numbers.
+        // The text of the largest model has ten digits; mrcal used the binary numbers.
         let (near, part) = if constant(model, "Nx") == 30.0 { (1e-6, 5e-9) } else { (1e-9, 1e-10) };
         for (k, ray) in rows(&entry["rays"]).into_iter().enumerate() {
             let u = Vector3::new(ray[0], -ray[1], -ray[2]);
@@ -89,7 +89,7 @@ fn images_and_partials_are_those_of_mrcal() {
     }
 }
 
-/// The image written out once more for complex arguments: the ray in axes of vision, fx, fy, cx, cy, then the knots.
+/// Independent implementation of the image for complex arguments: the ray in vision axes, fx, fy, cx, cy, then the knots.
 fn written_out(order: i32, size: [usize; 2], fov: f64, v: &[C]) -> [C; 2] {
     let n = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let place = [2.0 * v[0] / (n + v[2]), 2.0 * v[1] / (n + v[2])];
@@ -109,7 +109,7 @@ fn written_out(order: i32, size: [usize; 2], fov: f64, v: &[C]) -> [C; 2] {
     [0, 1].map(|k| v[3 + k] * at[k] + v[5 + k])
 }
 
-/// The uniform B-spline about zero, by truncated powers.
+/// Returns the uniform B-spline about zero, by truncated powers.
 fn bump(order: i32, x: C) -> C {
     let (count, factorial) = (order + 1, [1.0, 1.0, 2.0, 6.0][order as usize]);
     let mut binomial = 1.0;
@@ -162,7 +162,7 @@ fn polynomials_at_the_edge_go_on_beyond_the_knots() {
     for order in [2.0, 3.0] {
         let parameters = [700.0, 700.0, 640.0, 480.0, order, 5.0, 4.0, 60.0];
         let plain = Camera::named(NAME, &parameters).unwrap();
-        // Displacements that are linear in the place: all polynomials are the same, and so is what goes on.
+        // Displacements linear in the position: all polynomials are equal, and extrapolation is exact.
         let knots: Vec<f64> =
             (0..20).flat_map(|k| [0.01 * f64::from(k % 5), 0.02 * f64::from(k / 5)]).collect();
         let camera = plain.with_knots(pairs(&knots)).unwrap();

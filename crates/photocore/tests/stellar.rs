@@ -17,12 +17,12 @@ const ABERRATION: f64 = 0.32 * ARCSEC;
 const TEMPERATURE: f64 = 290.0;
 const PRESSURE: f64 = 750.0;
 
-/// The arc tangent to first order in the imaginary part; that of the library loses small ones.
+/// Returns the arctangent to first order in the imaginary part; the library function loses small imaginary parts.
 fn atan(z: C) -> C {
     C::new(z.re.atan(), z.im / (1.0 + z.re * z.re))
 }
 
-/// The whole model once more, from place to plate, for complex arguments: place (2), attitude (3), common parameters (17).
+/// Independent implementation of the model for complex arguments: direction (2), attitude (3), shared parameters (17).
 fn image(kind: &Kind, time: f64, unknowns: &[C]) -> [C; 2] {
     let (ra, dec) = (unknowns[0], unknowns[1]);
     let (sp, cp) = LATITUDE.sin_cos();
@@ -44,7 +44,7 @@ fn image(kind: &Kind, time: f64, unknowns: &[C]) -> [C; 2] {
     }
     let (xi, eta) = (north * observed.tan() / s, east * observed.tan() / s);
     let (alpha, omega, kappa) = (unknowns[2], unknowns[3], unknowns[4]);
-    // Turn by alpha about east, by omega about the turned north, by kappa about the axis; reflect x.
+    // Rotate by alpha about east, by omega about the rotated north, by kappa about the axis; reflect x.
     let (n1, z1) = (xi * alpha.cos() - alpha.sin(), xi * alpha.sin() + alpha.cos());
     let (e2, z2) = (eta * omega.cos() - z1 * omega.sin(), eta * omega.sin() + z1 * omega.cos());
     let (u, v) = (-n1, e2);
@@ -112,7 +112,7 @@ fn calibration(kind: &Kind, values: &[f64; 22], time: f64) -> Calibration {
     }
 }
 
-/// Every partial against a complex step, for all kinds of cameras, relative to the column's size.
+/// Compares every partial with a complex step, for all types of cameras, relative to the size of the column.
 #[test]
 fn partials_are_exact() {
     for form in [Form::ScaleFirst, Form::DistortionFirst(0.31)] {
@@ -150,7 +150,7 @@ fn check_partials(kind: &Kind, values: &[f64; 22], time: f64) {
     }
 }
 
-/// Directions of images lead back to the images.
+/// Directions computed from images reproduce the images.
 #[test]
 fn a_direction_comes_back() {
     let kind =

@@ -1,4 +1,4 @@
-//! A night of several attitudes with correlated catalogue places, weights of parameters and an axis, against dense algebra.
+//! Night of several attitudes with correlated catalogue places, weights of parameters and an axis, against dense algebra.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +20,7 @@ const STARS: usize = 14;
 const PLATE_SD: f64 = 3e-6;
 const LATITUDE: f64 = 0.6;
 
-/// Noise that does not depend on a library: a number between -1 and 1 for each index.
+/// Returns a reproducible number between -1 and 1 for each index.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
@@ -33,7 +33,7 @@ fn common() -> [f64; COMMON] {
     common
 }
 
-/// Every star on every attitude; the plate coordinates have errors.
+/// Returns every star on every attitude; the plate coordinates have errors.
 fn night(held: bool) -> Calibration {
     let place = |k: usize| [1.0 + 0.25 * noise(k), LATITUDE + 0.2 * noise(50 + k)];
     let plate = 1.0 / (PLATE_SD * PLATE_SD);
@@ -77,7 +77,7 @@ fn night(held: bool) -> Calibration {
     calibration
 }
 
-/// A night with a direction of the axis, and a weight matrix of two attitudes and a principal distance.
+/// Returns a night with a direction of the axis, and a weight matrix of two attitudes and a principal distance.
 fn weighted_night() -> Calibration {
     let mut calibration = night(false);
     let parameters = vec![1, 3 * 3 + 2, 3 * ATTITUDES + 3];
@@ -101,7 +101,7 @@ fn adjusted(calibration: &Calibration) -> Result<Solution, StellarError> {
     })
 }
 
-/// Rows of R A and R l, R from the left Cholesky factor of the weights.
+/// Rows of R A and R l, with R from the left Cholesky factor of the weights.
 struct Dense {
     rows: Vec<Vec<f64>>,
     right: Vec<f64>,
@@ -130,7 +130,7 @@ fn spread(rows: &Rows, pointing: usize, star: Option<usize>) -> [Vec<f64>; 2] {
     })
 }
 
-/// All equations at the adjusted values.
+/// Returns all equations at the adjusted values.
 fn dense(calibration: &Calibration, solution: &Solution) -> Dense {
     let mut at = calibration.clone();
     let (pointings, common) = solution.parameters.split_at(3 * ATTITUDES);
@@ -182,7 +182,7 @@ fn weights_of_stars_and_parameters_and_the_axis_are_those_of_a_dense_adjustment(
     let scaled = Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[j]);
     let inverse = (scaled.transpose() * &scaled).llt(Side::Lower).unwrap().inverse();
     let q = |i: usize, j: usize| inverse[(i, j)] * scale[i] * scale[j];
-    // The equations are solved: no unknown is off by a millionth of its standard deviation.
+    // The equations are solved: every unknown is within a millionth of its standard deviation.
     let l = Mat::from_fn(right.len(), 1, |i, _| right[i]);
     let step = &inverse * (scaled.transpose() * &l);
     for j in 0..own.len() {
@@ -196,7 +196,7 @@ fn weights_of_stars_and_parameters_and_the_axis_are_those_of_a_dense_adjustment(
             assert!((found - q(i, j)).abs() < 1e-7 * (q(i, i) * q(j, j)).sqrt(), "{row} {column}");
         }
     }
-    // Of the reduced normal equations, so of the inverse of the parameters' part of the inverse.
+    // The determinant of the reduced normal equations is the inverse of the determinant of the parameters' cofactors.
     let first = 2 * STARS;
     let part = Mat::from_fn(own.len() - first, own.len() - first, |i, j| inverse[(first + i, first + j)]);
     let factor = part.llt(Side::Lower).unwrap();
@@ -246,7 +246,7 @@ fn blocks_of_the_cofactors_are_those_of_the_whole() {
     (0..COMMON * COMMON).for_each(|k| same(cofactors.common[k], first + k / COMMON, first + k % COMMON));
 }
 
-/// Held stars that all attitudes share cost no more than stars of their own would.
+/// Fixed stars shared by all attitudes cost as much as separate stars per attitude.
 #[test]
 fn a_star_that_is_held_ties_no_attitudes() {
     let shared = night(true);

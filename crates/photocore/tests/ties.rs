@@ -1,4 +1,4 @@
-//! Networks with ties: a trilateration in the plane, free, in any datum, against dense algebra.
+//! Networks with constraints: a free trilateration in the plane, in any datum, against dense algebra.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -12,7 +12,7 @@ use photocore::adjustment::{
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 
-/// Points in the plane; distances from retained points to local ones are groups, those between retained points ties.
+/// Points in the plane; distances between retained and local points are observations, distances between retained points are constraints.
 struct Trilateration {
     layout: Layout,
     lengths: Vec<f64>,
@@ -20,7 +20,7 @@ struct Trilateration {
 }
 
 impl Trilateration {
-    /// Observed minus computed, and the partials by the first point; those by the second are the opposite. NaN if the length is NaN.
+    /// Returns observed minus computed, and the partials with respect to the first point; the second has opposite signs. NaN for NaN.
     fn distance(&self, values: &[f64], observation: usize, from: usize, to: usize) -> (f64, [f64; 2]) {
         let difference = [values[from] - values[to], values[from + 1] - values[to + 1]];
         let length = difference[0].hypot(difference[1]);
@@ -77,12 +77,12 @@ impl Model for Trilateration {
 
 const SD: f64 = 0.01;
 
-/// Noise that does not depend on a library: a number between -1 and 1 for each index.
+/// Returns a reproducible number between -1 and 1 for each index.
 fn noise(index: usize) -> f64 {
     ((index as f64 * 12.9898).sin() * 43758.5453).fract()
 }
 
-/// A grid of 4 x 3 retained points and 8 local ones among them, each local one seen from four retained points.
+/// Returns a grid of 4 x 3 retained points and 8 local ones, each local one observed from four retained points.
 fn network(held: Vec<usize>) -> Problem<Trilateration> {
     let retained: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
     let local: Vec<[f64; 2]> =
@@ -132,7 +132,7 @@ fn go<T>(_: T) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Design matrix divided by the standard deviations, at the given values.
+/// Returns the design matrix divided by the standard deviations, at the given values.
 fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     let layout = problem.layout();
     let mut a = Mat::zeros(layout.equations(), layout.unknowns());
@@ -152,7 +152,7 @@ fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     a
 }
 
-/// Shifts along both axes, and a rotation about the origin.
+/// Returns the null vectors: shifts along both axes, and a rotation about the origin.
 fn null_vectors(values: &[f64]) -> Vec<Vec<f64>> {
     let of = |each: &dyn Fn(f64, f64) -> [f64; 2]| {
         values.chunks_exact(2).flat_map(|point| each(point[0], point[1])).collect::<Vec<f64>>()
@@ -160,7 +160,7 @@ fn null_vectors(values: &[f64]) -> Vec<Vec<f64>> {
     vec![of(&|_, _| [1.0, 0.0]), of(&|_, _| [0.0, 1.0]), of(&|x, y| [-y, x])]
 }
 
-/// The inverse over the rows that the null vectors leave: (N + G G^T)^-1 - G (G^T G)^-2 G^T is the pseudo-inverse.
+/// Returns the pseudo-inverse of the normal matrix: the inverse without the null space.
 fn pseudo_inverse(a: &Mat<f64>) -> Mat<f64> {
     let eigen = (a.transpose() * a).self_adjoint_eigen(Side::Lower).unwrap();
     let (values, vectors) = (eigen.S(), eigen.U());
@@ -181,7 +181,7 @@ fn kept_block(problem: &Problem<Trilateration>, cofactors: &[f64], retained: usi
 
 #[test]
 fn inner_constraints_over_everything_are_the_pseudo_inverse() {
-    // One point and the direction to another are held.
+    // One point and the direction to another are fixed.
     let problem = network(vec![16, 17, 19]);
     let threads = threads();
     let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
@@ -204,14 +204,14 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
             assert!((cofactors.local[4 * local + k] - q[(i, j)]).abs() < 1e-9 * scale);
         }
     }
-    // The carriers move least: what they have moved has no part along the null vectors.
+    // The carriers have minimal displacements: these have a zero component along the null vectors.
     for vector in null_vectors(&free.unknowns) {
         let along: f64 =
             vector.iter().zip(&free.unknowns).zip(&problem.initial).map(|((g, x), x0)| g * (x - x0)).sum();
         let length = vector.iter().map(|g| g * g).sum::<f64>().sqrt();
         assert!((along / length).abs() < 1e-9);
     }
-    // Distances do not know of a datum.
+    // Distances are independent of the datum.
     for (row, r) in redundancy.iter().enumerate() {
         let share: f64 = (0..a.ncols())
             .flat_map(|i| (0..a.ncols()).map(move |j| (i, j)))
@@ -226,7 +226,7 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     assert!((sum - found.counts.degrees_of_freedom() as f64).abs() < 1e-8);
     assert!(found.redundancy_excess.unwrap().abs() < 1e-8);
 
-    // Without cofactors it is moved all the same, and nothing is factored.
+    // Without cofactors only the unknowns are transformed, without a factorization.
     let bare = Options { covariance: false, ..options() };
     let mut moved = adjust(&problem, &bare, &threads, &mut go).unwrap();
     let formations = moved.effort.formations;
@@ -243,7 +243,7 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
         let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
-        // Carried by three retained points only.
+        // Datum of three retained points.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
@@ -265,7 +265,7 @@ fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
     let threads = threads();
     let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
-    // One point carries shifts, but no rotation about itself; one coordinate of four points no shift along the other.
+    // One point defines shifts, but not a rotation about itself; one coordinate of four points does not define the shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
         let datum = Datum { carriers, left: vec![], relative: false };
@@ -292,12 +292,12 @@ fn what_is_open_is_found_by_trying_and_held() {
         let redundancy: f64 = free.redundancy.iter().flatten().sum();
         assert!((redundancy - free.counts.degrees_of_freedom() as f64).abs() < 1e-8);
         assert_eq!(free.counts.degrees_of_freedom(), 32 + 36 - 40 + 3);
-        // A fixed point leaves the rotation; one that is observed in x the shift along y and the rotation.
+        // A fixed point leaves the rotation; a point observed in x leaves the shift along y and the rotation.
         let (turning, _) = adjusted(&|problem| problem.sd[24..26].fill(0.0), method);
         assert_eq!(turning.datum, [16]);
         let (loose, _) = adjusted(&|problem| problem.sd[24] = 0.5, method);
         assert_eq!(loose.datum, [16, 17]);
-        // Two give a datum.
+        // Two points define the datum.
         let (mut placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
         assert!(placed.datum.is_empty());
         let datum = Datum {
@@ -374,7 +374,7 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
             .unwrap();
     let local = 3;
     let layout = problem.layout();
-    // The rows of the point, over all unknowns, in unit weight; what is held has no column.
+    // The rows of the point, over all unknowns, for unit weight; fixed unknowns have zero columns.
     let row = |group: usize| {
         let mut row = vec![0.0; layout.unknowns()];
         let (point, station) = (layout.local_range(local), layout.retained_range(layout.retained_of(group)));
@@ -400,7 +400,7 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
     }
     let redundancy = adjusted.redundancy.unwrap();
     for (k, group) in layout.groups_of(local).enumerate() {
-        // The adjustment took its own before the last step, which is a hundred-thousandth of the standard deviations.
+        // The adjustment computed its own before the last step, which is 1e-5 of the standard deviations.
         assert!((1.0 - blocks[0][5 * k] - redundancy[group]).abs() < 1e-6);
     }
 }

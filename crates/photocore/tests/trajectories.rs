@@ -1,4 +1,4 @@
-//! Photos on trajectories, which move while they are read: their motion is found with its covariance, and named where nothing shows it.
+//! Photos on trajectories with motion during readout: the motion is estimated with its covariance, and reported if undetermined.
 
 #![allow(clippy::unwrap_used)]
 
@@ -21,17 +21,17 @@ const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const SD: f64 = 0.002;
 const FREE: f64 = f64::INFINITY;
-/// Rows are read from above, 80 of an image's 18 millimetres in a second.
+/// Readout time per image coordinate: rows are read from the top, 80 mm of image height per second.
 const BY_XY: [f64; 2] = [0.0, -1.0 / 80.0];
 const START: f64 = 0.02;
 const PHOTOS: usize = 8;
 const POINTS: usize = 42;
 
-/// The way in object space and the turn of a second: of the photos of a strip, and of those of the strip back.
+/// Velocity in object space and rotation per second: for the photos of a strip, and for the photos of the return strip.
 const MOTIONS: [([f64; 3], [f64; 3]); 2] =
     [([5.0, 0.3, -0.1], [0.05, -0.2, 0.1]), ([-4.0, 0.2, 0.3], [-0.1, 0.15, 0.05])];
 
-/// Numbers of a normal distribution, the same for a seed on every machine.
+/// Reproducible generator of normally distributed numbers.
 struct Normal(u64);
 
 impl Normal {
@@ -51,7 +51,7 @@ fn place(k: usize) -> Vector3 {
     Vector3::new(6.0 * i, 5.0 * j, (1.3 * i + 2.1 * j).sin())
 }
 
-/// Four photos along X, and four back.
+/// Returns four photos along X, and four in the opposite direction.
 fn pose(k: usize) -> Pose {
     let (along, back) = (8.0 * (k % 4) as f64 + 6.0, k / 4);
     let wiggle = |n: usize| 0.05 * ((7 * k + n) as f64).sin();
@@ -76,7 +76,7 @@ fn image(photo: usize, point: usize) -> [f64; 2] {
     xy
 }
 
-/// The block with errors of a seed; the motions start at rest.
+/// Returns the block with errors of a seed; initial motions are zero.
 fn network(seed: u64) -> Network {
     let mut normal = Normal(seed);
     let (mut images, mut times) = (vec![], vec![]);
@@ -95,7 +95,7 @@ fn network(seed: u64) -> Network {
         let pose = [position.x, position.y, position.z, omega, phi, kappa];
         Photo { pose, observed: pose, sd: [FREE; 6], camera: 0 }
     };
-    // Where each photo is about, and its attitude.
+    // Approximate position of each photo, and its attitude.
     let line = || Basis::Polynomial(Polynomial { degree: 1, reference: 0.0, scale: 1.0 });
     let trajectory = |k: usize| {
         let Pose { position, attitude } = pose(k);
@@ -121,7 +121,7 @@ fn network(seed: u64) -> Network {
         let coordinates = place(k).map(|x| x + 0.005 * normal.next());
         Point { coordinates: coordinates.into(), sd: [0.005; 3] }
     };
-    // Of each strip a velocity and a rate, of each photo a shift and a turn.
+    // Per strip a velocity and a rotation rate, per photo a shift and a rotation.
     let coefficient = |index: usize| {
         let kinds = [CommonKind::PositionCoefficient, CommonKind::RotationCoefficient];
         Common::vector(kinds[index % 2], [0.0; 3], &[FREE; 3])
@@ -165,7 +165,7 @@ fn motions_are_found_within_their_covariance() {
             }
         }
     }
-    // Of so many times three components; four standard deviations of their mean.
+    // Mean over all draws of three components; limit of four standard deviations of the mean.
     let (count, mean) = (4.0 * DRAWS as f64, sum / (4.0 * DRAWS as f64));
     assert!((mean - 3.0).abs() < 4.0 * (6.0 / count).sqrt(), "{mean}");
 }
@@ -173,7 +173,7 @@ fn motions_are_found_within_their_covariance() {
 #[test]
 fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
     let mut network = network(100);
-    // One motion is known beforehand.
+    // One motion is weighted.
     network.commons[2].sd = vec![0.5; 3];
     network.commons[3].sd = vec![0.05; 3];
     let solution = adjust(&network).unwrap();
@@ -230,7 +230,7 @@ fn what_a_trajectory_does_not_reach_is_refused() {
         Positions::new(times, places, vec![], Interpolation::Linear).unwrap();
     network.mounts[1] = OnTrajectory { photo: 1, trajectory: 1, time: 3.0, rate: None, offset: None }.into();
     let found = adjust(&network).err().unwrap();
-    // The first of its images names it.
+    // The error names the first observation of the photo.
     assert!(
         matches!(found, NetworkError::OutsideTrajectory { photo: 1, point: Some(_), trajectory: 1, .. }),
         "{found}"

@@ -1,19 +1,19 @@
-//! Columns of a large table whose lines are all regular. The reader of single lines reads all other tables and names their faults.
+//! Columns of large tables with regular lines. Irregular tables are left to the line reader, which also reports errors.
 
 use std::hash::{BuildHasher, RandomState};
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Bytes of a line at most.
+/// Maximum length of a line in bytes.
 const LONGEST_LINE: usize = 100_000;
-/// Bytes of a number at most.
+/// Maximum length of a number in bytes.
 const LONGEST_NUMBER: usize = 1_000;
 
-/// Bytes of the parts of a piece, which threads read at the same time.
+/// Size in bytes of the parts of a piece, which are read in parallel.
 const PART: usize = 1 << 18;
 
-/// A table of text, which grows piece by piece.
+/// Table of text, read piece by piece.
 #[derive(Debug)]
 pub struct Table {
     delimiter: u8,
@@ -21,7 +21,7 @@ pub struct Table {
     state: State,
 }
 
-/// A column of a table.
+/// Column of a table.
 #[derive(Debug)]
 pub enum Column {
     /// Numbers; NaN for an empty cell.
@@ -30,31 +30,31 @@ pub enum Column {
     Names(Names),
 }
 
-/// What the lines so far require of the next ones.
+/// Conditions that previous lines impose on the next ones.
 #[derive(Debug, Default)]
 struct State {
-    /// The decimal mark of all numbers, from the first number that has one.
+    /// Decimal mark of all numbers, set by the first number with a mark.
     mark: Option<u8>,
-    /// A blank line was read: no other line may follow.
+    /// Whether a blank line was read: no line may follow.
     ended: bool,
 }
 
-/// The cells of some lines.
+/// Cells of some lines.
 struct Part {
     columns: Vec<Cells>,
     state: State,
-    /// Lines that are not blank.
+    /// Number of lines that are not blank.
     lines: usize,
 }
 
 enum Cells {
     Numbers(Vec<f64>),
-    /// Places of the names in the piece, and their hashes.
+    /// Byte ranges of the names in the piece, and their hashes.
     Names(Vec<(Range<usize>, u64)>),
 }
 
 impl Table {
-    /// An empty table; `numeric` of a column is whether its cells are numbers.
+    /// Creates an empty table; `numeric` is true for columns of numbers.
     pub fn new(delimiter: u8, numeric: &[bool]) -> Self {
         let column = |&numeric: &bool| {
             if numeric { Column::Numbers(vec![]) } else { Column::Names(Names::default()) }
@@ -62,12 +62,12 @@ impl Table {
         Self { delimiter, columns: numeric.iter().map(column).collect(), state: State::default() }
     }
 
-    /// The columns.
+    /// Returns the columns.
     pub fn columns(self) -> Vec<Column> {
         self.columns
     }
 
-    /// Appends whole lines, in the threads of the current pool. The result is `None`, and the table is useless, if a line is irregular.
+    /// Appends whole lines, on the threads of the current pool. Returns `None` for an irregular line; the table is then unusable.
     pub fn add(&mut self, piece: &[u8]) -> Option<()> {
         let parts: Vec<Part> =
             parts_of(piece).into_par_iter().map(|lines| self.part(piece, lines)).collect::<Option<_>>()?;
@@ -103,7 +103,7 @@ impl Table {
         Some(part)
     }
 
-    /// Appends a line to a part, and returns where the next one begins.
+    /// Appends a line to a part; returns the start of the next line.
     fn line(&self, piece: &[u8], mut at: usize, part: &mut Part) -> Option<usize> {
         for (k, (column, cells)) in self.columns.iter().zip(&mut part.columns).enumerate() {
             if k > 0 {
@@ -132,7 +132,7 @@ impl Table {
         after_line_end(piece, at)
     }
 
-    /// The content of a cell without quotation marks and outer blanks, and the place of the delimiter or line end behind the cell.
+    /// Returns the content of a cell without quotation marks and outer blanks, and the position of the delimiter or line end after it.
     fn cell(&self, piece: &[u8], at: usize) -> Option<(Range<usize>, usize)> {
         let start = after_blanks(piece, at, self.delimiter);
         if piece.get(start) != Some(&b'"') {
@@ -173,7 +173,7 @@ impl Column {
 }
 
 impl State {
-    /// Continues with the lines of a part; `None` if they may not follow.
+    /// Appends the state of a part; `None` if its lines may not follow.
     fn follow(&mut self, part: &Part) -> Option<()> {
         let marks = self.mark.is_none() || part.state.mark.is_none() || self.mark == part.state.mark;
         if !marks || (self.ended && part.lines > 0) {
@@ -185,7 +185,7 @@ impl State {
     }
 }
 
-/// Parts of a piece that end with a line each.
+/// Divides a piece into parts of whole lines.
 fn parts_of(piece: &[u8]) -> Vec<Range<usize>> {
     let (mut parts, mut start) = (vec![], 0);
     while start < piece.len() {
@@ -202,19 +202,19 @@ fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
 }
 
-/// The place of the first byte from `at` on that is the delimiter or no blank.
+/// Returns the position of the first byte at or after `at` that is the delimiter or not a blank.
 fn after_blanks(piece: &[u8], at: usize, delimiter: u8) -> usize {
     let blanks = piece[at..].iter().take_while(|&&byte| is_blank(byte) && byte != delimiter);
     at + blanks.count()
 }
 
-/// The range without blanks at its end.
+/// Returns the range without trailing blanks.
 fn without_blanks(piece: &[u8], range: Range<usize>) -> Range<usize> {
     let blanks = piece[range.clone()].iter().rev().take_while(|&&byte| is_blank(byte));
     range.start..range.end - blanks.count()
 }
 
-/// The place after the line end at a place; `None` if there is no line end.
+/// Returns the position after a line end; `None` if the position is not at a line end.
 fn after_line_end(piece: &[u8], at: usize) -> Option<usize> {
     match &piece[at..] {
         [] | [b'\r'] => Some(piece.len()),
@@ -224,7 +224,7 @@ fn after_line_end(piece: &[u8], at: usize) -> Option<usize> {
     }
 }
 
-/// The number in a cell, NaN if the cell is empty.
+/// Parses a number; NaN for an empty cell.
 fn number(cell: &[u8], delimiter: u8, mark: &mut Option<u8>) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
@@ -242,33 +242,33 @@ fn number(cell: &[u8], delimiter: u8, mark: &mut Option<u8>) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// A column of names: each name once, in the order of the rows, and the number of the name of each row.
+/// Column of names: distinct names in the order of first use, and the index of each row.
 #[derive(Debug, Default)]
 pub struct Names {
-    /// The number of the name of each row.
+    /// Index of the name of each row.
     pub rows: Vec<i64>,
-    /// The names, each with a line feed behind it.
+    /// Distinct names, each followed by a line feed.
     pub text: Vec<u8>,
     starts: Vec<usize>,
-    /// Places by hash: a power of two of them, of which at most half are filled.
+    /// Hash table: a power of two of slots, at most half of them filled.
     slots: Vec<Slot>,
     hashes: RandomState,
-    /// The names have letters of either case.
+    /// Whether names contain lower-case or upper-case letters.
     lower: bool,
     upper: bool,
-    /// A name is empty, "nan", not ASCII or with a blank inside.
+    /// Whether a name is empty, "nan", not ASCII, or contains a blank.
     doubtful: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     hash: u32,
-    /// The number of a name, from 1; 0 if the slot is free.
+    /// Index of a name, from 1; 0 for a free slot.
     number: u32,
 }
 
 impl Names {
-    /// Whether all names are proper names, no two of which are equal but for blanks and case.
+    /// Returns whether all names are proper names that remain distinct without blanks and case.
     pub fn are_distinct(&self) -> bool {
         let mixed = self.lower && self.upper;
         !self.doubtful && !mixed
@@ -299,7 +299,7 @@ impl Names {
         Some(i64::from(self.slots[slot].number) - 1)
     }
 
-    /// The slot of a name, or a free one for it.
+    /// Returns the slot of a name, or a free slot.
     fn slot(&self, name: &[u8], hash: u64) -> usize {
         let last = self.slots.len() - 1;
         let mut at = hash as usize & last;
@@ -330,7 +330,7 @@ impl Names {
         }
     }
 
-    /// Notes what a new name has; `None` if it has a control character.
+    /// Records the character classes of a new name; `None` for a control character.
     fn check(&mut self, name: &[u8]) -> Option<()> {
         self.doubtful |= name.is_empty() || name.eq_ignore_ascii_case(b"nan");
         for &byte in name {
@@ -350,7 +350,7 @@ impl Names {
 mod tests {
     use super::*;
 
-    /// Numbers, or names by row, of each column.
+    /// Numbers, or names by row, of a column.
     #[derive(Debug, PartialEq)]
     enum Read {
         Numbers(Vec<f64>),
@@ -442,7 +442,7 @@ mod tests {
         }
     }
 
-    /// Parts that threads read at the same time give the columns of one part, and their faults.
+    /// Parallel parts give the columns and the errors of a single part.
     #[test]
     fn parts_are_joined_in_order() {
         let line = |k: usize| format!("DJI_{:05},{},{}.25,{}\n", k / 100, k % 7919, k, k as f64 / 3.0);

@@ -1,6 +1,6 @@
 //! Columns of large files: control networks of ISIS, and delimited tables.
 //!
-//! The functions convert bytes to columns and columns to bytes. They open no file and know no photogrammetric model.
+//! The functions convert between bytes and columns. They open no file and are independent of photogrammetric models.
 
 pub mod control_network;
 pub mod delimited;

@@ -1,4 +1,4 @@
-//! Rows of NumPy arrays: shapes are checked here, and what is wrong is said with the name of the argument.
+//! Conversion of NumPy arrays; shapes are checked, and errors name the argument.
 
 use std::borrow::Cow;
 
@@ -8,23 +8,23 @@ use photocore::geometry::Matrix3;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
-/// Numbers and indices from Python, of any shape.
+/// Floating-point numbers and indices from Python, of any shape.
 pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
 pub type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
-/// Numbers for Python: (n,), (n, N), (n, M, N).
+/// Floating-point arrays for Python: (n,), (n, N), (n, M, N).
 pub type Vector<'py> = Bound<'py, PyArray1<f64>>;
 pub type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 pub type Blocks<'py> = Bound<'py, PyArray3<f64>>;
 
-// A ValueError of the package: what catches its errors catches this one, too.
+// A ValueError of the package, so that handlers of its errors catch it.
 import_exception!(photogram.errors, InputError);
 
-/// The rows of an (n, N) array.
+/// Returns the rows of an (n, N) array.
 pub fn rows<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<Vec<[f64; N]>> {
     rows_in_place(name, array).map(Cow::into_owned)
 }
 
-/// The same, not copied where they stand one after the other.
+/// Returns the rows of an (n, N) array, without a copy if it is contiguous.
 pub fn rows_in_place<'a, const N: usize>(name: &str, array: &'a Array<'_>) -> PyResult<Cow<'a, [[f64; N]]>> {
     match array.shape() {
         [_, columns] if *columns == N => Ok(match array.as_array().to_slice() {
@@ -35,7 +35,7 @@ pub fn rows_in_place<'a, const N: usize>(name: &str, array: &'a Array<'_>) -> Py
     }
 }
 
-/// The rows of an array of so many columns, as many as only the caller knows.
+/// Returns the rows of an (n, `columns`) array.
 pub fn slices(name: &str, array: &Array<'_>, columns: usize) -> PyResult<Vec<Vec<f64>>> {
     match array.shape() {
         [_, found] if *found == columns => Ok(values(array).chunks(columns).map(<[f64]>::to_vec).collect()),
@@ -43,7 +43,7 @@ pub fn slices(name: &str, array: &Array<'_>, columns: usize) -> PyResult<Vec<Vec
     }
 }
 
-/// The matrices of an (n, N, N) array.
+/// Returns the matrices of an (n, N, N) array.
 pub fn matrices<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<Vec<[[f64; N]; N]>> {
     match array.shape() {
         [_, rows, columns] if [*rows, *columns] == [N, N] => Ok(chunks(chunks(values(array)))),
@@ -51,7 +51,7 @@ pub fn matrices<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<Vec<[
     }
 }
 
-/// The numbers of an (n,) array.
+/// Returns the numbers of an (n,) array.
 pub fn numbers(name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
     match array.shape() {
         [_] => Ok(values(array)),
@@ -59,12 +59,12 @@ pub fn numbers(name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// The indices, not negative, of an (n,) array.
+/// Returns the nonnegative indices of an (n,) array.
 pub fn indices(name: &str, array: &Indices<'_>) -> PyResult<Vec<usize>> {
     Ok(indices_in_place(name, array)?.iter().map(|&index| index as usize).collect())
 }
 
-/// The same, none of them negative, not copied where they stand one after the other.
+/// Returns the nonnegative indices of an (n,) array, without a copy if it is contiguous.
 pub fn indices_in_place<'a>(name: &str, array: &'a Indices<'_>) -> PyResult<Cow<'a, [i64]>> {
     let [_] = array.shape() else { return Err(wrong_shape(name, "(n,)", array.shape())) };
     let view = array.as_array();
@@ -75,7 +75,7 @@ pub fn indices_in_place<'a>(name: &str, array: &'a Indices<'_>) -> PyResult<Cow<
     }
 }
 
-/// The rows of an (n, N) array of the numbers of groups; negative ones, of what is in none, as the largest number.
+/// Returns the rows of an (n, N) array of group numbers; negative numbers (without group) become the largest number.
 pub fn group_rows<const N: usize>(name: &str, array: &Indices<'_>) -> PyResult<Vec<[usize; N]>> {
     let number = |&group: &i64| usize::try_from(group).unwrap_or(usize::MAX);
     match array.shape() {
@@ -87,18 +87,18 @@ pub fn group_rows<const N: usize>(name: &str, array: &Indices<'_>) -> PyResult<V
     }
 }
 
-/// Rows as an (n, N) array.
+/// Converts rows to an (n, N) array.
 pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Matrix<'_>> {
     let count = rows.len();
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
-/// Square matrices as an (n, N, N) array.
+/// Converts square matrices to an (n, N, N) array.
 pub fn squares<const N: usize>(py: Python<'_>, matrices: Vec<[[f64; N]; N]>) -> PyResult<Blocks<'_>> {
     blocks(py, matrices)
 }
 
-/// Matrices as an (n, M, N) array.
+/// Converts matrices to an (n, M, N) array.
 pub fn blocks<const M: usize, const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; M]>,
@@ -107,17 +107,17 @@ pub fn blocks<const M: usize, const N: usize>(
     PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, M, N])
 }
 
-/// The rows of a matrix.
+/// Returns the rows of a matrix.
 pub fn row_major(matrix: &Matrix3) -> [[f64; 3]; 3] {
     matrix.transpose().data.0
 }
 
-/// The matrix of given rows.
+/// Returns the matrix of given rows.
 pub fn from_rows(rows: [[f64; 3]; 3]) -> Matrix3 {
     Matrix3::from(rows).transpose()
 }
 
-/// Refuses arrays whose lengths differ from the first one's.
+/// Checks that arrays have the length of the first one.
 pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult<()> {
     match others.iter().find(|(_, length)| *length != first.1) {
         None => Ok(()),
@@ -141,7 +141,7 @@ fn wrong_shape(name: &str, expected: &str, shape: &[usize]) -> PyErr {
     InputError::new_err(format!("{name} has the shape ({shape}), not {expected}"))
 }
 
-/// As an array, (rows, columns); what is symmetric may be large, and is not copied.
+/// Converts a matrix to an array (rows, columns); a symmetric matrix is not copied.
 pub fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Matrix<'_>> {
     let shape = [found.nrows(), found.ncols()];
     let rows = if symmetric { found } else { found.transpose() };

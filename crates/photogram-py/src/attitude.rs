@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Array, InputError, Matrix, from_rows, matrices, row_major, rows, squares, table};
 
-/// Two arrays, each of a row or matrix for every attitude.
+/// Two arrays with one row or matrix per attitude.
 type Pair<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
 
-/// What the numbers of an attitude are.
+/// Representation of an attitude by numbers.
 enum Representation {
     Three(AttitudeNumbers),
-    /// Of A.
+    /// Quaternion of A.
     Quaternion,
-    /// Of R = F A^T.
+    /// Quaternion of R = F A^T.
     VisionQuaternion,
 }
 
@@ -38,7 +38,7 @@ impl Representation {
         })
     }
 
-    /// Partials of the numbers with respect to the rotation step, row by row; NaN at a singular attitude.
+    /// Returns the partials of the numbers with respect to the rotation step, row by row; NaN at a singular attitude.
     fn by_step(&self, numbers: &[f64]) -> Vec<Vector3> {
         match (self, numbers) {
             (Self::Three(kind), &[p, q, r]) => {
@@ -77,7 +77,7 @@ pub fn attitudes_from_numbers<'py>(
                 let vision = matches!(representation, Representation::VisionQuaternion);
                 let attitude = if vision { rotation.transpose() * vision_axes() } else { rotation };
                 attitudes.push(row_major(&attitude));
-                // With dq = W rho / 2, W having orthonormal columns: rho = 2 W^T dq, of a quaternion that is normalised.
+                // dq = W rho / 2 with orthonormal columns of W: rho = 2 W^T dq for a normalised quaternion.
                 let by_step = representation.by_step(&q);
                 rates.extend((0..3).flat_map(|k| by_step.iter().map(move |row| 4.0 * row[k] / length)));
             }

@@ -1,4 +1,4 @@
-//! Cameras by the names of their models; their documentation is in `_photocore.pyi`.
+//! Cameras by model name; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::geometry::camera::{LensDirection, ModelFacts, Patch, RadialLimit};
@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use crate::arrays::{Array, Blocks, InputError, Matrix, numbers, rows, table, values};
 use crate::options::unknown;
 
-/// Formula, parameters with the power of the unit of the image that they are measured in, how many of them, the last ones, are
-/// constants, the direction of the lens, and that of the second image coordinate.
+/// Formula, parameters with the power of the image unit, number of constants (the last parameters), direction of the lens, and direction of
+/// the second image coordinate.
 type Facts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str, &'static str);
 
 #[pyfunction]
@@ -31,7 +31,7 @@ pub fn camera_models() -> Vec<(&'static str, Facts)> {
     Camera::NAMES.iter().filter_map(facts).collect()
 }
 
-/// The camera of a model.
+/// Returns the camera of a model.
 pub fn named(model: &str, parameters: &[f64]) -> PyResult<Camera> {
     let facts = Camera::model(model).ok_or_else(|| unknown("camera", model))?;
     Camera::named(model, parameters).ok_or_else(|| {
@@ -40,7 +40,7 @@ pub fn named(model: &str, parameters: &[f64]) -> PyResult<Camera> {
     })
 }
 
-/// The same with its knots, where there are any: dx, dy of each, row by row.
+/// Returns the camera of a model with its knots, if any: dx, dy of each, row by row.
 pub fn knotted(model: &str, parameters: &[f64], knots: Option<Vec<f64>>) -> PyResult<Camera> {
     let camera = named(model, parameters)?;
     let Some(knots) = knots else { return Ok(camera) };
@@ -50,7 +50,7 @@ pub fn knotted(model: &str, parameters: &[f64], knots: Option<Vec<f64>>) -> PyRe
     })
 }
 
-/// The camera of what Python gives.
+/// Returns the camera of Python arguments.
 fn given(model: &str, parameters: &Array<'_>, knots: Option<&Array<'_>>) -> PyResult<Camera> {
     knotted(model, &numbers("parameters", parameters)?, knots.map(values))
 }
@@ -99,7 +99,7 @@ pub fn camera_correct<'py>(
     table(py, rows("xy", &xy)?.into_iter().map(corrected).collect::<PyResult<_>>()?)
 }
 
-/// Images, their partials with respect to u and to the parameters.
+/// Images, and their partials with respect to u and to the parameters.
 type Partials<'py> = (Matrix<'py>, Blocks<'py>, Blocks<'py>);
 
 #[pyfunction]
@@ -123,7 +123,7 @@ pub fn camera_partials<'py>(
     ))
 }
 
-/// Numbers of knots and their weights, of each direction.
+/// Knot indices and their weights per direction.
 type Patches<'py> = (Bound<'py, PyArray2<i64>>, Matrix<'py>);
 
 #[pyfunction]
@@ -140,7 +140,7 @@ pub fn camera_patches<'py>(
     };
     let patches: Vec<Patch> = rows("u", &u)?.into_iter().map(patch).collect::<PyResult<_>>()?;
     let each = patches.first().map_or(0, |patch| patch.nodes * patch.nodes);
-    // The numbers of columns and rows are the sixth and the seventh parameter.
+    // The sixth parameter is the number of columns.
     let columns = camera.parameters().get(5).map_or(0, |&columns| columns as usize);
     let (numbers, weights) = patches
         .iter()

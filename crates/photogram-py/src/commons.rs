@@ -1,4 +1,4 @@
-//! Unknowns that observations have in common, and rigs.
+//! Shared parameters of observations, and rigs.
 
 use photocore::geometry::Matrix3;
 use photocore::network::commons::Measure;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::options::unknown;
 
-/// The types of common unknowns, each with the names of its unknowns and what these measure.
+/// Returns the types of shared parameters, each with the names and physical quantities of its components.
 pub fn kinds() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
     let facts = |kind: &CommonKind| {
         let unknowns = kind.unknowns().iter().map(|&(name, _, measure)| (name, measured(measure)));
@@ -33,25 +33,25 @@ fn measured(measure: Measure) -> &'static str {
 /// Type, position, rotation matrix row by row, standard deviations.
 pub type CommonRow = (String, [f64; 3], [f64; 9], Vec<f64>);
 
-/// The common unknown of a row.
+/// Converts a row to a shared parameter.
 pub fn common((kind, position, attitude, sd): CommonRow) -> PyResult<Common> {
     let kind = CommonKind::named(&kind).ok_or_else(|| unknown("kind of unknown", &kind))?;
     Ok(Common { kind, position, attitude: Matrix3::from_row_slice(&attitude), sd })
 }
 
-/// Indices of a photo, of the photo that stands for its frame, and of its sensor among the unknowns.
+/// Index of a photo, index of the photo of its frame, and index of its sensor among the shared parameters.
 pub type MountRow = (usize, usize, usize);
 
-/// The mount of a row.
+/// Converts a row to a pose link.
 pub fn mount((photo, frame, sensor): MountRow) -> Mount {
     OnFrame { photo, frame, sensor }.into()
 }
 
-/// Change, position, rotation matrix row by row, cofactors row by row, the same with the one before, redundancy numbers, number of
+/// Change, position, rotation matrix row by row, cofactors row by row, cofactors with the previous parameter, redundancy numbers, number of
 /// observations.
 pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize);
 
-/// What has become of a common unknown, for Python.
+/// Converts an adjusted shared parameter to a row.
 pub fn adjusted_row(common: AdjustedCommon) -> AdjustedRow {
     let AdjustedCommon { change, position, attitude, cofactors, with_former, redundancy, observations } =
         common;

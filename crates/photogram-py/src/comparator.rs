@@ -1,4 +1,4 @@
-//! Joint calibration of a comparator; its documentation is in `_photocore.pyi`.
+//! Calibration of a comparator; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::adjustment::{Method, Options, Status, Stop};
@@ -91,7 +91,7 @@ fn failure(error: &CalibrationError) -> PyErr {
     ComparatorError::new_err((error.to_string(), cases, points))
 }
 
-/// An adjusted calibration.
+/// Adjusted calibration.
 #[pyclass(frozen, get_all, module = "photogram._photocore")]
 pub struct ComparatorSolution {
     converged: bool,

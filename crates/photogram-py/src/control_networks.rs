@@ -1,4 +1,4 @@
-//! Control networks of ISIS as columns; their documentation is in `_photocore.pyi`.
+//! Control networks of ISIS as columns; the documentation is in `_photocore.pyi`.
 
 use std::ops::ControlFlow;
 
@@ -17,9 +17,9 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::memory;
 use crate::work::{Workers, watched};
 
-/// The header of a file: texts, number of points, lengths of messages, radii, what is not known.
+/// Header of a file: texts, number of points, lengths of messages, radii, unknown fields.
 type HeaderRow<'py> = ([Option<String>; 6], Option<u64>, Vec<u64>, Vec<f64>, Bound<'py, PyBytes>);
-/// Points and measures as columns by their names, first measures.
+/// Columns of points and of measures by name, first measures.
 type PointsRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>, Bound<'py, PyArray1<i64>>);
 
 #[pyfunction]
@@ -100,12 +100,12 @@ pub fn control_point_text<'py>(
     Ok(PyBytes::new(py, written.map_err(|fault| raised(&fault, py.None().bind(py)))?.as_bytes()))
 }
 
-/// Signals are looked after; of what comes of it, the caller hears.
+/// Checks signals; an exception is reported to the caller.
 fn looked_after(watch: Watch<'_>) -> ControlFlow<()> {
     watch(Event::Progress { phase: Phase::Form, done: 0, total: 0 })
 }
 
-/// The error of a fault, with its file and with the number of its point or line.
+/// Converts a fault to an exception with its file and the number of its point or line.
 fn raised(fault: &Fault, file: &Bound<'_, PyAny>) -> PyErr {
     if let Reason::Stopped(stopped @ Stopped::OutOfMemory(_)) = &fault.reason {
         return memory::exhausted(&stopped.to_string());
@@ -131,7 +131,7 @@ fn row<'py>(py: Python<'py>, all: Points<'static>) -> PyResult<PointsRow<'py>> {
     Ok((columns(py, points)?, columns(py, measures)?, PyArray1::from_vec(py, firsts.into_owned())))
 }
 
-/// Columns by their names, without those that are empty, and what has none as `rest`.
+/// Returns nonempty columns by name, and fields without a column as `rest`.
 fn columns<'py>(py: Python<'py>, table: Table<'static>) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     let rows = table.rows;
@@ -167,7 +167,7 @@ fn put<'py>(all: &Bound<'py, PyDict>, field: &Field, column: Option<impl IntoPyO
     column.map_or(Ok(()), |column| all.set_item(field.name, column))
 }
 
-/// A column that Python has; arrays are not copied.
+/// Column owned by Python; arrays are not copied.
 enum Held<'py> {
     Texts(Texts),
     Names(PyReadonlyArray1<'py, i32>, Vec<String>),
@@ -179,7 +179,7 @@ enum Held<'py> {
     Empty(Kind),
 }
 
-/// The columns of a table that Python has, and what has none.
+/// Columns of a table owned by Python, and fields without a column.
 struct HeldTable<'py> {
     fields: &'static [Field],
     columns: Vec<Held<'py>>,

@@ -1,4 +1,4 @@
-//! Distributions of test statistics; their documentation is in `_photocore.pyi`.
+//! Distributions of test statistics; the documentation is in `_photocore.pyi`.
 
 use crate::arrays::{self, Array, Vector};
 use numpy::PyArray1;
@@ -9,7 +9,7 @@ fn tail(upper: bool) -> Tail {
     if upper { Tail::Upper } else { Tail::Lower }
 }
 
-/// Functions of numbers, as the core has them.
+/// Exports functions of floating-point numbers from the core.
 macro_rules! functions {
     ($($name:ident($($argument:ident),*) -> $found:ty;)*) => {
         $(#[pyfunction]

@@ -1,4 +1,4 @@
-//! Features through points; its documentation is in `_photocore.pyi`.
+//! Features through points; the documentation is in `_photocore.pyi`.
 
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
@@ -21,7 +21,7 @@ pub fn measured_feature<'py>(
 ) -> PyResult<Row<'py>> {
     let points: Vec<Vector3> = rows("points", &points)?.into_iter().map(<Vector3>::from).collect();
     let covariance = match covariance.shape() {
-        // Symmetric: whether rows or columns stand together is all one.
+        // The matrix is symmetric, so that row and column order are equivalent.
         &[n, m] => DMatrix::from_iterator(n, m, covariance.as_array().iter().copied()),
         _ => return Err(PyValueError::new_err("the covariance is no matrix")),
     };

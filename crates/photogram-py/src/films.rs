@@ -1,4 +1,4 @@
-//! Readings of scanned films; their documentation is in `_photocore.pyi`.
+//! Readings of scanned films; the documentation is in `_photocore.pyi`.
 
 use photocore::geometry::Vector3;
 use photocore::network::film::{FilmAt, FilmOf, Read};
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Array, Blocks, InputError, Matrix, blocks, numbers, rows, table};
 
-/// The film of given numbers, whose common unknowns are these vectors in the order of the film.
+/// Creates the film of given numbers; the vectors are its shared parameters in order.
 fn film(film: &Array<'_>, vectors: &Array<'_>) -> PyResult<(FilmOf, FilmAt)> {
     let vectors = rows::<3>("vectors", vectors)?;
     let all: Vec<usize> = (0..vectors.len()).collect();
@@ -16,7 +16,7 @@ fn film(film: &Array<'_>, vectors: &Array<'_>) -> PyResult<(FilmOf, FilmAt)> {
     Ok((found, at))
 }
 
-/// Readings, and their partials by place, t1 .. b2 and h or g, (n, 2, 10).
+/// Readings, and their partials with respect to position, t1 .. b2 and h or g, (n, 2, 10).
 type Readings<'py> = (Matrix<'py>, Blocks<'py>);
 
 #[pyfunction]

@@ -1,4 +1,4 @@
-//! The geometry functions, row by row over arrays; their documentation is in `_photocore.pyi`.
+//! Geometry functions over the rows of arrays; the documentation is in `_photocore.pyi`.
 
 use crate::arrays::{
     Array, Blocks, Matrix, check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table,
@@ -125,7 +125,7 @@ pub fn refraction_shift<'py>(
     let space = object_space(spheroid)?;
     let refraction = self::refraction(refraction)?;
     let shift = |i: usize| {
-        // Where the camera looks does not matter.
+        // The result is independent of the attitude.
         let photo = View::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
         let point = Point::new(space, points[i]);
         lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector.into()
@@ -133,7 +133,7 @@ pub fn refraction_shift<'py>(
     table(py, py.detach(|| (0..points.len()).map(shift).collect()))
 }
 
-/// The lift of one point for one photo, each with its coordinates.
+/// Returns the lift of one point for one photo, each with its coordinates.
 fn lift(
     refraction: &Refraction,
     space: ObjectSpace,
@@ -144,10 +144,10 @@ fn lift(
     refraction.lift(&photo.orientation, &at(position), point, &at(coordinates))
 }
 
-/// Model of the air, model of the water, its level (linear unit), its refractive index, metres in the linear unit.
+/// Model of the air, model of the water, its level (linear unit), its refractive index, metres per linear unit.
 pub type RefractionRow = (Option<String>, Option<String>, f64, f64, f64);
 
-/// The refraction of a row.
+/// Converts a row to a refraction model.
 pub fn refraction((air, water, level, index, metres_per_unit): RefractionRow) -> PyResult<Refraction> {
     let refused = |medium: &str, model: &str| {
         Err(PyValueError::new_err(format!("the refraction in {medium} cannot be {model:?}")))
@@ -176,12 +176,12 @@ fn ellipsoid((a, b): (f64, f64)) -> PyResult<Ellipsoid> {
     Ellipsoid::new(a, b).map_err(geometry_error)
 }
 
-/// The object space: geographic when a spheroid is given by its semi-axes.
+/// Returns the object space: geographic if a spheroid is given by its semi-axes.
 pub fn object_space(spheroid: Option<(f64, f64)>) -> PyResult<ObjectSpace> {
     spheroid.map_or(Ok(ObjectSpace::Rectangular), |axes| ellipsoid(axes).map(ObjectSpace::Geographic))
 }
 
-/// The sense of the angles.
+/// Returns the direction of the rotation matrix.
 pub fn rotation_sense(photo_to_ground: bool) -> RotationSense {
     if photo_to_ground { RotationSense::PhotoToGround } else { RotationSense::GroundToPhoto }
 }

@@ -1,4 +1,4 @@
-//! The extension module `photogram._photocore`: converts arrays, releases the GIL, decides nothing.
+//! Extension module `photogram._photocore`: converts arrays, releases the GIL, and contains no further logic.
 
 mod arrays;
 mod attitude;
@@ -26,7 +26,7 @@ mod work;
 #[global_allocator]
 static ALLOCATOR: memory::Reserved = memory::Reserved;
 
-/// What Python sees of the core.
+/// Python interface of the core.
 #[pyo3::pymodule]
 mod _photocore {
     use pyo3::prelude::*;

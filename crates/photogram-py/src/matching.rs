@@ -1,4 +1,4 @@
-//! Points and stars that belong together; its documentation is in `_photocore.pyi`.
+//! Matching of points and stars; the documentation is in `_photocore.pyi`.
 
 use nalgebra::Complex;
 use numpy::PyArray1;

@@ -1,10 +1,10 @@
-//! Memory: an allocator that lets the process outlive an allocation that fails, and what Python hears of it.
+//! Memory: an allocator that reports failed allocations to Python and prevents an abort.
 //!
-//! Rust aborts the process where a vector cannot grow. The large arrays of the engine are asked for and may be refused; for all the
-//! small ones a reserve is kept, which is given back to the system when the first of them fails. The work then has room to end.
+//! Rust aborts the process if a vector cannot grow. Large arrays of the engine are allocated fallibly. For small arrays the allocator holds
+//! a reserve, which it releases at the first failure so that the computation can end regularly.
 //!
-//! Products of matrices have buffers for each thread, twice the last cache, which the library takes with the first larger product and
-//! ends the process where it gets none. They are taken before work begins, where a failure is an error.
+//! Matrix products use buffers per thread, twice the size of the last-level cache. The library allocates them with the first large product
+//! and aborts if this fails. They are therefore allocated before the computation, so that a failure is an error.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -20,45 +20,45 @@ use pyo3::prelude::*;
 
 import_exception!(photogram.errors, OutOfMemoryError);
 
-/// What Python loads with the first adjustment, and room that the allocator keeps.
+/// Size of the modules that Python loads with the first adjustment, and of memory retained by the allocator.
 pub const LOADED: usize = 40 << 20;
-/// Kept for allocations that fail: addresses only, no page of it is ever touched.
+/// Size of the reserve for failed allocations: address space only, its pages are never touched.
 const RESERVE: usize = 64 << 20;
-/// Left free beside the reserve when threads are started, for their stacks.
+/// Free address space in addition to the reserve when threads are started, for their stacks.
 const MARGIN: usize = 16 << 20;
-/// A larger allocation is not saved by the reserve: whoever asks for so much asks whether it is there.
+/// Size above which an allocation does not use the reserve: callers of large allocations handle failures.
 const LARGE: usize = 16 << 20;
-/// Rounds that a thread waits for another one that is just giving the reserve back.
+/// Number of spins while another thread releases the reserve.
 const PATIENCE: usize = 1 << 16;
 
 static KEPT: AtomicPtr<u8> = AtomicPtr::new(ptr::null_mut());
-/// How many allocations have failed so far. It only ever rises: each job compares it with what it was when the job began.
+/// Number of failed allocations. It increases monotonically: each job compares it with the value at its start.
 static FAILURES: AtomicUsize = AtomicUsize::new(0);
-/// Bytes of the last of them.
+/// Size in bytes of the last failed allocation.
 static LAST: AtomicUsize = AtomicUsize::new(0);
 
-/// The allocator of the system, with a reserve.
+/// System allocator with a reserve.
 pub struct Reserved;
 
-// SAFETY: every call is passed on to the allocator of the system, with the arguments that it was made with.
+// SAFETY: every call is forwarded to the system allocator with unchanged arguments.
 unsafe impl GlobalAlloc for Reserved {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller keeps the contract of `alloc`.
+        // SAFETY: the caller satisfies the contract of `alloc`.
         or_again(layout.size(), || unsafe { System.alloc(layout) })
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller keeps the contract of `alloc_zeroed`.
+        // SAFETY: the caller satisfies the contract of `alloc_zeroed`.
         or_again(layout.size(), || unsafe { System.alloc_zeroed(layout) })
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // SAFETY: the caller keeps the contract of `realloc`; a failure leaves the old block as it was.
+        // SAFETY: the caller satisfies the contract of `realloc`; a failure leaves the old block unchanged.
         or_again(size, || unsafe { System.realloc(pointer, layout, size) })
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`.
+        // SAFETY: the caller satisfies the contract of `dealloc`.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -69,7 +69,7 @@ fn or_again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
     if pointer.is_null() { again(size, allocate) } else { pointer }
 }
 
-/// Gives the reserve back and tries once more.
+/// Releases the thread's room or the reserve, and retries.
 #[cold]
 fn again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
     if let Some(room) = ROOM.take() {
@@ -86,7 +86,7 @@ fn again(size: usize, allocate: impl Fn() -> *mut u8) -> *mut u8 {
     }
     let kept = KEPT.swap(ptr::null_mut(), SeqCst);
     if !kept.is_null() {
-        // SAFETY: it was allocated with this layout, and nobody else has it any more.
+        // SAFETY: it was allocated with this layout, and the swap made this thread its only owner.
         unsafe { System.dealloc(kept, reserve()) };
         return allocate();
     }
@@ -107,21 +107,21 @@ const fn reserve() -> Layout {
     }
 }
 
-/// How many allocations had failed when a job began.
+/// Number of failed allocations at the start of a job.
 #[derive(Clone, Copy)]
 pub struct Failures(usize);
 
 impl Failures {
-    /// Whether an allocation, of whichever job, has failed since.
+    /// Returns whether an allocation of any job has failed since.
     pub fn more(self) -> bool {
         FAILURES.load(SeqCst) != self.0
     }
 }
 
-/// Puts the reserve in its place before work begins.
+/// Allocates the reserve before a computation.
 ///
 /// # Errors
-/// There is no memory for it, nor for the stacks of threads beside it.
+/// Insufficient memory for the reserve, or for the stacks of threads.
 pub fn arm() -> PyResult<Failures> {
     let before = Failures(FAILURES.load(SeqCst));
     // SAFETY: the layout is not empty.
@@ -130,7 +130,7 @@ pub fn arm() -> PyResult<Failures> {
         let reserve_kept = fresh();
         let other = KEPT.swap(reserve_kept, SeqCst);
         if !other.is_null() {
-            // SAFETY: another thread allocated it with this layout, and nobody has it any more.
+            // SAFETY: another thread allocated it with this layout, and the swap made this thread its only owner.
             unsafe { System.dealloc(other, reserve()) };
         }
     }
@@ -138,18 +138,18 @@ pub fn arm() -> PyResult<Failures> {
     if KEPT.load(SeqCst).is_null() || margin.try_reserve_exact(MARGIN).is_err() {
         return Err(exhausted("there is no memory left to begin with"));
     }
-    // Or the compiler would see that nobody needs it.
+    // Prevents the compiler from removing the unused allocation.
     black_box(margin.as_mut_ptr());
     Ok(before)
 }
 
-/// Addresses that a thread holds until its buffers, which need them, are taken.
+/// Address space reserved by a thread until its buffers are allocated.
 #[derive(Clone, Copy)]
 struct Room(*mut u8, Layout);
 
 impl Room {
     fn give_back(self) {
-        // SAFETY: it was allocated with this layout, and is given back once.
+        // SAFETY: it was allocated with this layout, and is released once.
         unsafe { System.dealloc(self.0, self.1) }
     }
 }
@@ -159,7 +159,7 @@ thread_local! {
     static HAS_BUFFERS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Takes the buffers that products of matrices need on this thread, once; whether there was room for them.
+/// Allocates the buffers for matrix products on this thread, once; returns whether memory was sufficient.
 pub fn take_buffers() -> bool {
     if HAS_BUFFERS.get() {
         return true;
@@ -170,7 +170,7 @@ pub fn take_buffers() -> bool {
     if pointer.is_null() {
         return false;
     }
-    // Where there is no room beside it, the buffers take its place.
+    // If memory is insufficient for both, the room is released for the buffers.
     ROOM.set(Some(Room(pointer, layout)));
     take_product_buffers();
     if let Some(room) = ROOM.take() {
@@ -180,10 +180,10 @@ pub fn take_buffers() -> bool {
     true
 }
 
-/// What the library takes the last cache for where the system does not tell.
+/// Default size of the last-level cache, if the system does not report one.
 const CACHE: usize = 4 << 20;
 
-/// Bytes of the buffers of a thread: twice the last cache of all processors, as the library finds it.
+/// Returns the size in bytes of the buffers of a thread: twice the last-level cache of all processors, as computed by the library.
 fn buffers() -> usize {
     static BYTES: OnceLock<usize> = OnceLock::new();
     *BYTES.get_or_init(|| {
@@ -198,8 +198,8 @@ fn buffers() -> usize {
     })
 }
 
-/// Has the allocator give back to the system what was freed, where it can be told to: it keeps what is not huge for the next ones, and those may
-/// be of other sizes.
+/// Returns freed memory to the system, if this is supported. The allocator otherwise retains smaller blocks for later allocations, which
+/// may have other sizes.
 #[pyfunction]
 pub fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -211,7 +211,7 @@ pub fn give_back() {
     }
 }
 
-/// What Python hears when there is no room for them.
+/// Returns the exception for insufficient memory for the buffers.
 pub fn no_buffers() -> PyErr {
     exhausted(&format!(
         "products of matrices take {} MiB of addresses for each thread, and there are not so many: fewer threads, or a higher limit",
@@ -219,12 +219,12 @@ pub fn no_buffers() -> PyErr {
     ))
 }
 
-/// What Python hears when one has failed.
+/// Returns the exception for a failed allocation.
 pub fn failure() -> PyErr {
     exhausted(&format!("an allocation of {} bytes failed: there is not enough memory", LAST.load(SeqCst)))
 }
 
-/// An error of memory.
+/// Returns a memory exception with a message.
 pub fn exhausted(message: &str) -> PyErr {
     OutOfMemoryError::new_err(message.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Observations beside images: rows of one kind from Python, and what has become of them.
+//! Additional observations: input rows by type, and their results.
 
 use nalgebra::DMatrix;
 use numpy::PyUntypedArrayMethods;
@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Array, Indices, InputError};
 
-/// Observations of one kind: its name, indices of points (n, p), photos (n, q) and common unknowns (n, c; -1 for none), values (n, v),
+/// Observations of one type: name, indices of points (n, p), photos (n, q) and shared parameters (n, c; -1 for none), values (n, v),
 /// covariance matrices (n, r, r).
 pub type Group<'py> = (String, Indices<'py>, Indices<'py>, Indices<'py>, Array<'py>, Array<'py>);
 
-/// The observations of all groups, one group after the other.
+/// Returns the observations of all groups in sequence.
 pub fn observations(groups: &[Group<'_>]) -> PyResult<Vec<Observation>> {
     let mut all = Vec::new();
     for (kind, points, photos, commons, values, covariances) in groups {
@@ -44,7 +44,7 @@ pub fn observations(groups: &[Group<'_>]) -> PyResult<Vec<Observation>> {
     Ok(all)
 }
 
-/// One row of a matrix.
+/// Returns one row of a matrix.
 fn own<'a, T>(all: &'a [T], shape: &[usize], row: usize) -> &'a [T] {
     &all[row * shape[1]..][..shape[1]]
 }
@@ -52,7 +52,7 @@ fn own<'a, T>(all: &'a [T], shape: &[usize], row: usize) -> &'a [T] {
 /// Residuals, redundancy numbers, standardized residuals, weighted square and weight.
 pub type AdjustedRow = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64);
 
-/// What has become of an observation, for Python.
+/// Converts an adjusted observation to a row.
 pub fn adjusted_row(observation: AdjustedObservation) -> AdjustedRow {
     let AdjustedObservation { residual, redundancy, standardized, square, weight } = observation;
     (residual, redundancy, standardized, square, weight)

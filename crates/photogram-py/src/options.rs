@@ -1,16 +1,16 @@
-//! Options that Python gives by name.
+//! Options that are selected by name.
 
 use photocore::adjustment::Loss;
 use photocore::normals::Ordering;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// The ordering of the given name.
+/// Returns the ordering of a name.
 pub fn named_ordering(name: &str) -> PyResult<Ordering> {
     Ordering::named(name).ok_or_else(|| unknown("ordering", name))
 }
 
-/// The loss of the given name and scale.
+/// Returns the loss of a name and scale.
 pub fn named_loss(loss: Option<(&str, f64)>) -> PyResult<Option<Loss>> {
     match loss {
         None => Ok(None),
@@ -20,7 +20,7 @@ pub fn named_loss(loss: Option<(&str, f64)>) -> PyResult<Option<Loss>> {
     }
 }
 
-/// An option that has no such choice.
+/// Returns the error for an unknown choice of an option.
 pub fn unknown(option: &str, value: &str) -> PyErr {
     PyValueError::new_err(format!("{option} cannot be {value:?}"))
 }

@@ -1,4 +1,4 @@
-//! Resection of one photo; its documentation is in `_photocore.pyi`.
+//! Resection of one photo; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::adjustment::{Method, Options, Published, Stop};
@@ -72,7 +72,7 @@ pub fn resect(
     run(py, &resection, &Options { method, max_iterations, covariance, loss: None, threads: 0 })
 }
 
-/// Adjusts on the calling thread: one photo is too little work for another one.
+/// Adjusts on the calling thread: the work for one photo is too small for another thread.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
     let solution =
         watched(py, Workers::CALLER, None, |pool, watch| resection.adjust_on(options, pool, watch))?;
@@ -106,7 +106,7 @@ fn degeneracy(why: Degeneracy) -> &'static str {
     }
 }
 
-/// A resected photo.
+/// Resected photo.
 #[pyclass(frozen, get_all, module = "photogram._photocore")]
 pub struct ResectionSolution {
     status: &'static str,

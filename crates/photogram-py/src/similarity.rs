@@ -1,4 +1,4 @@
-//! Absolute orientation; its documentation is in `_photocore.pyi`.
+//! Absolute orientation; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::programs::similarity::{
@@ -132,7 +132,7 @@ fn trace_row(py: Python<'_>, trace: &Trace) -> PyResult<Py<PyTuple>> {
     Ok(row.into_pyobject(py)?.unbind())
 }
 
-/// An oriented model.
+/// Oriented model.
 #[pyclass(frozen, get_all, module = "photogram._photocore")]
 pub struct SimilaritySolution {
     status: &'static str,

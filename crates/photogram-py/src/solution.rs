@@ -1,4 +1,4 @@
-//! What all solutions tell, as Python sees it.
+//! Results common to all solutions.
 
 use photocore::adjustment::{Adjustment, Iteration, Status};
 use pyo3::prelude::*;
@@ -7,12 +7,12 @@ use pyo3::types::PyDict;
 /// Number, weighted sum of squares, largest change in standard deviations, damping.
 pub type IterationRow = (usize, f64, f64, f64);
 
-/// One iteration as Python sees it.
+/// Converts an iteration to a row.
 pub fn iteration_row(iteration: &Iteration) -> IterationRow {
     (iteration.number, iteration.sum_of_squares, iteration.largest_change, iteration.damping)
 }
 
-/// How an adjustment ended, as Python says it.
+/// Returns the name of a status.
 pub fn status_name(status: Status) -> &'static str {
     match status {
         Status::Converged => "converged",
@@ -21,7 +21,7 @@ pub fn status_name(status: Status) -> &'static str {
     }
 }
 
-/// Predicted multiply-adds of a factorisation in each ordering that was tried; NaN if the network is too large for it.
+/// Returns the predicted multiply-adds of a factorization for each tried ordering; NaN if the network is too large for the ordering.
 pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (ordering, operations) in &adjustment.effort.predictions {
@@ -30,7 +30,7 @@ pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bo
     Ok(dict)
 }
 
-/// Predicted multiply-adds of each phase.
+/// Returns the predicted multiply-adds of each phase.
 pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let operations = adjustment.effort.operations;
     let dict = PyDict::new(py);
@@ -40,7 +40,7 @@ pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bou
     Ok(dict)
 }
 
-/// Seconds spent in each phase.
+/// Returns the seconds spent in each phase.
 pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let seconds = adjustment.effort.seconds;
     let dict = PyDict::new(py);

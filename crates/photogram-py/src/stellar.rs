@@ -1,4 +1,4 @@
-//! Stellar camera calibration; its documentation is in `_photocore.pyi`.
+//! Stellar camera calibration; the documentation is in `_photocore.pyi`.
 
 use numpy::{PyArray1, PyArrayMethods};
 use photocore::Threads;
@@ -30,13 +30,13 @@ create_exception!(
 
 /// Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury).
 type Place = (f64, f64, f64, f64);
-/// What is not estimated of a camera.
+/// Camera model without its values.
 #[derive(FromPyObject)]
 pub enum CameraKind {
-    /// Of plates: reference principal distance (none: scale first), Brown's decentering, common scale.
+    /// Plate camera: reference principal distance (None: scale first), Brown's decentering, common scale.
     #[pyo3(transparent)]
     Plate((Option<f64>, bool, bool)),
-    /// Of another model: its name, common scale.
+    /// Another model: name, common scale.
     #[pyo3(transparent)]
     Lens((String, bool)),
 }
@@ -67,7 +67,7 @@ fn kind(camera: CameraKind) -> PyResult<Kind> {
     }
 }
 
-/// A camera of plates or of another model; it must have room for the parameters of the latter.
+/// Returns a plate camera or another model; the model must not have more parameters than fit.
 fn camera_of(camera: CameraKind, interior: &Array<'_>) -> PyResult<Camera> {
     let kind = kind(camera)?;
     if kind.lens.as_ref().is_some_and(|lens| lens.parameter_names().len() > INTERIOR) {
@@ -175,7 +175,7 @@ pub fn plate_directions<'py>(
     table(py, xy.iter().map(direction).collect())
 }
 
-/// A calibration as it is known beforehand.
+/// Input of a stellar calibration.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct StellarProblem {
     calibration: Calibration,
@@ -389,7 +389,7 @@ impl StellarProblem {
     }
 }
 
-/// Stars, images and axis after an adjustment.
+/// Converts adjusted stars, images and axis to a dictionary.
 fn observations<'py>(py: Python<'py>, found: Observations) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("places", table(py, found.places)?)?;
@@ -403,7 +403,7 @@ fn observations<'py>(py: Python<'py>, found: Observations) -> PyResult<Bound<'py
     Ok(dict)
 }
 
-/// Discrepancies and partials as arrays; the second index is x or y.
+/// Converts discrepancies and partials to arrays; the second index is x or y.
 fn equations<'py>(py: Python<'py>, all: &[Rows]) -> PyResult<Bound<'py, PyDict>> {
     let count = all.len();
     let dict = PyDict::new(py);

@@ -1,4 +1,4 @@
-//! Numbers and tables as text; their documentation is in `_photocore.pyi`.
+//! Numbers and tables as text; the documentation is in `_photocore.pyi`.
 
 use std::convert::Infallible;
 use std::io::{self, Write};
@@ -28,7 +28,7 @@ pub fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Vector<'py>, bool) {
     (PyArray1::from_vec(py, numbers), whole)
 }
 
-/// Bytes of a short line.
+/// Length of a short line in bytes.
 const LINE: usize = 16;
 
 #[pyclass]
@@ -68,10 +68,10 @@ impl TableReader {
     }
 }
 
-/// Rows that a thread writes at a time.
+/// Number of rows that a thread writes in one task.
 const STRETCH: usize = 8192;
 
-/// A column of a table.
+/// Column of a table.
 pub enum Column {
     Floats(Vec<f64>),
     Integers(Vec<i64>),
@@ -107,7 +107,7 @@ impl Column {
     }
 
     fn write(&self, row: usize, to: &mut Vec<u8>) {
-        // Writing to memory does not fail.
+        // Writing to memory cannot fail.
         let _ = match self {
             Self::Floats(column) if column[row].is_nan() => Ok(()),
             Self::Floats(column) => write!(to, "{:?}", column[row]),
@@ -118,7 +118,7 @@ impl Column {
     }
 }
 
-/// In quotation marks where another program might take a part of it for something else.
+/// Writes a text, quoted if it contains a possible delimiter, quote or comment character.
 fn write_text(text: &str, to: &mut Vec<u8>) -> io::Result<()> {
     if !text.contains([',', ';', '"', '|', '\t', '#', '\n']) && text == text.trim() {
         return to.write_all(text.as_bytes());

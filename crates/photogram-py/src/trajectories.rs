@@ -14,10 +14,10 @@ use crate::options::unknown;
 /// Name, degree, and the numbers of a basis: reference and scale of a polynomial, knots of a spline.
 type BasisRow = (String, usize, Vec<f64>);
 
-/// Times and rotation matrices, and how they are joined.
+/// Times and rotation matrices, and the interpolation.
 type AttitudesRow<'py> = (Vec<f64>, Array<'py>, String);
 
-/// A trajectory as Python says it.
+/// Trajectory as Python attributes.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct TrajectoryRow<'py> {
@@ -35,15 +35,15 @@ pub struct TrajectoryRow<'py> {
     rotations: String,
 }
 
-/// Indices of a photo and a trajectory, the time there, indices of its rate and offset among the unknowns.
+/// Indices of a photo and a trajectory, the time, and indices of the rate and offset among the shared parameters.
 pub type TimedRow = (usize, usize, f64, Option<usize>, Option<usize>);
 
-/// The mount of a row.
+/// Converts a row to a pose link.
 pub fn on_trajectory((photo, trajectory, time, rate, offset): TimedRow) -> OnTrajectory {
     OnTrajectory { photo, trajectory, time, rate, offset }
 }
 
-/// The trajectory of a row.
+/// Converts a row to a trajectory.
 pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
     let vectors = |name, array: &Array<'_>| -> PyResult<Vec<Vector3>> {
         Ok(rows::<3>(name, array)?.into_iter().map(Vector3::from).collect())
@@ -75,7 +75,7 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
     Ok(Trajectory { course, position: row.position, rotation: row.rotation })
 }
 
-/// For each time what the functions of a basis are that are not zero: the number of the first, and their values.
+/// Nonzero basis functions per time: index of the first, and their values.
 type Active = Vec<(usize, Vec<f64>)>;
 
 /// Positions, attitudes row by row, axes of coefficients row by row, right Jacobians row by row; functions of positions, of rotations.

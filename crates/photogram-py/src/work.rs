@@ -1,4 +1,4 @@
-//! Work without the GIL: the threads that share it, and the signals and the progress that are looked after meanwhile.
+//! Execution without the GIL: threads, signals and progress.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -14,44 +14,44 @@ use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use crate::memory;
 use crate::solution::iteration_row;
 
-/// Between two looks at signals and progress.
+/// Interval between two checks of signals and progress.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// Threads for each processor at the most: more only wait for each other, and thousands of them take minutes to start.
+/// Maximum number of threads per processor: further threads only wait, and thousands of them need minutes to start.
 const THREADS_EACH: usize = 4;
-/// Observed points up to which work stays on the calling thread, where the number of threads is not asked for: it takes some
-/// milliseconds, and to start threads and to hand work over takes as long.
+/// Number of observed points up to which work remains on the calling thread, if the number of threads is not specified. Such work needs
+/// some milliseconds, as much as the start of threads.
 const SMALL: usize = 5000;
-/// Local blocks from which on what solutions have needed of them is given back before the inversion, not left to the allocator.
+/// Number of local blocks from which memory of the solution phase is returned to the system before the inversion.
 const MANY: usize = 200_000;
 
-/// Who does work.
+/// Threads of a computation.
 pub struct Workers {
-    /// So many threads, 0 for all processors, which the calling thread watches; None for the calling thread itself, which looks after
-    /// signals and progress between the phases of the work, or one other where it is not the main thread.
+    /// Number of threads (0 for all processors), watched by the calling thread. None for the calling thread itself, which checks signals
+    /// and progress between phases, or for one other thread if it is not the main thread.
     threads: Option<usize>,
-    /// Whether they multiply matrices, for which each needs buffers.
+    /// Whether they multiply matrices, which needs buffers per thread.
     multiply: bool,
 }
 
 impl Workers {
-    /// The calling thread, for work without larger matrices.
+    /// The calling thread, for work without large matrices.
     pub const CALLER: Self = Self { threads: None, multiply: false };
 
-    /// As many threads as asked for; where none are, the calling one when there are few observed points.
+    /// Selects the requested number of threads; for 0, the calling thread if there are few observed points.
     pub fn of(threads: usize, points: usize) -> Self {
         Self { threads: (threads > 0 || points > SMALL).then_some(threads), multiply: true }
     }
 
-    /// The same without buffers for products of matrices.
+    /// Selects threads without buffers for matrix products.
     pub fn reading(rows: usize) -> Self {
         Self { multiply: false, ..Self::of(0, rows) }
     }
 }
 
-/// Works without the GIL. Signals and the caller's `progress` are looked after now and then, on this thread.
+/// Runs work without the GIL. This thread checks signals and calls `progress` at intervals.
 ///
 /// # Errors
-/// What a signal or `progress` raised; memory or threads that are not to be had.
+/// An exception of a signal or of `progress`; insufficient memory or threads.
 pub fn watched<T: Send, E: Send>(
     py: Python<'_>,
     workers: Workers,
@@ -67,7 +67,7 @@ pub fn watched<T: Send, E: Send>(
     found.ok_or_else(memory::no_buffers)
 }
 
-/// The same for work that keeps what it finds and says whether it succeeded: compiled once, not for each work.
+/// Runs work that stores its result and returns its success: compiled once for all types of work.
 fn supervise(
     py: Python<'_>,
     workers: Workers,
@@ -98,7 +98,7 @@ fn supervise(
             }
         }
     };
-    // A thread that has become a pool stays one as long as the process lives: the main thread alone does. Others come and go.
+    // A thread remains in its pool for the life of the process: only the main thread becomes a pool. Other threads are temporary.
     let threads = match workers.threads {
         None if !is_main_thread(py)? => Some(1),
         asked => asked,
@@ -116,7 +116,7 @@ fn supervise(
                 let pool = Threads::from(pool);
                 let done = room.then(|| work(&pool, &mut watch));
                 drop(pool);
-                // Threads keep buffers until they have ended, and the next ones may need the room. A panic has reached the caller.
+                // Threads retain their buffers until they end, and later threads may need the memory. A panic has reached the caller.
                 handles.into_iter().for_each(|thread| drop(thread.join()));
                 done
             })
@@ -126,20 +126,20 @@ fn supervise(
     match raised {
         Some(error) => Err(error),
         None if !succeeded && failures.more() => Err(memory::failure()),
-        // What is made of the result needs a reserve again.
+        // The conversion of the result needs a reserve again.
         None => memory::arm().map(drop),
     }
 }
 
-/// Whether the calling thread is the one that Python started in.
+/// Returns whether the calling thread is Python's main thread.
 fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
     let threading = py.import("threading")?;
     let main = threading.call_method0("main_thread")?.getattr("ident")?;
     main.eq(threading.call_method0("get_ident")?)
 }
 
-/// The main thread, which calls, as a pool of one. A thread can be in one pool only and stays in it: it is made once, and once more by
-/// the thread that is the main one of a process forked from this.
+/// Returns the main thread, which is the caller, as a pool of one. A thread can be in one pool only: the pool is created once, and again by
+/// the main thread of a forked process.
 fn pool_of_main_thread() -> PyResult<&'static Threads> {
     thread_local! {
         static POOL: Cell<Option<&'static Threads>> = const { Cell::new(None) };
@@ -153,7 +153,7 @@ fn pool_of_main_thread() -> PyResult<&'static Threads> {
     Ok(pool)
 }
 
-/// So many new threads, and no more than are of use; 0 for all processors. With them, how to wait for their end.
+/// Starts `threads` new threads (0: one per processor), limited per processor. Returns the pool and its join handles.
 fn start(threads: usize) -> PyResult<(ThreadPool, Vec<JoinHandle<()>>)> {
     static PROCESSORS: OnceLock<usize> = OnceLock::new();
     let processors = *PROCESSORS.get_or_init(|| thread::available_parallelism().map_or(1, usize::from));

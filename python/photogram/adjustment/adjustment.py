@@ -47,18 +47,6 @@ from photogram.results.iteration import Iteration
 from photogram.results.result import Result, dropped_points
 from photogram.words import phrase
 
-__all__ = [
-    "AsPublished",
-    "Ordering",
-    "Progress",
-    "UnitVariance",
-    "adjust",
-    "adjusted_again",
-    "core_options",
-    "teller",
-    "with_datum",
-]
-
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 

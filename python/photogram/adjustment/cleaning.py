@@ -27,8 +27,6 @@ from photogram.show.page import Document, Part, Remarks, Section
 from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
 
-__all__ = ["Cleaned", "clean"]
-
 MOST_ROUNDS = 3  # Of components and snooping
 STANDS = 0.05  # Components that change by less are the same
 
@@ -80,7 +78,7 @@ class Cleaned(Brief, Documented):
 
     def section(self) -> Section:
         """Return the section on weights: what was done to them, and the components that are left."""
-        from photogram.results.components_document import components_section
+        from photogram.results.components import components_section
 
         parts: list[Part] = [Remarks(self.changes)]
         if self.components is not None:

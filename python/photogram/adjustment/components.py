@@ -24,8 +24,6 @@ from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 from photogram.words import phrase
 
-__all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components"]
-
 NOTHING = 1e-6  # A redundancy that is rounding
 OTHERS = "all other observations"  # What is in no group
 DECREASE = 1e-12  # Relative decrease of the sum of squares by a step that ends the adjustment of a collection

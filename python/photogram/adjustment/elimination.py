@@ -16,8 +16,6 @@ from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_ter
 from photogram.results.result import Result
 from photogram.words import phrase
 
-__all__ = ["Elimination", "eliminate_terms"]
-
 
 @dataclass(frozen=True, eq=False)
 class Elimination:

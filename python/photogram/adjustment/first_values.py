@@ -31,8 +31,6 @@ from photogram.network.subset import kept_images, of_photos, with_rejected_point
 from photogram.show.methods import Brief
 from photogram.words import Phrase, phrase
 
-__all__ = ["FirstValues", "first_values"]
-
 _Array = TypeVar("_Array", bound=NDArray[np.generic])
 
 NEEDED = 4  # Known points of a photo that is resected

@@ -27,8 +27,6 @@ from photogram.network.subset import image_rows
 from photogram.results.result import Result
 from photogram.words import phrase
 
-__all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
-
 _OF_POSES = (Attitude, Position, Rate, Velocity)
 _AGREES = 1e-3  # Standard deviations by which an observation of a trajectory may differ from it
 

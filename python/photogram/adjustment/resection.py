@@ -37,9 +37,6 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE, standardized
 from photogram.words import Phrase, phrase
 
-__all__ = ["Pose", "Resection", "resect"]
-
-
 RANK_FAILURES = ("too few points", "collinear", "danger cylinder", "undetermined")
 """Failures of the core that are a :class:`RankError`."""
 SOLVED = (

@@ -11,8 +11,6 @@ from photogram.arguments.arrays import argument_error, number, one_of
 from photogram.messages import Message
 from photogram.words import phrase
 
-__all__ = ["SCALES", "Loss", "LossName", "loss_row", "remark"]
-
 LossName = Literal["huber", "cauchy"]
 Loss = LossName | tuple[LossName, float]
 """A robust loss, perhaps with its scale: where it sets in, in standard deviations a priori."""

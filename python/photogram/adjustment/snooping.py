@@ -56,14 +56,6 @@ from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
 from photogram.words import Phrase, phrase
 
-__all__ = [
-    "block_trial",
-    "finished",
-    "gone",
-    "snoop",
-    "started_by_consensus",
-    "used_images",
-]
 MOST_PHOTOS = 0.2  # Of the photos, that may agree with no pose: with more it is the consensus that is wrong
 
 

@@ -23,8 +23,6 @@ from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
 from photogram.words import phrase
 
-__all__ = ["variance_function"]
-
 TOLERANCE = 1e-6  # Of the adjustments, in standard deviations
 
 

@@ -122,7 +122,7 @@ def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: i
     pairs += second
     if (pairs[1:] > pairs[:-1]).all():  # sorted, as most blocks are
         return np.zeros(0, dtype=np.int64)
-    ordered = np.sort(pairs)
+    ordered = np.sort(pairs, kind="stable")  # fast for images that are sorted by photo
     if (ordered[1:] != ordered[:-1]).all():
         return np.zeros(0, dtype=np.int64)
     return np.setdiff1d(np.arange(len(pairs)), np.unique(pairs, return_index=True)[1])

@@ -260,7 +260,7 @@ def _weights(
 
 
 def _document(found: Calibrated, weights: VarianceComponents | None) -> Document:
-    from photogram.results.components_document import components_section
+    from photogram.results.components import components_section
 
     document = found.document()
     more = [] if weights is None else [components_section(weights)]

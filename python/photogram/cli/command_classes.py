@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from copy import copy
-from functools import cache
+from functools import cache, partial
 from inspect import Parameter
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
@@ -53,7 +54,33 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
     return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[(kind, info, *others)])
 
 
-class Command(TyperCommand):
+class _Params:
+    """Options and arguments; typer converts only values that need it: it would import pydantic (80 ms)."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters; :func:`_processed` processes their values."""
+        parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for parameter in parameters:
+            if hasattr(parameter, "type_descriptor"):  # older versions of typer convert without pydantic
+                parameter.process_value = partial(_processed, parameter)
+        return parameters
+
+
+def _processed(parameter: Any, ctx: Any, value: Any) -> Any:
+    """Return the value of an option or argument; defaults and accessible paths need no conversion."""
+    is_path = parameter.type_descriptor.is_path and value is not None
+    if is_path and (os.access(value, os.R_OK) or not os.path.exists(value)):
+        value = Path(value)
+    elif value != parameter.default or parameter.required:
+        return type(parameter).process_value(parameter, ctx, value)
+    return value if parameter.callback is None else parameter.callback(ctx, parameter, value)
+
+
+class Group(_Params, TyperGroup):
+    """A group of commands."""
+
+
+class Command(_Params, TyperCommand):
     """A command whose help has panels and switches without a type."""
 
     def __init__(self, *args: Any, **values: Any) -> None:
@@ -73,7 +100,7 @@ class Command(TyperCommand):
         return option
 
 
-class GroupWithMain(TyperGroup):
+class GroupWithMain(Group):
     """A group whose first command is the default command.
 
     A folder with the name of a side command must be written as `./check`.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.command_classes import Command, GroupWithMain
+from photogram.cli.command_classes import Command, Group, GroupWithMain
 from photogram.cli.console import output
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ def application(word: str | None = None) -> typer.Typer:
     """Return the command line."""
     made = typer.Typer(
         name="photogram",
+        cls=Group,
         help="Photogrammetric least-squares adjustment with the covariance of every result.",
         epilog="Exit codes: 0 converged, 1 input or output at fault, 2 usage, 3 not converged, diverged or"
         " something grave found, 4 a result that cannot be used as it is, 129, 130, 143 ended by a signal.",

@@ -95,7 +95,7 @@ class AdjustmentOutcome(Generic[Network]):
     @cached_property
     def document(self) -> Document:
         """The document of the report, with weights and removed observations."""
-        from photogram.results.components_document import weighed_document
+        from photogram.results.components import weighed_document
 
         if self.cleaned is not None:
             return self.cleaned.document()

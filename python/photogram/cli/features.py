@@ -69,7 +69,7 @@ def features(
     from photogram import features as fitted
     from photogram.formats.adjusted import feature_files
     from photogram.io.json import to_json
-    from photogram.results.features_report import features_document, features_section
+    from photogram.results.features import features_document, features_section
     from photogram.show.forms import titled_lines
     from photogram.show.judgement import judged
     from photogram.show.page import Document

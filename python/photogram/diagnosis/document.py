@@ -13,7 +13,7 @@ from photogram.results.result import Result
 from photogram.show import page
 from photogram.show.forms import part_lines
 from photogram.show.judgement import judged, verdict_table
-from photogram.show.page import Cell, Column, Document, Fact, Row, Table, Text, Tone
+from photogram.show.page import Cell, Column, Document, Fact, Table, Text, Tone
 from photogram.statistics.verdict import Verdict
 
 LEVELS: dict[str, tuple[str, Tone]] = {"grave": ("grave", "bad"), "look": ("to look at", "look")}
@@ -85,11 +85,11 @@ def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
     """Return the table of findings with the titles of their parts, grave findings first."""
     ordered = sorted(findings, key=lambda row: row[0].level != "grave")
     columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
-    rows: list[Row] = []
+    rows: list[list[Cell]] = []
     for finding, title in ordered[:MAX_FINDINGS]:
         level, tone = LEVELS[finding.level]
         names = listed([*finding.photos, *finding.points], MAX_NAMES)
-        rows.append([Cell(level, tone=tone), finding.text, names, title])
+        rows.append([Cell(level, tone=tone), *map(Cell, (finding.text, names, title))])
     rest = len(ordered) - len(rows)
     note = f"The JSON document has {rest} more." if rest else ""
     return Table("Findings", columns, rows, note)

@@ -40,7 +40,7 @@ from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
-from photogram.show.page import Column, Table
+from photogram.show.quantity import Axis, Quantity, Table
 
 ROUNDS = 20  # Adjustments at the most
 COMPARABLE = 0.4  # Smaller test values (of the largest) may be consequences
@@ -394,19 +394,19 @@ def _list(result: Result, spread: float, section: Section) -> None:
         return
     block = result.block
     unit, factor = small_unit(block.image_unit)
-    listed: list[tuple[str | float, ...]] = []
-    for row in np.argsort(-values[images, axes], kind="stable")[:SHOWN].tolist():
-        i, axis = int(images[row]), int(axes[row])
-        residual, redundancy = factor * result.residuals[i, axis], result.redundancy[i, axis]
-        names = block.photo_ids[block.image_photos[i]], block.point_ids[block.image_points[i]]
-        figures = residual, redundancy, values[i, axis], residual / redundancy
-        listed.append((*names, "xy"[axis], *map(float, figures)))
+    order = np.argsort(-values[images, axes], kind="stable")[:SHOWN]
+    rows, axis = images[order], axes[order]
+    residuals, redundancy = factor * result.residuals[rows, axis], result.redundancy[rows, axis]
+    photos, points = block.image_photos[rows].tolist(), block.image_points[rows].tolist()
+    small = (Axis.of("", unit),)
     columns = [
-        *(Column(head, text=True) for head in ("Photo", "Point", "Axis")),
-        Column("Residual", unit, decimals=1),
-        Column("Redundancy", decimals=3),
-        Column("Test value", decimals=2),
-        Column("Error", unit, decimals=1),
+        Quantity([block.photo_ids[photo] for photo in photos], kind="name", head="Photo"),
+        Quantity([block.point_ids[point] for point in points], kind="name", head="Point"),
+        Quantity(["xy"[k] for k in axis], kind="name", head="Axis"),
+        Quantity(residuals, small, "deviation", head="Residual", decimals=1),
+        Quantity(redundancy, head="Redundancy", decimals=3),
+        Quantity(values[rows, axis], head="Test value", decimals=2),
+        Quantity(residuals / redundancy, small, "deviation", head="Error", decimals=1),
     ]
     note = "The error is the gross error that would explain the residual."
-    section.parts.append(Table("Largest test values of the other observations", columns, listed, note))
+    section.parts.append(Table("", "Largest test values of the other observations", columns, note))

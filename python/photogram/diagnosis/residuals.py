@@ -14,7 +14,7 @@ from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
-from photogram.show.page import Column, Table
+from photogram.show.quantity import Axis, Quantity, Table
 from photogram.words import phrase
 
 FEWEST = 20  # Images of a photo that a test of its pattern needs
@@ -44,21 +44,18 @@ def residuals(result: Result, spread: float) -> Section:
 def _by_rays(result: Result, section: Section) -> None:
     used = result.used_images
     unit, factor = small_unit(result.block.image_unit)
-    rays = result.point_rays[result.block.image_points]
-    listed: list[tuple[float, ...]] = []
-    for number in np.unique(rays[used]).tolist():
-        rows = used & (rays == number)
-        x, y = factor * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
-        redundancy = result.redundancy[rows].mean()
-        listed.append((number, int(rows.sum()), float(x), float(y), float(redundancy)))
+    rays, squares = result.point_rays[result.block.image_points], result.residuals**2
+    numbers = np.unique(rays[used])
+    own = [used & (rays == number) for number in numbers]
+    rms = factor * np.sqrt([squares[rows].mean(axis=0) for rows in own])
+    axes = (Axis.of("x", unit), Axis.of("y", unit))
     columns = [
-        Column("Rays"),
-        Column("Image observations"),
-        Column("rms x", unit, decimals=2),
-        Column("rms y", unit, decimals=2),
-        Column("Mean redundancy", decimals=3),
+        Quantity(numbers, head="Rays"),
+        Quantity([int(rows.sum()) for rows in own], head="Image observations"),
+        Quantity(rms, axes, "deviation", head="rms {}", decimals=2),
+        Quantity([result.redundancy[rows].mean() for rows in own], head="Mean redundancy", decimals=3),
     ]
-    section.parts.append(Table("Residuals by number of rays", columns, listed))
+    section.parts.append(Table("", "Residuals by number of rays", columns))
 
 
 def _sums(result: Result, section: Section) -> None:

@@ -21,7 +21,8 @@ from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.network.observations import Control
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
-from photogram.show.page import Column, Row, Section, Table, decimals_of
+from photogram.show.page import Section, decimals_of
+from photogram.show.quantity import Axis, Quantity, Table
 from photogram.words import phrase
 
 __all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
@@ -281,29 +282,31 @@ def placed_section(found: Placed) -> Section:
     own.sort(key=lambda k: natural_order(names[int(found.rows[k])]))
     sd = np.sqrt(np.diagonal(found.point_covariances, axis1=1, axis2=2))
     decimals = decimals_of(sd)
+    rows, differences = found.rows[own[:MOST]], _listed_differences(found)
+    axes = [Axis.of(name.capitalize(), unit) for name, unit in zip(found.names, found.units, strict=True)]
+    local = tuple(Axis.of(axis, "m") for axis in _LOCAL)
     columns = [
-        Column("Point", text=True),
-        Column("Kind", text=True),
+        Quantity([names[row] for row in rows.tolist()], kind="name", head="Point"),
+        Quantity(kinds[rows], kind="name", head="Kind"),
         *(
-            Column(name.capitalize(), unit, 8 if unit == "deg" else decimals)
-            for name, unit in zip(found.names, found.units, strict=True)
+            Quantity(values, (axis,), "deviation", head="{}", decimals=8 if axis.unit == "deg" else decimals)
+            for axis, values in zip(axes, found.points[own[:MOST]].T, strict=True)
         ),
-        *(Column(f"sd {axis}", "m", decimals) for axis in _LOCAL),
-        *(Column(f"d {axis}", "m", decimals) for axis in _LOCAL),
+        Quantity(sd[own[:MOST]], local, "deviation", head="sd {}", decimals=decimals),
+        Quantity(
+            np.array([differences[row] for row in rows.tolist()]),
+            local,
+            "deviation",
+            head="d {}",
+            decimals=decimals,
+        ),
     ]
-    differences = _listed_differences(found)
-    rows: list[Row] = []
-    for k in own[:MOST]:
-        row = int(found.rows[k])
-        rows.append(
-            [names[row], str(kinds[row]), *found.points[k].tolist(), *sd[k].tolist(), *differences[row]]
-        )
     left = len(own) - len(rows)
     note = "d: adjusted minus given. Tables of all photos and points are in `in_crs`" + (
         f"; {left} more there." if left else "."
     )
     title = f"Control and check points in {found.crs}"
-    return Section("in-crs", title, [Table(title, columns, rows, note)] if rows else [])
+    return Section("in-crs", title, [Table("", title, columns, note)] if own else [])
 
 
 def _listed_differences(found: Placed) -> dict[int, list[float]]:

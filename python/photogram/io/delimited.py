@@ -25,7 +25,7 @@ from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD, cells
 from photogram.words import Phrase, phrase
 
-LARGE = 1 << 20  # Bytes of a table above which the extension module reads it
+LARGE = 1 << 16  # Bytes of a table above which the extension module reads it
 PIECE = 1 << 22  # Bytes of a large table that are read at a time
 COMMENT = "#"
 TITLES = 30  # Lines in which a header is looked for below titles

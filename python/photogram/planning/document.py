@@ -14,9 +14,9 @@ from photogram.planning.pattern import Pattern
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
-from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
-from photogram.show.sketch.layout import labelled
-from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
+from photogram.show.quantity import Axis, Quantity, Table, chosen, component, of_each, records
+from photogram.show.sketch.letters import NOWHERE
+from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 from photogram.statistics.reliability import TESTABLE, noncentrality
@@ -28,7 +28,7 @@ MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which mo
 MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
 SHARE = (Axis("", "", small="percent", factor=100.0),)
 IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
-MOTION_UNITS = {"s": (1e-3, "ms"), "rad/s": (1e-3, "mrad/s"), "rad": (ARCSEC, "arcsec")}
+MOTION_UNITS = {"s": ("ms", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("arcsec", 1 / ARCSEC)}
 _PANEL_INCHES = 6.0  # Longer side of a panel
 _MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
@@ -146,38 +146,40 @@ def _multiples(pattern: Pattern) -> Table:
 
 
 def _photos(pattern: Pattern) -> Table:
-    linear = pattern.block.linear_unit
-    axes = (
-        *(Axis.of(quality.unknown, linear) for quality in pattern.photos[:3]),
-        *(Axis.turned(quality.unknown) for quality in pattern.photos[3:]),
-    )
-    of = np.arange(len(axes))
-    unknown = [f"{axis.name}, {axis.small}" for axis in axes]
-    columns = [
-        Quantity(np.array(unknown, dtype=object), (), "name", head="Unknown"),
-        of_each(pattern.photos, "rms_sd", axes, "deviation", head="rms sd", of=of),
-        of_each(pattern.photos, "max_sd", axes, "deviation", head="Largest sd", of=of),
-        of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3),
-    ]
-    return Table("", pattern.name, columns)
+    turned = ("omega", "phi", "kappa")
+    axes = [Axis.of(name, pattern.block.linear_unit) for name in pattern.axes] + [*map(Axis.turned, turned)]
+    redundancy = of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3)
+    rms, largest = ([getattr(each, name) for each in pattern.photos] for name in ("rms_sd", "max_sd"))
+    return _deviations(pattern, axes, rms, largest, redundancy)
 
 
 def _motion(pattern: Pattern) -> Table:
-    rows: list[tuple[str, float, float | None, float | None]] = []
-    for quality in pattern.motion:
-        factor, unit = MOTION_UNITS.get(quality.unit, (1.0, quality.unit))
-        rows.append((f"{quality.unknown}, {unit}", quality.rms_sd / factor, quality.max_sd / factor, None))
-    for axis, sd, ratio in zip(
-        pattern.axes, pattern.known_rms_sd or (), _improvements(pattern), strict=False
-    ):
-        name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
-        rows.append((name, sd, None, ratio))
-    values = [[row[k] for row in rows] for k in range(4)]
+    known, linear = pattern.known_rms_sd or (), pattern.block.linear_unit
+    units = [MOTION_UNITS.get(each.unit, (each.unit, 1.0)) for each in pattern.motion]
+    axes = [
+        Axis(each.unknown, small=unit, factor=factor)
+        for each, (unit, factor) in zip(pattern.motion, units, strict=True)
+    ]
+    if known:
+        axes += [
+            Axis.of(f"{axis} of new points if the readout time is known", linear) for axis in pattern.axes
+        ]
+    rms = [*(each.rms_sd for each in pattern.motion), *known]
+    largest = [*(each.max_sd for each in pattern.motion), *(np.nan for _ in known)]
+    better = [*(None for _ in pattern.motion), *(_improvements(pattern) if known else ())]
+    return _deviations(pattern, axes, rms, largest, Quantity(better, head="Times better", decimals=2))
+
+
+def _deviations(
+    pattern: Pattern, axes: Sequence[Axis], rms: Sequence[float], largest: Sequence[float], more: Quantity
+) -> Table:
+    """Return a table with a row for each unknown, of which each has its unit."""
+    own, of = tuple(axes), np.arange(len(axes))
     columns = [
-        Quantity(values[0], kind="name", head="Unknown"),
-        Quantity(values[1], head="rms sd"),
-        Quantity(values[2], head="Largest sd"),
-        Quantity(values[3], head="Times better", decimals=2),
+        replace(component(own, of)[0], head="Unknown"),
+        Quantity(np.array(rms), own, "deviation", head="rms sd", of=of),
+        Quantity(np.array(largest), own, "deviation", head="Largest sd", of=of),
+        more,
     ]
     return Table("", pattern.name, columns)
 
@@ -231,16 +233,13 @@ def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
 def _comparison_section(patterns: Sequence[Pattern]) -> Section:
     if not all(pattern.new_points.any() for pattern in patterns):
         return Section("comparison", "Side by side", [])
-    unit, axes = patterns[0].block.linear_unit, patterns[0].axes
+    unit, names = patterns[0].block.linear_unit, [pattern.name for pattern in patterns]
     groups = [pattern.points[-1] for pattern in patterns]
     sd = np.array([np.ravel([group.rms_sd, group.max_sd], order="F") for group in groups])
     least, most = sd.min(axis=0), sd.max(axis=0)
-    names = [pattern.name for pattern in patterns]
-    differ = most > 1.005 * least
-    best = [names[k] if own else "no difference" for k, own in zip(sd.argmin(axis=0), differ, strict=True)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(least > 0, most / least, np.nan)
-    rows = [f"{kind} {axis}" for axis in axes for kind in ("rms", "largest")]
+    best = np.where(most > 1.005 * least, np.array(names)[sd.argmin(axis=0)], "no difference").tolist()
+    ratios = np.divide(most, least, where=least > 0, out=np.full(len(least), np.nan))
+    rows = [f"{kind} {axis}" for axis in patterns[0].axes for kind in ("rms", "largest")]
     columns = [
         Quantity(rows, kind="name", head="Standard deviation"),
         *(Quantity(own, head=f"{name} {unit}") for name, own in zip(names, sd, strict=True)),
@@ -317,8 +316,8 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     label = f"expected standard deviation in height, {patterns[0].block.linear_unit}"
     shades = Shades(float(heights.min()), float(heights.max()), label)
     panels = [_panel(pattern, limits, shades) for pattern in patterns]
-    known = {mark.label for mark in labelled(panels[-1])}
-    every = {mark.label: mark for panel in panels for mark in labelled(panel) if isinstance(mark, Markers)}
+    known = {mark.label for mark in panels[-1].labelled}
+    every = {mark.label: mark for panel in panels for mark in panel.labelled if isinstance(mark, Markers)}
     more = [replace(mark, places=NOWHERE) for label, mark in every.items() if label not in known]
     panels[-1] = replace(panels[-1], marks=[*panels[-1].marks, *more], legend="beside")
     width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()

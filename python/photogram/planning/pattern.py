@@ -21,7 +21,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.hull import hull
-from photogram.network.motion import on_shared
+from photogram.network.motion import on_shared, timed_images
 from photogram.network.trajectories import Readout
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
@@ -319,20 +319,16 @@ class Pattern:
         return np.asarray(depths / self.block.camera_scales()[photos])
 
     def _plan(self, positions: Floats) -> Floats:
-        spheroid = self.block.spheroid
-        if spheroid is not None:
-            positions = geometry.geographic_to_geocentric(positions, spheroid)
-        return self._cartesian_plan(positions)
+        return self._cartesian_plan(geometry.Cartesian(self.block.spheroid).positions(positions))
 
     def _cartesian_plan(self, xyz: Floats) -> Floats:
         """Return the plan of places in X, Y, Z, geocentric where the space is geographic."""
-        spheroid = self.block.spheroid
-        if spheroid is None:
+        if not self.block.geographic:
             return xyz[:, :2]
+        axes = geometry.Cartesian(self.block.spheroid)
         # The mean of geocentric coordinates knows no antimeridian.
-        stations = geometry.geographic_to_geocentric(self.result.photo_positions, spheroid)
-        centre = stations.mean(axis=0)
-        frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
+        centre = axes.positions(self.result.photo_positions).mean(axis=0)
+        frame = geometry.local_frames(axes.from_cartesian(centre[np.newaxis]))[0]
         return np.asarray((xyz - centre) @ frame[:2].T)
 
 
@@ -380,21 +376,14 @@ def _axes(points: Floats) -> Floats:
 
 def _times_on_trajectories(block: Block) -> dict[str, Floats]:
     """Return the times at which the trajectories that photos share are looked at, by their names."""
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    order = np.argsort(block.image_photos, kind="stable")
-    bounds = np.searchsorted(block.image_photos[order], np.arange(len(rows) + 1))
-    spans: dict[str, tuple[float, float]] = {}
-    for each in block.timed:
-        row = rows[each.photo]
-        own = order[bounds[row] : bounds[row + 1]]
-        if each.trajectory is None or not len(own):
-            continue
-        time, since, _ = each.images(block.image_xy[own])
-        scale = 1.0 if each.readout is None else float(each.readout.position[0])
-        times = time + scale * since
-        first, last = spans.get(each.trajectory.name, (math.inf, -math.inf))
-        spans[each.trajectory.name] = min(first, float(times.min())), max(last, float(times.max()))
-    return {name: np.linspace(*span, PLACES) for name, span in spans.items()}
+    found: dict[str, list[Floats]] = {}
+    for each, trajectory, _, own in timed_images(block):
+        if each.trajectory is not None and len(own):
+            time, since, _ = each.images(block.image_xy[own])
+            scale = 1.0 if each.readout is None else float(each.readout.position[0])
+            found.setdefault(trajectory.name, []).append(time + scale * since)
+    spans = {name: np.concatenate(times) for name, times in found.items()}
+    return {name: np.linspace(times.min(), times.max(), PLACES) for name, times in spans.items()}
 
 
 def _quality(unknown: str, unit: str, sd: Floats) -> MotionQuality:

@@ -60,8 +60,7 @@ def _speaking(group: Tested) -> Tested:
 def _histogram(values: Floats, unit_weight: float) -> Panel:
     reach = float(np.clip(1.02 * np.abs(values).max(), 3.5 * min(unit_weight, 1.0), MAX_TEST_VALUE))
     number = int(np.clip(2 * round(np.sqrt(len(values))), 12, 60))
-    edges = np.linspace(-reach, reach, number + 1)
-    counts, _ = np.histogram(values, edges)
+    counts, edges = np.histogram(values, number, (-reach, reach))
     density = counts / (len(values) * np.diff(edges))
     x = np.linspace(-reach, reach, 241)
     marks: list[Mark] = [bars(edges, density, SKY, 0.6, f"{len(values):,} test values")]

@@ -1,7 +1,5 @@
 from .calibration import Calibration as Calibration
 from .calibration import calibrations as calibrations
-from .calibration_picture import plot_distortion as plot_distortion
-from .calibration_picture import plot_lens_field as plot_lens_field
 from .covariance import Covariances as Covariances
 from .covariance import Propagated as Propagated
 from .distortion import DistortionCurve as DistortionCurve
@@ -10,3 +8,5 @@ from .distortion import distortion_curve as distortion_curve
 from .distortion import lens_field as lens_field
 from .pattern_pictures import DrawnPattern as DrawnPattern
 from .pattern_pictures import drawn_patterns as drawn_patterns
+from .picture_data import plot_distortion as plot_distortion
+from .picture_data import plot_lens_field as plot_lens_field

@@ -75,13 +75,12 @@ _TABLES = {
 
 
 def block_files(result: Result) -> dict[str, Content]:
-    """Return the files of the result of a block."""
     block = result.block
     photos, points = (np.arange(len(names)) for names in (block.photo_ids, block.point_ids))
     kinds = ("control", "check", "pass")
     of_points = np.argmax(result.point_kinds[np.newaxis] == np.array(kinds)[:, np.newaxis], axis=0)
     leading = {
-        "photos": [_named("photo", block.photo_ids, photos), *_camera_column(block)],
+        "photos": [_named("photo", block.photo_ids, photos)],
         "points": [
             _named("point", block.point_ids, points),
             Column("kind", Repeated(kinds, of_points), "", "control (held), check (known) or pass"),
@@ -91,6 +90,8 @@ def block_files(result: Result) -> dict[str, Content]:
             _named("point", block.point_ids, block.image_points),
         ],
     }
+    if block.photo_cameras is not None:
+        leading["photos"].append(_named("camera", block.camera_names, block.photo_cameras))
     tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
     summary = {
         "title": block.title,
@@ -131,7 +132,6 @@ def _parts(block: Block) -> dict[str, list[Part]]:
 def parts_of_block(
     *, geographic: bool, unit: str, image_unit: str, distances: bool, observed: list[str]
 ) -> dict[str, list[Part]]:
-    """Return what the tables of a block have."""
     places = ("longitude", "latitude", "height") if geographic else ("x", "y", "z")
     lengths = ("rad", "rad", unit) if geographic else (unit,) * 3
     turns = ("rad",) * 3
@@ -172,13 +172,6 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
     return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
 
 
-def _camera_column(block: Block) -> list[Column]:
-    if block.photo_cameras is None:
-        return []
-    names = block.camera_names
-    return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
-
-
 @dataclass(frozen=True, eq=False)
 class KeptTrajectory(Stand):
     """What stands for a trajectory: what makes it, and the coefficients that it has made.
@@ -197,7 +190,6 @@ class KeptTrajectory(Stand):
 
     @classmethod
     def of(cls, given: Any) -> KeptTrajectory:
-        """Return what stands for a trajectory."""
         own = (given.name, given.table, given.position, given.rotation, given.body)
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 

@@ -23,11 +23,10 @@ from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.scores import quadratic
+from photogram.show.page import about
 
 if TYPE_CHECKING:
     from photogram import Result
-
-__all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
 LEVEL = 0.05  # Significance level of terms
 CORRELATED = 0.95  # The report lists larger correlations
@@ -39,8 +38,6 @@ FAR = 5.0  # Change of a weighted parameter that contradicts it (a priori sd)
 
 @dataclass(frozen=True)
 class ParameterTest:
-    """An estimated parameter."""
-
     # Name and unit; empty for plain numbers
     name: str
     unit: str
@@ -102,14 +99,11 @@ class GroupTest:
 
     @property
     def outcome(self) -> str:
-        """The same in words."""
         return "significant" if self.significant else "not significant"
 
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two unknowns that are correlated, by name, and their coefficient."""
-
     first: str
     second: str
     coefficient: float
@@ -161,37 +155,18 @@ class Calibration:
         """Say what needs attention, in sentences."""
         said = []
         for each in self.parameters:
-            if not each.separable:
-                said.append(
-                    f"{each.name} cannot be told from the other unknowns: its multiple correlation is"
-                    f" {each.multiple_correlation:.6f}"
-                )
-            if each.from_prior:
-                said.append(
-                    f"{each.name} is from its prior: the redundancy number of its weight is"
-                    f" {each.redundancy:.3f}, the images say little of it"
-                )
-            if each.contradicts:
-                said.append(
-                    f"{each.name} has moved by {abs(each.change) / each.given_sd:.1f} standard deviations of"
-                    " its prior: value or weight is wrong"
-                )
-        said += self._worth()
-        if self.removable is not None:
-            said.append(
-                f"{self.removable} may be left out: the least significant term; adjust again before the next"
-            )
-        return said
-
-    def _worth(self) -> list[str]:
-        kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
-        others = [
-            f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"
-            for each in self.terms
-            if not each.worth_keeping
-        ]
-        parts = (("worth keeping by their tests at 1 percent", kept), ("not worth keeping", others))
-        return [f"terms of the lens {what}: {'; '.join(names)}" for what, names in parts if names]
+            own = {"name": each.name, "r": each.multiple_correlation, "redundancy": each.redundancy}
+            own["size"] = abs(each.change) / each.given_sd if each.contradicts else 0.0
+            holds = {"inseparable": not each.separable, "prior": each.from_prior, "moved": each.contradicts}
+            said += [about(f"parameter.{code}", **own) for code in holds if holds[code]]
+        for code, kept in (("kept", True), ("others", False)):
+            names = [
+                about(f"term.{code}", names=each.names, p=each.probability, effect=each.effect)
+                for each in self.terms
+                if each.worth_keeping == kept
+            ]
+            said += [about(f"terms.{code}", names=names)] if names else []
+        return [*said, about("terms.removable", term=self.removable)] if self.removable else said
 
 
 def calibrations(result: Result) -> list[Calibration]:
@@ -202,19 +177,21 @@ def calibrations(result: Result) -> list[Calibration]:
     """
     cameras = [each for each in result.cameras if each.estimated and np.isfinite(each.cofactors).all()]
     covariances = result.covariances() if cameras and result.WHOLE else None
-    return [
-        _calibration(result, each, covariances if number < ASKED else None)
-        for number, each in enumerate(cameras)
-    ]
-
-
-def _calibration(result: Result, camera: AdjustedCamera, covariances: Covariances | None) -> Calibration:
-    parameters = tuple(_parameter(result, camera, k) for k in camera.estimated)
-    groups = tuple(_group(result, camera, names) for names in _families(camera))
-    poses = () if covariances is None else _poses(result, camera, covariances)
-    terms = tuple(terms_test(result, names, camera=camera.name) for names in groups_of_terms(camera))
-    correlations = _correlations(camera)
-    return Calibration(camera, parameters, groups, correlations, poses, terms, _removable(parameters))
+    found = []
+    for number, each in enumerate(cameras):
+        parameters = tuple(_parameter(result, each, k) for k in each.estimated)
+        found.append(
+            Calibration(
+                camera=each,
+                parameters=parameters,
+                groups=tuple(_group(result, each, names) for names in _families(each)),
+                correlations=_correlations(each),
+                poses=() if covariances is None or number >= ASKED else _poses(result, each, covariances),
+                terms=tuple(terms_test(result, names, camera=each.name) for names in groups_of_terms(each)),
+                removable=_removable(parameters),
+            )
+        )
+    return found
 
 
 def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
-from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, layered_tables
+from photogram.show.page import Drawing, Fact, Facts, Part, Remarks, Section, about, layered_tables
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
 
 if TYPE_CHECKING:
     from photogram import Result
 
 LISTED = 12  # Cameras with a table of their own
-NAMED = 3  # Photos of a correlation
 RADII = 9  # Rows of a distortion curve
 
 
@@ -40,14 +38,19 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     remarks = [
         f"{each.camera.name}: {sentence}"
         for each in shown
-        for sentence in (*_pairs(each), *_field_remarks(result, each), *each.remarks())
+        for sentence in (
+            *(about("correlated", **vars(pair)) for pair in each.correlations),
+            *(about("correlated.pose", **vars(pair)) for pair in each.poses),
+            *_field_remarks(result, each),
+            *each.remarks(),
+        )
     ]
     parts += [Remarks(remarks)] if remarks else []
     held = [each for each in result.cameras if each.given.is_held]
     facts = [
         Fact(
             f"{each.name}: {each.camera.model}",
-            values_written(each.camera),
+            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
             each.camera.unit or "",
             f"{each.photos} photos, {each.images} images",
         )
@@ -59,8 +62,7 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
         parts.append(Facts("Cameras that are held", facts))
     if len(found) > LISTED:
         parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
-    intro = "The interior orientation: what was given, what was found, and what the images say about it."
-    return Section("cameras", "Cameras", parts, intro if found else "")
+    return Section("cameras", "Cameras", parts, about("cameras") if found else "")
 
 
 def law_of(result: Result) -> str:
@@ -68,13 +70,7 @@ def law_of(result: Result) -> str:
     return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
 
 
-def values_written(camera: Camera) -> str:
-    """Return the parameters of a camera that are not zero."""
-    return ", ".join(f"{name} {value:.8g}" for name, value in camera.parameters.items() if value != 0)
-
-
 def parameters_table(found: Calibration, law: str = "") -> Table:
-    """Return the estimated parameters of a camera with their tests, which have a distribution."""
     every, camera = found.parameters, found.camera
     axes, of = tuple(Axis.of(each.name, each.unit) for each in every), np.arange(len(every))
     names = replace(component(axes, of)[0], head="Parameter")
@@ -102,11 +98,8 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
             marked=np.array([not each.separable or each.contradicts for each in every], dtype=bool),
         ),
     ]
-    note = (
-        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
-        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
-        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
-    )
+    lens = {"model": camera.camera.model, "direction": camera.camera.direction}
+    note = about("camera", **lens, photos=camera.photos, images=camera.images)
     deviations = np.array([each.sd for each in every])
     return Table(f"parameters-{camera.name}", camera.name, columns, note, "", deviations)
 
@@ -123,8 +116,7 @@ def gains_section(result: Result) -> Section:
             of_each(every, "gain", head="Gain"),
         ]
         tables.append(Table(f"gains-{name}", name, columns))
-    intro = "Without a parameter, the weighted sum of squares would rise by its gain."
-    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, intro)
+    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, about("gains"))
 
 
 def outcome(each: ParameterTest) -> str:
@@ -151,21 +143,6 @@ def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
     return Table("camera-groups", "Terms of the lens tested together", columns)
 
 
-def _pairs(found: Calibration) -> list[str]:
-    """Name what is correlated by more than 0.95."""
-
-    def some(photos: Sequence[str]) -> str:
-        more = f" and {len(photos) - NAMED} others" if len(photos) > NAMED else ""
-        return f"photo {', '.join(photos[:NAMED])}{more}"
-
-    alike = [(f"{each.first} and {each.second}", each.coefficient) for each in found.correlations]
-    alike += [
-        (f"{each.parameter} and {each.component} of {some(each.photos)}", each.coefficient)
-        for each in found.poses
-    ]
-    return [f"{both} are correlated by {coefficient:.4f}" for both, coefficient in alike]
-
-
 def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
     axes = (Axis("", unit, small="um", factor=1000.0) if unit == "mm" else Axis.of("", unit),)
     inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
@@ -185,12 +162,8 @@ def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
             for name, head in heads.items()
         ),
     ]
-    note = (
-        f"Radial distortion, added to {added} coordinates, over the {added} radius up to"
-        f" {curve.observed:.4g} {unit}. The mapping is curve and principal distance together. The balanced"
-        f" curve is zero at {curve.balanced_at:.4g} {unit}, with a principal distance of"
-        f" {curve.balanced_distance:.7g} {unit}."
-    )
+    sizes = {"observed": curve.observed, "zero": curve.balanced_at, "distance": curve.balanced_distance}
+    note = about("curve", added=added, unit=unit, **sizes)
     return Table(f"distortion-{camera}", f"Radial distortion of {camera}", columns, note, shown=rows)
 
 
@@ -209,7 +182,6 @@ def _field_remarks(result: Result, found: Calibration) -> list[str]:
 
 
 def calibration_members(result: Result) -> list[dict[str, Any]]:
-    """Return what the JSON document contains of each camera with unknown parameters."""
     return [_member(result, each) for each in calibrations(result)]
 
 

@@ -18,8 +18,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["AdjustedCamera", "adjusted_cameras", "units"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustedCamera(Brief):

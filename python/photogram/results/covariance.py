@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,8 +21,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-__all__ = ["Covariances", "Failure", "Propagated"]
-
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
 
@@ -32,8 +31,6 @@ Selection = Item | Sequence[Item]  # One or several items
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """What a selection names."""
-
     rows: list[tuple[str, int]]  # Kind and index of each part, as the core knows them
     labels: list[tuple[str, str, str]]  # What each unknown is: kind, name, component
     values: Floats  # Adjusted values and standard deviations, one after the other
@@ -52,8 +49,6 @@ class Selected:
 
 @dataclass(frozen=True, eq=False)
 class Things:
-    """Things of one kind, one after the other."""
-
     ids: Sequence[str]  # Of each its name, the names of its unknowns, their values and standard deviations
     components: Sequence[tuple[str, ...]]
     values: Sequence[Floats] | Floats
@@ -64,8 +59,6 @@ class Things:
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted values and standard deviations of a network."""
-
     network: str  # What it is called: a block, or a collection
     things: Mapping[str, Things]  # By their kinds
     numbered: bool = False  # Whether they are called by their numbers
@@ -127,20 +120,15 @@ class Adjusted:
 
 
 def photo_components(block: Block) -> tuple[str, ...]:
-    """Name the six unknowns of a photo."""
     return tuple(name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS))
-
-
-def point_components(block: Block) -> tuple[str, ...]:
-    """Name the three coordinates of a point."""
-    return tuple(name.removesuffix("_deg") for name in position_columns(block))
 
 
 def adjusted(result: Result) -> Adjusted:
     """Return the adjusted values of a result by kinds and names."""
     block = result.block
     photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
-    places, count = point_components(block), len(photos)
+    unknowns_of_photo, count = photo_components(block), len(photos)
+    places = unknowns_of_photo[:3]
     steps = (*places, "rho x", "rho y", "rho z")
     points = [places] * len(block.point_ids)
     # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
@@ -148,7 +136,7 @@ def adjusted(result: Result) -> Adjusted:
     return Adjusted(
         network="block",
         things={
-            "photo": Things(block.photo_ids, [photo_components(block)] * count, photos, sd),
+            "photo": Things(block.photo_ids, [unknowns_of_photo] * count, photos, sd),
             "step": Things(block.photo_ids, [steps] * count, photos, sd),
             "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
             "camera": Things(
@@ -306,13 +294,12 @@ class Covariances:
         selected = self._adjusted.selected(selection)
         if all(kind != "step" for kind, _ in selected.rows):
             return selected.sd
-        parts = range(0, len(selected.rows), TOGETHER)
-        return np.concatenate([self._own(selected.rows[k : k + TOGETHER]) for k in parts])
-
-    def _own(self, rows: list[tuple[str, int]]) -> Floats:
-        """Return the standard deviations of a few things."""
-        cofactors = self._asked(lambda: self._core.cofactors(rows, None, threads=0, progress=None))
-        return np.asarray(np.sqrt(self._scale * np.diag(cofactors)))
+        found = []
+        for k in range(0, len(selected.rows), TOGETHER):
+            rows = selected.rows[k : k + TOGETHER]
+            cofactors = self._asked(partial(self._core.cofactors, rows, None, threads=0, progress=None))
+            found.append(np.sqrt(self._scale * np.diag(cofactors)))
+        return np.concatenate(found)
 
     def propagate(
         self, function: Callable[..., Any], unknowns: Selection, *, bias: bool = False

@@ -23,8 +23,6 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
 
-__all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
-
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
 TURNS = (*ANGLES, "rotation ")  # First words of names of rotations
 NOTABLE_LOSS = 1e-9  # Largest part of a variance by rounding without a message
@@ -51,7 +49,6 @@ class ResultDatum:
 
     @property
     def phrase(self) -> Phrase:
-        """The datum as a message."""
         counts = (("points", self.points), ("photos", self.photos), ("attitudes", self.attitudes))
         scaled = self.kind == "inner constraints" and self.scale
         fields = {
@@ -75,7 +72,6 @@ class ResultDatum:
         return self.scale or (self.kind == "minimum constraints" and holds_scale(self.held))
 
     def document(self) -> dict[str, Any]:
-        """Return what the JSON document says of it."""
         return {
             "kind": self.kind,
             "held": [{"photo": photo, "unknown": unknown} for photo, unknown in self.held],
@@ -111,7 +107,10 @@ def datum_of(
     """Return the datum of what the core found: that of inner constraints or, without, what it held."""
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
-    own += _held_coefficients(block, solution)
+    for number, component in sorted(solution.datum_unknowns):  # Of coefficients of trajectories
+        each = block.unknowns[number]
+        turn = "rotation " if isinstance(each, RotationCoefficient) else ""
+        own += ((each.name, turn + each.components[component]),)
     if row is None:
         given = "minimal control" if solution.minimal_control else "observations"
         return ResultDatum("minimum constraints" if own else given, own)
@@ -128,20 +127,6 @@ def datum_of(
         attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,
     )
-
-
-def _held_coefficients(block: Block, solution: BlockSolution) -> tuple[tuple[str, str], ...]:
-    """Return the coefficients of trajectories that are held, each with the name of one of its unknowns."""
-    if not solution.datum_unknowns:
-        return ()
-    unknowns = block.unknowns
-
-    def named(row: int, number: int) -> tuple[str, str]:
-        own = unknowns[row]
-        turn = "rotation " if isinstance(own, RotationCoefficient) else ""
-        return own.name, turn + own.components[number]
-
-    return tuple(named(row, number) for row, number in sorted(solution.datum_unknowns))
 
 
 def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:
@@ -176,7 +161,6 @@ def _levelled(block: Block, held: int) -> Phrase | None:
 
 
 def inner_datum(datum: object) -> InnerConstraints:
-    """Return inner constraints; refuse anything else."""
     if not isinstance(datum, InnerConstraints):
         raise argument_error("datum", "kind", kind="InnerConstraints", value=value_field(datum))
     return datum
@@ -200,7 +184,6 @@ def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None
 def refused(
     block: Block, network: BlockNetwork, state: _photocore.BlockState | None, error: Failure
 ) -> AdjustmentError | InputError:
-    """Return what the core has refused, with the names concerned."""
     kind, message, _, points, *_ = error.args
     if kind == "memory":
         return OutOfMemoryError(message)

@@ -15,15 +15,11 @@ from photogram.results.covariance import adjusted
 from photogram.results.result import Result
 from photogram.words import phrase
 
-__all__ = ["Differences", "Largest", "differences"]
-
 _KINDS = ("photo", "point", "camera", "unknown")
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of differences."""
-
     size: float = 0.0  # 0 if nothing differs
     # Empty if nothing differs
     kind: str = ""

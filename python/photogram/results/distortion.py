@@ -16,6 +16,7 @@ the vector there has the covariance sigma0^2 J Q J'.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,22 +30,6 @@ from photogram.results.cameras import AdjustedCamera
 
 if TYPE_CHECKING:
     from photogram import Result
-
-__all__ = [
-    "INTERIOR",
-    "RADIAL",
-    "DistortionCurve",
-    "LensField",
-    "added_along",
-    "curve_deviations",
-    "distortion_curve",
-    "largest_radius",
-    "lens_field",
-    "own_images",
-    "radial_curve",
-    "radial_part",
-    "rows_of_images",
-]
 
 DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
@@ -101,23 +86,36 @@ def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:
     return np.flatnonzero(result.used_images & (np.asarray(block.photo_cameras) == row)[block.image_photos])
 
 
-def own_images(result: Result, camera: AdjustedCamera) -> Floats:
+def _images(result: Result, camera: AdjustedCamera) -> Floats:
     """Return (k, 2) the images of a camera that took part, in the focal plane."""
     return np.asarray(focal_images(result.block)[rows_of_images(result, camera)])
 
 
-def largest_radius(result: Result, camera: AdjustedCamera) -> float:
-    """Return how far from the principal point images of a camera reach: measured, or ideal where forward."""
-    xy = own_images(result, camera)
+def _largest_radius(xy: Floats, camera: Camera) -> float:
+    """Return the largest distance of images from the principal point: measured, or ideal if forward."""
     if not len(xy):
         return 0.0
-    if _is_backward(camera.camera):
+    if _is_backward(camera):
         names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
-        principal_point = [camera.camera.parameters.get(name, 0.0) for name in names]
+        principal_point = [camera.parameters.get(name, 0.0) for name in names]
         return float(np.hypot(*(xy - principal_point).T).max())
-    rays = camera.camera.rays(xy)
-    ideal = _ideal(camera.camera, rays)
-    return camera.camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
+    rays = camera.rays(xy)
+    across = np.hypot(rays[:, 0], rays[:, 1])
+    # The argument of radial terms: the tangent of the angle from the axis, or the angle.
+    ideal = np.arctan2(across, -rays[:, 2]) if _is_fisheye(camera) else across / -rays[:, 2]
+    return camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
+
+
+def partials_of(evaluate: Callable[[Camera], Floats], camera: Camera, steps: Mapping[str, float]) -> Floats:
+    """Return (k, ...) central differences of a function of a camera by k parameters, over their steps."""
+
+    def at(name: str, value: float) -> Floats:
+        return evaluate(camera.replace(parameters={**camera.parameters, name: value}))
+
+    values = {name: camera.parameters[name] for name in steps}
+    return np.array(
+        [(at(k, values[k] + step) - at(k, values[k] - step)) / (2 * step) for k, step in steps.items()]
+    )
 
 
 def distortion_curve(
@@ -136,7 +134,7 @@ def distortion_curve(
     """
     terms = [k for k, name in enumerate(camera.names) if RADIAL.fullmatch(name)]
     used = any(camera.values[k] != 0 or k in camera.estimated for k in terms)
-    observed = largest_radius(result, camera)
+    observed = _largest_radius(_images(result, camera), camera.camera)
     if not used or observed == 0:
         return None
     at = np.linspace(0.0, BEYOND * observed, ROWS) if radii is None else np.asarray(radii, dtype=np.float64)
@@ -177,23 +175,14 @@ def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) ->
 
     `sd` are the (k,) standard deviations of all parameters, `terms` the indices of the radial ones.
     """
-    own = radial_part(camera)
-    bare = own.parameters
-    largest = radii.max()
-
-    def at(changes: dict[str, float]) -> Floats:
-        return added_along(own.replace(parameters={**bare, **changes}), radii)
-
-    partials = np.empty((len(radii), len(terms)))
+    own, steps = radial_part(camera), dict[str, float]()
     for column, k in enumerate(terms):
-        name = camera.names[k]
         # Without covariances there are no standard deviations.
         own_sd = sd[k] if sd[k] > 0 else 0.0
-        step = own_sd or abs(camera.values[k]) or largest ** -(2 * (column + 1))
-        step *= 0.01
-        upper, lower = (at({name: bare[name] + sign * step}) for sign in (1, -1))
-        partials[:, column] = (upper - lower) / (2 * step)
-    return at({}), partials
+        size = own_sd or abs(camera.values[k]) or radii.max() ** -(2 * (column + 1))
+        steps[camera.names[k]] = 0.01 * float(size)
+    partials = partials_of(lambda changed: added_along(changed, radii), own, steps)
+    return added_along(own, radii), partials.reshape(-1, len(radii)).T
 
 
 def radial_part(camera: Camera) -> Camera:
@@ -218,12 +207,6 @@ def added_along(camera: Camera, radii: Floats) -> Floats:
     middle = camera.project([[0.0, 0.0, -1.0]])[0, 0]
     images = camera.project(np.column_stack([across, zero, back]))[:, 0]
     return np.asarray(np.abs(images - middle) - radii)
-
-
-def _ideal(camera: Camera, rays: Floats) -> Floats:
-    """Return the argument of forward radial terms: the tangent of the angle from the axis, or the angle."""
-    across = np.hypot(rays[:, 0], rays[:, 1])
-    return np.arctan2(across, -rays[:, 2]) if _is_fisheye(camera) else across / -rays[:, 2]
 
 
 def _is_backward(camera: Camera) -> bool:
@@ -273,31 +256,26 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
         and not RADIAL.fullmatch(name)
         and (camera.values[k] != 0 or k in camera.estimated)
     )
-    xy = own_images(result, camera)
+    xy = _images(result, camera)
     if not names or not len(xy):
         return None
     sides = [np.linspace(low, high, GRID) for low, high in zip(xy.min(axis=0), xy.max(axis=0), strict=True)]
     positions = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     own = camera.camera
-    rays = None if own.direction == "backward" else own.rays(positions)
+    rays = None if _is_backward(own) else own.rays(positions)
 
-    def at(changes: dict[str, float]) -> Floats:
-        changed = own.replace(parameters={**own.parameters, **changes})
+    def images(changed: Camera) -> Floats:
         if rays is None:
             return _photocore.camera_correct(changed.model, changed.values, positions)
         return changed.project(rays)
 
-    partials = np.empty((len(positions), 2, len(names)))
     rows = [camera.names.index(name) for name in names]
-    for column, (name, k) in enumerate(zip(names, rows, strict=True)):
-        step = 0.01 * (camera.sd[k] or abs(camera.values[k]))
-        value = own.parameters[name]
-        partials[:, :, column] = (at({name: value + step}) - at({name: value - step})) / (2 * step)
+    steps = {camera.names[k]: 0.01 * float(camera.sd[k] or abs(camera.values[k])) for k in rows}
+    partials, covariance = partials_of(images, own, steps), camera.covariance[np.ix_(rows, rows)]
+    without = own.replace(parameters={**own.parameters, **dict.fromkeys(names, 0.0)})
     return LensField(
         names=names,
         positions=positions,
-        vectors=at({}) - at(dict.fromkeys(names, 0.0)),
-        covariances=np.einsum(
-            "nai,ij,nbj->nab", partials, camera.covariance[np.ix_(rows, rows)], partials, optimize=True
-        ),
+        vectors=images(own) - images(without),
+        covariances=np.einsum("ina,ij,jnb->nab", partials, covariance, partials, optimize=True),
     )

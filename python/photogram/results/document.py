@@ -15,8 +15,8 @@ from photogram.network.structuring import structure
 from photogram.results.axes import point_axes
 from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
 from photogram.results.check_points import observed_control
-from photogram.results.features_report import features_document, features_section
-from photogram.results.film_report import fiducial_members, film_members, films_section, scanner_members
+from photogram.results.features import features_document, features_section
+from photogram.results.film_report import film_table, films_section, mark_table, scanner_table
 from photogram.results.network_document import (
     drawings,
     network_document,
@@ -39,9 +39,9 @@ from photogram.results.tables import (
     unheld,
     unknowns,
 )
-from photogram.results.trajectories import POSES, courses_table, notable, notable_courses
+from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.cells import unit_written
-from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.page import Document, Fact, Section, about, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite
 def block_document(result: Result) -> Document:
-    """Return the document of an adjusted block."""
-    pictures, (about, figures) = drawings(result), bandwidths(result)
+    pictures, (head, figures) = drawings(result), bandwidths(result)
     given = [
         control_section(result, unheld(result)),
         check_section(result),
@@ -61,6 +60,8 @@ def block_document(result: Result) -> Document:
         films_section(result, pictures["films"]),
         _unknowns_section(result),
     ]
+    title, columns = "Redundancy by kind of observation", redundancy_by_kind(result)
+    redundancy, datum = Table("redundancy-by-kind", title, columns, about("redundancy-by-kind")), result.datum
     return network_document(
         result,
         "Adjustment of a block of photos",
@@ -69,12 +70,12 @@ def block_document(result: Result) -> Document:
         photos=len(result.block.photo_ids),
         title=result.block.title,
         more=_accuracy(result),
-        redundancy=_redundancy_tables(result),
+        redundancy=[redundancy] if redundancy.visible else [],
         beside=[features_section(result.features, pictures["features"])],
-        datum=_datum(result),
-        poses=POSES if result.block.timed else "",
+        datum=about(f"datum.{'chosen' if datum.is_chosen else 'given'}", datum=datum.phrase),
+        poses=about("poses") if result.block.timed else "",
         details=[gains_section(result)],
-        work=[Fact(f"Bandwidth {name}", value, note=about) for name, value in figures],
+        work=[Fact(f"Bandwidth {name}", value, note=head) for name, value in figures],
     )
 
 
@@ -101,10 +102,16 @@ def _accuracy(result: Result) -> list[Fact]:
 def _size_section(result: Result) -> Section:
     variance, more = result.variance_of_unit_weight, list[Fact]()
     if result.dropped:
-        more.append(Fact("Points left out", f"{len(result.dropped)}", note=_reasons(result)))
+        reasons = Counter(result.dropped.values()).items()
+        note = ", ".join(f"{count}: {reason}" for reason, count in reasons)
+        more.append(Fact("Points left out", f"{len(result.dropped)}", note=note))
     value = f"{variance:.6f}" if variance is not None else "undefined"
-    good = [Fact("Variance of unit weight", value, note=_BASIS[result.unit_variance])]
-    good += _sums(result)
+    good = [Fact("Variance of unit weight", value, note=about(f"unit-variance.{result.unit_variance}"))]
+    sums = result.sums_of_squares
+    groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
+    groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
+    groups["total"] = sums.total
+    good += [Fact(f"Weighted sum of squares, {name}", f"{square:.6f}") for name, square in groups.items()]
     tables = {"control points": control, "unheld components": unheld, "check points": check_points}
     for what, table in tables.items():
         differences = named(table(result), "d").values
@@ -114,66 +121,17 @@ def _size_section(result: Result) -> Section:
     return size_section(result, size_of(result), more, good)
 
 
-def _sums(result: Result) -> list[Fact]:
-    sums = result.sums_of_squares
-    groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
-    groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
-    groups["total"] = sums.total
-    return [Fact(f"Weighted sum of squares, {name}", f"{value:.6f}") for name, value in groups.items()]
-
-
-_BASIS = {
-    "free": "rule of 1987: the weights of photos and cameras do not count",
-    "constrained": "of all weighted values, those of photos and cameras among them",
-    "unity": "set to 1",
-    "redundancy": "based on redundancy numbers",
-}
-
-
-def _reasons(result: Result) -> str:
-    counts = Counter(result.dropped.values())
-    return ", ".join(f"{count}: {reason}" for reason, count in counts.items())
-
-
-def _redundancy_tables(result: Result) -> list[Table]:
-    note = (
-        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
-        " multiplied by to agree, if the others are right."
-    )
-    columns = redundancy_by_kind(result)
-    table = Table("redundancy-by-kind", "Redundancy by kind of observation", columns, note)
-    return [table] if len(columns[0].values) else []
-
-
 def _unknowns_section(result: Result) -> Section:
     if not result.unknowns:
         return Section("unknowns", "Common unknowns", [])
-    intro = (
-        "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common;"
-        " clocks, readout times and coefficients of trajectories."
+    shown, note = notable(result.unknowns)
+    tables = [Table("unknowns", "Common unknowns", unknowns(shown), note), trajectories_table(result)]
+    return Section(
+        "unknowns", "Common unknowns", [table for table in tables if table.visible], about("unknowns")
     )
-    (shown, note), (every, said) = notable(result.unknowns), notable_courses(result)
-    columns = unknowns(shown)
-    tables = [Table("unknowns", "Common unknowns", columns, _sentence(note))] if shown else []
-    if every:
-        said = said or "The largest correction in the span of the table, and its time."
-        columns = courses_table(every, result.block.linear_unit)
-        tables.append(Table("trajectories", "Trajectories", columns, _sentence(said)))
-    return Section("unknowns", "Common unknowns", tables, intro)
-
-
-def _sentence(said: str) -> str:
-    return f"{said[:1].upper()}{said[1:].removesuffix('.')}." if said else ""
-
-
-def _datum(result: Result) -> str:
-    if result.datum.is_chosen:
-        return f"Datum: {result.datum}."
-    return f"Coordinates and standard deviations refer to the datum that is {result.datum}."
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
-    """Return what the block consists of: names and what there is."""
     block = result.block
     kinds = result.point_kinds[result.used_points].tolist()
     held = np.isfinite(block.point_sd)
@@ -212,7 +170,6 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
 
 
 def rms_of(values: Floats) -> float:
-    """Return the root mean square of some values; NaN of none."""
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 
@@ -228,8 +185,9 @@ def _differences(result: Result, values: Iterable[float]) -> list[str]:
 
 
 def block_members(result: Result) -> dict[str, Any]:
-    """Return the members of the document of an adjusted block."""
     covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
+    test = result.global_test
+    side = None if test is None else "high" if test.rejected_high else "low" if test.rejected_low else None
     of_photos = (
         Quantity(covariances[:, place, place], member="position_covariance"),
         Quantity(covariances[:, turn, turn], member="attitude_covariance"),
@@ -255,7 +213,8 @@ def block_members(result: Result) -> dict[str, Any]:
         "weighted_sum_of_squares": members(result.sums_of_squares, *_SUMS),
         "redundancy": result.redundancies and members(result.redundancies, *_SUMS),
         "unit_variance": result.unit_variance,
-        "global_test": _global_test(result),
+        "global_test": test
+        and members(test, "variance", "limits", "level", "probability") | {"rejected": side},
         **_of_some(result),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),
@@ -267,12 +226,25 @@ def _of_some(result: Result) -> dict[str, Any]:
     """Return the members on what only some blocks have."""
     found: dict[str, Any] = {}
     if result.cameras:
-        found |= {"cameras": _cameras(result), "calibrations": calibration_members(result)}
+        found["cameras"] = [
+            members(each, "name", model="camera.model", image_unit="camera.unit")
+            | members(each, "photos", "images")
+            | {"parameters": records(camera_parameters([each])), "covariance": each.covariance}
+            for each in result.cameras
+        ]
+        found["calibrations"] = calibration_members(result)
     if result.unknowns:
-        found["unknowns"] = _unknowns(result)
+        found["unknowns"] = [
+            members(each, "kind", "name", "position", matrix="attitude")
+            | members(
+                each, "observations", "components", "units", sd_given="given.deviations", value="values"
+            )
+            | members(each, "change", "sd", "redundancy", "standardized", "covariance")
+            for each in result.unknowns
+        ]
     if result.films:
-        found |= {"films": film_members(result), "fiducials": fiducial_members(result)}
-        found["scanners"] = scanner_members(result)
+        tables = {"films": film_table, "fiducials": mark_table, "scanners": scanner_table}
+        found |= {name: records(table(result)) for name, table in tables.items()}
     if result.features is not None:
         found["features"] = features_document(result.features)
     return found
@@ -303,27 +275,6 @@ def _units(result: Result) -> dict[str, str]:
     }
 
 
-def _cameras(result: Result) -> list[dict[str, Any]]:
-    return [
-        {
-            **members(each, "name", model="camera.model", image_unit="camera.unit"),
-            **members(each, "photos", "images"),
-            "parameters": records(camera_parameters([each])),
-            "covariance": each.covariance,
-        }
-        for each in result.cameras
-    ]
-
-
-def _unknowns(result: Result) -> list[dict[str, Any]]:
-    return [
-        members(each, "kind", "name", "position", matrix="attitude")
-        | members(each, "observations", "components", "units", sd_given="given.deviations", value="values")
-        | members(each, "change", "sd", "redundancy", "standardized", "covariance")
-        for each in result.unknowns
-    ]
-
-
 def _beside_images(result: Result) -> list[dict[str, Any]]:
     found = []
     for each in result.kinds.values():
@@ -336,11 +287,3 @@ def _beside_images(result: Result) -> list[dict[str, Any]]:
         ]
         found += records([*chosen(observations(each), rows), *own])
     return found
-
-
-def _global_test(result: Result) -> dict[str, Any] | None:
-    test = result.global_test
-    if test is None:
-        return None
-    rejected = "high" if test.rejected_high else "low" if test.rejected_low else None
-    return members(test, "variance", "limits", "level", "probability") | {"rejected": rejected}

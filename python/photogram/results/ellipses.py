@@ -14,8 +14,6 @@ from photogram.network import geometry
 if TYPE_CHECKING:
     from photogram import Result
 
-__all__ = ["CONFIDENCE", "Ellipses", "ellipses", "fitting_scale", "metric_covariances"]
-
 CONFIDENCE = 0.95  # Default probability of an ellipse
 VERTICES = 36
 SHARE = 0.3  # Size of a typical drawn ellipse as a part of the distance between neighbours

@@ -32,8 +32,6 @@ HELD = 1e-6  # Standard deviation of fixed coordinates, relative to an image at 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two names that are exchanged."""
-
     photos: tuple[str, ...]  # several if the images do not show on which photo
     points: tuple[str, str]
     # as_named, exchanged: T of both points as they are named, and with the names exchanged on the first of
@@ -44,7 +42,6 @@ class Exchange:
 
     @property
     def sentence(self) -> Phrase:
-        """The message on it."""
         one, other = self.points
         photos = [Phrase("named.photo", {"photo": photo.removeprefix("photo ")}) for photo in self.photos]
         return Phrase("exchange", {"one": one, "other": other, "photos": photos})
@@ -57,7 +54,6 @@ class Exchange:
 
     @property
     def reason(self) -> Phrase:
-        """The test values as they are named and exchanged."""
         fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
         return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
 
@@ -125,8 +121,6 @@ def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]
 
 
 class _Fit:
-    """Fits points to rays of photos that are known."""
-
     def __init__(self, block: Block, used: Bools) -> None:
         self.block, self.used = block, used
         self.rays = Rays.of(block)

@@ -1,4 +1,4 @@
-"""Features through adjusted points, distances to cylinders, as they are told (docs/features.md)."""
+"""Features through adjusted points, distances to cylinders: values, tables, documents (docs/features.md)."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import unknown_name
 from photogram.show import quantity
-from photogram.show.quantity import Axis
+from photogram.show.page import Drawing, Part, Section, Text, about
+from photogram.show.quantity import Axis, Table, members, of_each
 from photogram.statistics.distributions import LEVEL
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_points"]
 
 T = TypeVar("T", "Quantity", "Feature")
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
@@ -36,8 +35,6 @@ Definition = tuple[str, str | Sequence[str]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a feature."""
-
     # `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
     # `sphericity`, `cylindricity`
     name: str
@@ -200,7 +197,7 @@ def deviation_quantities(features: Features) -> list[quantity.Quantity]:
             each.points, each.deviations[:, d].tolist(), each.deviation_sd[:, d].tolist(), strict=False
         )
     ]
-    columns: list[tuple[str, Any, str]] = [
+    columns: list[tuple[str, quantity.Kind, str]] = [
         ("feature", "name", "name of the feature"),
         ("point", "name", "name of the point"),
         ("direction", "name", "of the deviation"),
@@ -240,3 +237,60 @@ def _named(all_: Sequence[T], name: str, kind: str) -> T:
         if each.name == name:
             return each
     raise KeyError(str(unknown_name(kind, name, [each.name for each in all_])))
+
+
+def features_section(features: Features | None, picture: Drawing | None = None) -> Section:
+    if not features:
+        return Section("features", "Features", [])
+    k = f"{features.k:g}"
+    if features.coverage is not None:
+        student = f"Student with {features.freedom:.4g} degrees of freedom"
+        law = "normal" if math.isinf(features.freedom) else student
+        k = f"{features.k:.3f} ({100 * features.coverage:g} %, {law})"
+    columns, by = quantity_columns(features), unit_deviations(features)
+    note = f"Coverage factor k = {k}."
+    parts: list[Part] = [Table("features", "Quantities of features", columns, note, deviations=by)]
+    if tested := [each for each in features if each.statistic is not None]:
+        forms = [
+            of_each(tested, "name", kind="name", head="Feature"),
+            quantity.Quantity([str(through(each)) for each in tested], kind="name", head="What"),
+            of_each(tested, "statistic", head="T", figures=4),
+            of_each(tested, "freedom", head="of", decimals=0),
+            of_each(tested, "probability", kind="probability", head="p"),
+            of_each(tested, "form", kind="name", head="Form"),
+        ]
+        parts.append(Table("forms", "Whether form is more than errors of points", forms))
+        parts += [] if picture is None else [picture]
+    parts += [Text(each) for each in features.remarks]
+    return Section("features", "Features", parts, about("features"))
+
+
+def through(feature: Feature) -> Phrase:
+    """Return the form of a feature and its points as a message."""
+    first, *_, last = points = list(feature.points)
+    if feature.kind == "distance":
+        return Phrase("feature.distance", {"first": first, "last": last})
+    form = Phrase(f"feature.{feature.kind}")
+    return Phrase("feature.through", {"feature": form, "count": len(points), "points": points})
+
+
+def features_document(features: Features) -> dict[str, Any]:
+    own = members(features, "k", "coverage", "remarks")
+    return own | {"features": [_member(each) for each in features]}
+
+
+def _member(feature: Feature) -> dict[str, Any]:
+    across = directions(feature.kind)
+    named = [*across, *(f"sd_{name}" for name in across)]
+    numbers = np.hstack([feature.deviations, feature.deviation_sd]).tolist()
+    form = members(feature, "statistic", "freedom", "probability", sentence="form")
+    return {
+        **members(feature, "name", "kind", "points"),
+        "quantities": [vars(each) for each in feature.quantities],
+        "covariance": feature.covariance,
+        "deviations": [
+            {"point": point, **dict(zip(named, row, strict=True))}
+            for point, row in zip(feature.points, numbers, strict=False)
+        ],
+        "form": form if feature.statistic is not None else None,
+    }

@@ -14,8 +14,8 @@ from photogram.network.observations import FILM, Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION, observations_of_core
-from photogram.show.page import Drawing, Part, Section
-from photogram.show.quantity import Axis, Quantity, Table, members
+from photogram.show.page import Drawing, Part, Section, about
+from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each, of_each
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -49,26 +49,20 @@ def mark_residuals(result: Result) -> MarkResiduals:
         place = marks[each.mark.name].position[np.newaxis, :2]
         _, partials = _photocore.film_readings(each.film.numbers(), numbers, place)
         xy[k] = np.linalg.solve(partials[0, :, :2], kind.residuals[k])
+    tests, summary = np.full(len(read), np.nan), result.reliability_summary
+    if summary is not None and read:
+        places = {id(each): k for k, each in enumerate(read)}
+        core, testable = observations_of_core(result.block), summary.testable
+        for group in np.flatnonzero(summary.suspects.kinds == OBSERVATION).tolist():
+            own = places.get(id(core[summary.suspects.subjects[group]]))
+            if own is not None and testable[group]:
+                tests[own] = summary.tests.statistic[group]
     return MarkResiduals(
         np.array([photos[each.photo] for each in read], dtype=np.int64),
         tuple(each.mark.name for each in read),
         xy,
-        _tests(result, read),
+        tests,
     )
-
-
-def _tests(result: Result, read: list[Fiducial]) -> Floats:
-    """Return T of readings; NaN where they were not tested."""
-    summary, found = result.reliability_summary, np.full(len(read), np.nan)
-    if summary is None or not read:
-        return found
-    place = {id(each): k for k, each in enumerate(read)}
-    core, testable = observations_of_core(result.block), summary.testable
-    for group in np.flatnonzero(summary.suspects.kinds == OBSERVATION).tolist():
-        k = place.get(id(core[summary.suspects.subjects[group]]))
-        if k is not None and testable[group]:
-            found[k] = summary.tests.statistic[group]
-    return found
 
 
 def mean_mark_residuals(result: Result) -> list[VectorField]:
@@ -130,27 +124,32 @@ _MM = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 
 def film_table(result: Result) -> list[Quantity]:
     """Return the films of photos: values, standard deviations, marks read and lost, the largest test."""
-    rows = [row for row, _ in result.films]
+    rows, films = [row for row, _ in result.films], [film for _, film in result.films]
     axes = tuple(Axis.of(name, unit) for name, unit in zip(FILM, _UNITS, strict=True))
     residuals = mark_residuals(result)
     lost = _lost(result, residuals)
-    read = [int(np.count_nonzero(residuals.photos == row)) for row in rows]
-    largest = [
-        np.fmax.reduce(residuals.tests[residuals.photos == row], initial=-np.inf, dtype=float) for row in rows
-    ]
+    tests = [residuals.tests[residuals.photos == row] for row in rows]
+    largest = [np.fmax.reduce(own, initial=-np.inf, dtype=float) for own in tests]
     return [
         _photos(result),
-        Quantity(result.film[rows], axes, "value", head="{}", figures=7),
-        Quantity(result.film_sd[rows], axes, "deviation", head="sd {}"),
-        Quantity(read, head="Marks", decimals=0),
+        Quantity([FILM] * len(rows), member="components"),
+        Quantity(result.film[rows], axes, "value", member="film", head="{}", figures=7),
+        Quantity(result.film_sd[rows], axes, "deviation", member="sd", head="sd {}"),
+        Quantity(result.film_cofactors[rows], member="film_cofactors"),
+        Quantity([vars(each) for each in result.film_forms.values()], member="affine"),
+        Quantity([len(own) for own in tests], member="marks", head="Marks", decimals=0),
+        Quantity([lost[row] for row in rows], member="lost"),
         Quantity([" ".join(lost[row]) for row in rows], kind="name", name="lost", head="Lost"),
-        Quantity(np.where(np.isfinite(largest), largest, np.nan), head="Largest T", decimals=2),
+        Quantity(
+            np.where(np.isfinite(largest), largest, np.nan), member="largest_T", head="Largest T", decimals=2
+        ),
+        *members_of_each(films, "mirrored", scanner="scanner.name"),
     ]
 
 
 def _photos(result: Result) -> Quantity:
     names = [result.block.photo_ids[row] for row, _ in result.films]
-    return Quantity(names, kind="name", head="Photo")
+    return Quantity(names, kind="name", member="photo", head="Photo")
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
@@ -197,130 +196,71 @@ def form_table(result: Result) -> list[Quantity]:
 
 def mark_table(result: Result) -> list[Quantity]:
     """Return the marks of cameras: adjusted, less the certificate, and mean residuals of their readings."""
-    marks, residuals = result.fiducials, mark_residuals(result)
-    means, counts = np.full((len(marks), 2), np.nan), np.zeros(len(marks))
-    of = np.array(residuals.marks, dtype=object)
-    for k, name in enumerate(marks):
-        own = residuals.xy[of == name]
-        counts[k] = len(own)
-        if len(own):
-            means[k] = own.mean(axis=0)
+    every, residuals, photos = result.fiducials.values(), mark_residuals(result), result.block.photo_ids
+    columns = residuals.photos, residuals.marks, residuals.xy, residuals.tests
+    readings: dict[str, list[dict[str, Any]]] = {each.name: [] for each in every}
+    for photo, mark, xy, test in zip(*columns, strict=True):
+        readings[mark].append({"photo": photos[photo], "residual_mm": xy, "T": test})
+    means = [
+        np.mean([each["residual_mm"] for each in own], axis=0) if own else (np.nan, np.nan)
+        for own in readings.values()
+    ]
     given, values, changes, sd = (
-        np.array(each).reshape(-1, 2)
-        for each in (
-            [mark.given.position[:2] for mark in marks.values()],
-            *([getattr(mark, what) for mark in marks.values()] for what in ("values", "change", "sd")),
-        )
+        [each.given.position[:2] for each in every],
+        *([getattr(each, what) for each in every] for what in ("values", "change", "sd")),
     )
+
+    def places(of: Any, kind: Kind, head: str, decimals: int, member: str = "") -> Quantity:
+        pairs = np.array(of).reshape(-1, 2)
+        return Quantity(pairs, _MM, kind, member=member, head=head, decimals=decimals)
+
     return [
-        Quantity(list(marks), kind="name", head="Fiducial"),
-        Quantity(counts, head="Photos", decimals=0),
-        Quantity(given, _MM, "value", head="{}", decimals=4),
-        Quantity(values, _MM, "value", head="adjusted {}", decimals=4),
-        Quantity(changes, _MM, "difference", head="d {}", decimals=2),
-        Quantity(sd, _MM, "deviation", head="sd {}", decimals=2),
-        Quantity(means, _MM, "difference", head="mean residual {}", decimals=2),
+        Quantity(list(readings), kind="name", member="fiducial", head="Fiducial"),
+        Quantity([len(own) for own in readings.values()], head="Photos", decimals=0),
+        places(given, "value", "{}", 4, "certificate_mm"),
+        places(values, "value", "adjusted {}", 4, "value_mm"),
+        places(changes, "difference", "d {}", 2),
+        places(sd, "deviation", "sd {}", 2, "sd_mm"),
+        Quantity([each.covariance for each in every], member="covariance_mm2"),
+        places(means, "difference", "mean residual {}", 2),
+        Quantity(list(readings.values()), member="readings"),
     ]
 
 
-def _scanners(result: Result) -> list[Any]:
-    return [each for each in result.unknowns if isinstance(each.given, Scanner)]
-
-
 def scanner_table(result: Result) -> list[Quantity]:
-    """Return the scanners: adjusted, less their calibrations, standard deviations."""
-    every = _scanners(result)
+    """Return the scanners: pixels, adjusted values less the calibration, standard deviations."""
+    of = {id(film.scanner): film.readings for _, film in result.films}
+    every = [each for each in result.unknowns if id(each.given) in of]
     values, changes, sd = (
         np.array([getattr(each, what) for each in every]).reshape(-1, 3)
         for what in ("values", "change", "sd")
     )
+    readings = [of[id(each.given)] for each in every]
     return [
-        Quantity([each.name for each in every], kind="name", head="Scanner"),
-        Quantity(values, _DEVICE, "value", head="{}", decimals=8),
+        of_each(every, "name", kind="name", member="scanner", head="Scanner"),
+        *members_of_each(readings, pitch_mm="pitch", origin="origin", rows_down="down"),
+        Quantity([["Sx", "Sy", "alpha_rad"]] * len(every), member="components"),
+        *members_of_each(every, calibration="given.position"),
+        Quantity(values, _DEVICE, "value", member="value", head="{}", decimals=8),
         Quantity(changes, _DEVICE, "difference", head="d {}"),
-        Quantity(sd, _DEVICE, "deviation", head="sd {}"),
+        Quantity(sd, _DEVICE, "deviation", member="sd", head="sd {}"),
+        *members_of_each(every, "covariance"),
     ]
 
 
 def films_section(result: Result, drawing: Drawing) -> Section:
-    """Return the section of films, with the picture of marks and patterns; empty without films."""
     if not result.films:
         return Section("films", "Film and fiducials", [])
-    intro = (
-        "Where films lay and how their size has changed, the form of six numbers that other programs have,"
-        " and marks of cameras: what a certificate was moved by, and what their readings leave."
-    )
-    form = (
-        "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm); the scanner is errorless in"
-        " standard deviations."
-    )
-    scales = (
-        "Scales are mm of the film in a mm of the camera; between axes is the angle between their images less"
-        " 90 degrees."
-    )
     photos, *rest = form_table(result)
     numbers, said = rest[:2], rest[2:]
-    lost = "Lost are marks that were read on other photos. T is that of both coordinates of a reading."
-    marks = "Mean residuals are in the frame of the camera, of all photos."
     parts: list[Part] = [
-        Table("films", "Films", film_table(result), lost),
-        Table("film-forms", "The same as six numbers", [photos, *numbers], form),
-        Table("film-scales", "Scales, angle between the axes, rotation", [photos, *said], scales),
+        Table("films", "Films", film_table(result), about("films")),
+        Table("film-forms", "The same as six numbers", [photos, *numbers], about("film-forms")),
+        Table(
+            "film-scales", "Scales, angle between the axes, rotation", [photos, *said], about("film-scales")
+        ),
         drawing,
-        Table("fiducials", "Fiducial marks", mark_table(result), marks),
+        Table("fiducials", "Fiducial marks", mark_table(result), about("fiducials")),
         Table("scanners", "Scanners", scanner_table(result)),
     ]
-    return Section("films", "Film and fiducials", parts, intro)
-
-
-def film_members(result: Result) -> list[dict[str, object]]:
-    """Return the films of photos for documents: values, cofactors, the form of six numbers, the side."""
-    *_, marks, lost, largest = film_table(result)
-    arrays = {"film": result.film, "sd": result.film_sd, "film_cofactors": result.film_cofactors}
-    forms = result.film_forms.values()
-    return [
-        {
-            "photo": result.block.photo_ids[row],
-            "components": FILM,
-            **{name: values[row] for name, values in arrays.items()},
-            "affine": vars(form),
-            "marks": marks.values[k],
-            "lost": lost.values[k].split(),
-            "largest_T": largest.values[k],
-            **members(film, "mirrored", scanner="scanner.name"),
-        }
-        for k, ((row, film), form) in enumerate(zip(result.films, forms, strict=True))
-    ]
-
-
-def fiducial_members(result: Result) -> list[dict[str, object]]:
-    """Return the marks of cameras for documents: certificate and adjusted, covariance, readings."""
-    residuals, photos = mark_residuals(result), result.block.photo_ids
-    columns = residuals.photos, residuals.marks, residuals.xy, residuals.tests
-    readings: dict[str, list[dict[str, object]]] = {}
-    for photo, mark, xy, test in zip(*columns, strict=True):
-        readings.setdefault(mark, []).append({"photo": photos[photo], "residual_mm": xy, "T": test})
-    return [
-        {
-            "fiducial": name,
-            "certificate_mm": each.given.position[:2],
-            **members(each, value_mm="values", sd_mm="sd", covariance_mm2="covariance"),
-            "readings": readings.get(name, []),
-        }
-        for name, each in result.fiducials.items()
-    ]
-
-
-def scanner_members(result: Result) -> list[dict[str, object]]:
-    """Return the scanners for documents: what their readings count, calibration and adjusted, covariance."""
-    counted = {id(film.scanner): film.readings for _, film in result.films}
-    return [
-        {
-            "scanner": each.name,
-            **members(counted[id(each.given)], pitch_mm="pitch", origin="origin", rows_down="down"),
-            "components": ["Sx", "Sy", "alpha_rad"],
-            **members(each, calibration="given.position", value="values", sd="sd", covariance="covariance"),
-        }
-        for each in _scanners(result)
-        if id(each.given) in counted
-    ]
+    return Section("films", "Film and fiducials", parts, about("film-and-fiducials"))

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
+from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
 from photogram.results.patterns import CameraImages, patterns
@@ -51,7 +52,7 @@ def network_findings(
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
-        computed=has_redundancy(result),
+        computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
         systematic=systematic,
         snooped=result.snooped,
         remarks=[*unseen(result), *_assumptions(result)],
@@ -75,6 +76,7 @@ def block_findings(result: Result) -> Findings:
         intersected=intersected,
         scaled=result.unit_variance != "unity",
         remarks=[*found.remarks, *_left_out(result), *_on_checks(result)],
+        duplicates=duplicates(result.block),
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
@@ -177,11 +179,6 @@ def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
     summary = result.reliability_summary
     names = [] if summary is None else [each.name for each in summary.hypotheses.assumptions]
     return [Phrase("line.datum-assumed", {"errors": names})] if names else []
-
-
-def has_redundancy(result: AdjustedNetwork) -> bool:
-    """Return whether redundancy numbers were computed, without which no observation is tested."""
-    return bool(finite_rows(result.redundancy)[chosen(result.used_images)].all())
 
 
 def unseen(result: AdjustedNetwork) -> list[Phrase]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import value_field
+from photogram.arguments.arrays import argument_error, probability, value_field
 from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.messages import Message, unknown_name
 from photogram.results.covariance import Covariances
@@ -25,9 +25,7 @@ from photogram.results.features import (
 )
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_student, log_chi_square, log_fisher
-from photogram.words import phrase
-
-__all__ = ["features", "with_features"]
+from photogram.words import Phrase, phrase
 
 
 def features(
@@ -60,38 +58,36 @@ def features(
         As :meth:`Result.covariances`.
     """
     fitted, empty = _fitting(result, k, coverage)
-    return replace(empty, features=tuple(fitted(name, each) for name, each in definitions.items()))
-
-
-def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
-    """Return a result with features; what keeps one from being fitted is told in its messages."""
-    if not definitions:
-        return result
-    try:
-        fitted, empty = _fitting(result, 2.0, None)
-    except (InputError, AdjustmentError) as error:
-        return replace(
-            result,
-            messages=[*result.messages, Message(phrase("fit.none", reason=message_of(error)))],
-        )
-    found, messages = [], []
+    found = []
     for name, each in definitions.items():
         try:
             found.append(fitted(name, each))
         except InputError as error:
-            messages.append(Message(message_of(error)))
-        except AdjustmentError as error:
-            messages.append(
-                Message(
-                    phrase(
-                        "error.at",
-                        what=phrase("fit.named", name=name),
-                        message=message_of(error),
-                    )
-                )
-            )
+            raise InputError(_of_feature(name, error)) from None
+    return replace(empty, features=tuple(found))
+
+
+def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
+    """Return a result with features; its messages say why others were not fitted."""
+    if not definitions:
+        return result
+    found, messages = [], []
+    try:
+        fitted, empty = _fitting(result, 2.0, None)
+    except (InputError, AdjustmentError) as error:
+        message = Message(phrase("fit.none", reason=message_of(error)))
+        return replace(result, messages=[*result.messages, message])
+    for name, each in definitions.items():
+        try:
+            found.append(fitted(name, each))
+        except (InputError, AdjustmentError) as error:
+            messages.append(Message(_of_feature(name, error)))
     told = [*result.messages, *messages, *(Message(each) for each in empty.remarks)]
     return replace(result, messages=told, features=replace(empty, features=tuple(found)))
+
+
+def _of_feature(name: str, error: Exception) -> Phrase:
+    return phrase("error.at", what=phrase("fit.named", name=name), message=message_of(error))
 
 
 def _fitting(
@@ -102,18 +98,10 @@ def _fitting(
         raise InputError(phrase("fit.geographic"))
     freedom = result.freedom_of_scale
     if coverage is not None:
-        if not 0 < coverage < 1:
-            raise InputError(
-                phrase(
-                    "error.at", what="coverage", message=phrase("error.range", value=coverage, low=0, high=1)
-                )
-            )
-        k = critical_student(1.0 - coverage, freedom)
+        k = critical_student(1.0 - probability("coverage", coverage), freedom)
     if not 0 < k < math.inf:
-        raise InputError(phrase("error.at", what="k", message=phrase("error.positive", value=k)))
-    remarks: tuple[str, ...] = ()
-    if result.datum.has_chosen_scale:
-        remarks = (str(phrase("fit.scale")),)
+        raise argument_error("k", "positive", value=k)
+    remarks = (str(phrase("fit.scale")),) if result.datum.has_chosen_scale else ()
     covariances = result.covariances()
     return (
         lambda name, definition: _fitted(result, covariances, name, definition, k, freedom),
@@ -124,55 +112,36 @@ def _fitting(
 def _fitted(
     result: Result, covariances: Covariances, name: str, definition: Definition, k: float, freedom: float
 ) -> Feature:
-    try:
-        if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
-            raise InputError(phrase("fit.definition", value=value_field(definition)))
-        kind, wanted = definition
-        if kind not in KINDS:
-            raise InputError(unknown_name("kind of feature", str(kind), KINDS))
-        block = result.block
-        points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
-        if kind == "distance" and len(points) != 2:
-            raise InputError(phrase("fit.two-points", count=len(points)))
-        places = {point: row for row, point in enumerate(block.point_ids)}
-        rows = np.array([places[point] for point in points], dtype=np.int64)
-        for point, used in zip(points, result.used_points[rows].tolist(), strict=True):
-            if not used:
-                raise InputError(phrase("adjusted.unused-point", point=point))
-        names, values, covariance, deviations, test = _photocore.measured_feature(
-            kind, result.point_positions[rows], covariances.covariance(("point", points))
-        )
-    except InputError as error:
-        raise InputError(
-            phrase(
-                "error.at",
-                what=phrase("fit.named", name=name),
-                message=message_of(error),
-            )
-        ) from None
+    if not (isinstance(definition, Sequence) and len(definition) == 2) or isinstance(definition, str):
+        raise InputError(phrase("fit.definition", value=value_field(definition)))
+    kind, wanted = definition
+    if kind not in KINDS:
+        raise InputError(unknown_name("kind of feature", str(kind), KINDS))
+    block = result.block
+    points = named_points([wanted] if isinstance(wanted, str) else wanted, block.point_ids)
+    if kind == "distance" and len(points) != 2:
+        raise InputError(phrase("fit.two-points", count=len(points)))
+    places = {point: row for row, point in enumerate(block.point_ids)}
+    rows = np.array([places[point] for point in points], dtype=np.int64)
+    for point, used in zip(points, result.used_points[rows].tolist(), strict=True):
+        if not used:
+            raise InputError(phrase("adjusted.unused-point", point=point))
+    joint = covariances.covariance(("point", points))
+    own, values, covariance, deviations, test = _photocore.measured_feature(
+        kind, result.point_positions[rows], joint
+    )
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     quantities = tuple(
-        Quantity(own, value, deviation, k * deviation, block.linear_unit if is_length else "")
-        for (own, is_length), value, deviation in zip(names, values.tolist(), sd.tolist(), strict=True)
+        Quantity(called, value, deviation, k * deviation, block.linear_unit if is_length else "")
+        for (called, is_length), value, deviation in zip(own, values.tolist(), sd.tolist(), strict=True)
     )
-    count = len(directions(kind))
-    found = Feature(
-        name,
-        kind,
-        tuple(points),
-        quantities,
-        covariance,
-        deviations[:, 0 : 2 * count : 2],
-        deviations[:, 1 : 2 * count : 2],
-    )
+    apart, apart_sd = (deviations[:, first : 2 * len(directions(kind)) : 2] for first in (0, 1))
+    found = Feature(name, kind, tuple(points), quantities, covariance, apart, apart_sd)
     if test is None:
         return found
     statistic, beyond = test
-    log = (
-        log_chi_square(statistic, beyond)
-        if math.isinf(freedom)
-        else log_fisher(statistic / beyond, beyond, freedom)
-    )
+    known = math.isinf(freedom)
+    log = log_chi_square(statistic, beyond) if known else log_fisher(statistic / beyond, beyond, freedom)
     return replace(found, statistic=statistic, freedom=beyond, probability=math.exp(float(log)))
 
 

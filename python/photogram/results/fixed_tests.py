@@ -44,7 +44,6 @@ class Held:
 
     @property
     def name(self) -> Phrase:
-        """The name, and that it is fixed."""
         return Phrase("named.held", {"named": self.named})
 
 

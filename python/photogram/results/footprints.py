@@ -18,8 +18,6 @@ from photogram.network.rays import LocalAxes, local_axes
 if TYPE_CHECKING:
     from photogram import Result
 
-__all__ = ["Footprints", "footprints", "grounds", "picture_frames"]
-
 SIDE = 4  # Vertices of an outline on each side of the picture
 HORIZON = math.radians(80.0)  # Limit of footprints from the vertical
 

@@ -30,7 +30,7 @@ from photogram.results.grouping import Grouping, GroupsArgument, Observables, gr
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Section
-from photogram.show.quantity import Quantity, Table, of_each
+from photogram.show.quantity import Table, column, of_each
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
@@ -38,17 +38,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = [
-    "GroupSum",
-    "GroupSums",
-    "Left",
-    "Probing",
-    "block_observables",
-    "factored",
-    "group_sums",
-    "observables",
-]
 
 TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
@@ -151,8 +140,8 @@ class GroupSums(Documented, Brief):
             of_each(groups, "spread", name="spread"),
             of_each(groups, "freedom", name="degrees_of_freedom"),
             of_each(groups, "factor", name="factor", head="Factor of sd", decimals=3),
-            Quantity(low, name="probability_below", member="probability_below", head="p low", figures=2),
-            Quantity(high, name="probability_above", member="probability_above", head="p high", figures=2),
+            column("probability_below", low, "p low", figures=2),
+            column("probability_above", high, "p high", figures=2),
         ]
         tested = sum(test is not None for test in tests)
         names = ", ".join(each.name for each in self.rejected) or "none"
@@ -238,7 +227,6 @@ def observables(network: object) -> Observables:
 
 
 def block_observables(block: Block) -> Observables:
-    """Return what a block has observations of."""
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
     # What is given of a photo with a trajectory of its own is given of common unknowns.
@@ -272,7 +260,6 @@ def _strips(block: Block) -> list[Indices]:
 
 
 def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
-    """Return the factor of the normal equations of an adjusted network."""
     return result._core_network().covariances(result.state, threads=0, progress=None)
 
 
@@ -308,7 +295,13 @@ def group_sums(
         raise InputError(phrase("groups.no-redundancy"))
     grouping = grouped(observables(result), groups)
     counts, squares, redundancy = sums_of(result, grouping)
-    spread = np.clip(_spread(result, grouping, counts, probing or Probing()), 0.0, redundancy)
+    # The groups beyond some share columns.
+    classes = TOGETHER if grouping.count > TOGETHER else None
+    options = (probing or Probing()).options(int(counts.sum()))
+    _, spread, _ = factored(result).group_squares(grouping.core(), classes=classes, **options)
+    if classes is None:
+        spread = np.diag(spread.reshape(-1, grouping.count))
+    spread = np.clip(spread, 0.0, redundancy)
     testable = redundancy >= TESTABLE
     own = bonferroni(level, int(testable.sum()))
     found = []
@@ -317,15 +310,6 @@ def group_sums(
         test = global_test(q * r / s, r * r / s, own) if testable[g] and s > 0 else None
         found.append(GroupSum(name, int(counts[g]), q, r, s, test))
     return GroupSums(tuple(found), level)
-
-
-def _spread(result: AdjustedNetwork, grouping: Grouping, counts: Indices, probing: Probing) -> Floats:
-    """Return (G,) s_g; the groups beyond some share columns."""
-    options = probing.options(int(counts.sum()))
-    g = grouping.count
-    classes = TOGETHER if g > TOGETHER else None
-    _, squares, _ = factored(result).group_squares(grouping.core(), classes=classes, **options)
-    return squares if classes else np.asarray(np.diag(squares.reshape(g + 1, g)))
 
 
 check_arguments(globals(), ["group_sums"])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.unadjusted import Given
 from photogram.statistics.components import GroupsOf
 
@@ -61,11 +61,9 @@ class Grouping:
 
     @property
     def count(self) -> int:
-        """How many groups there are."""
         return len(self.groups.names)
 
     def core(self) -> tuple[int, Indices, Indices, Indices, list[int], list[int], list[int]]:
-        """Return the groups as the core takes them."""
         photos = np.vstack([self.photos[:, :6], np.full((self.records, 6), -1)])
         none = [-1] * (self.cameras + (self.records > 0))
         return (
@@ -110,22 +108,14 @@ def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
             if not isinstance(basis, str) or basis not in BASES:
                 raise argument_error("groups", "choice", names=[*BASES], value=value_field(basis))
         labels = _by(of, bases)
-    return _numbered(of, labels)
+    return _numbered(of, *labels)
 
 
-@dataclass(frozen=True, eq=False)
-class _Labelled:
-    """Labels of all parts, and of each label the larger group."""
-
-    images: _Labels
-    points: _Labels
-    photos: _Labels
-    observations: _Labels
-    parents: dict[str, str]
+_Labelled = tuple[dict[str, _Labels], dict[str, str]]
+"""Labels of images, points, photos and observations, and of each label the larger group."""
 
 
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
-    """Label by named bases."""
     components = "component" in bases
     of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
     head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
@@ -147,11 +137,11 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     photos[:] = of.stations
     parents |= dict.fromkeys(of.stations, "stations")
     observations = np.array([each.label for each in of.given.observations], dtype=object)
-    return _Labelled(images, points, photos, observations, parents)
+    labels = {"images": images, "points": points, "photos": photos, "observations": observations}
+    return labels, parents
 
 
 def _images_by(of: Observables, basis: str) -> list[str]:
-    """Label the images by one basis."""
     photos, seen = of.given.image_photos.tolist(), of.given.image_points
     if basis == "photo":
         return [f"photo {of.given.photo_ids[photo]}" for photo in photos]
@@ -169,24 +159,20 @@ def _images_by(of: Observables, basis: str) -> list[str]:
 
 
 def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
-    """Label as the user does."""
     unknown = set(given) - set(PARTS)
     if unknown:
         raise argument_error("labels", "choice", names=[*PARTS], value=min(map(str, unknown)))
-    by_kind = _by(of, ["kind"])
-    parts = {"images": "images", "control": "points", "stations": "photos", "observations": "observations"}
-    found: dict[str, Any] = {}
-    for name, part in parts.items():
+    labels, parents = _by(of, ["kind"])
+    for name, part in zip(PARTS, labels, strict=True):
         if name in given:
-            default: _Labels = getattr(by_kind, part)
-            labels = np.asarray(given[name], dtype=object)
-            if labels.shape == default.shape[:1] and default.ndim == 2:
-                labels = np.repeat(labels[:, np.newaxis], default.shape[1], axis=1)
-            if labels.shape != default.shape:
+            default, own = labels[part], np.asarray(given[name], dtype=object)
+            if own.shape == default.shape[:1] and default.ndim == 2:
+                own = np.repeat(own[:, np.newaxis], default.shape[1], axis=1)
+            if own.shape != default.shape:
                 shapes = f"{default.shape[:1]} or {default.shape}"
-                raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=labels.shape)
-            found[part] = np.vectorize(_text, otypes=[object])(labels) if labels.size else labels
-    return replace(by_kind, **found)
+                raise argument_error(f"labels of {name}", "shape", shape=shapes, actual=own.shape)
+            labels[part] = np.vectorize(_text, otypes=[object])(own) if own.size else own
+    return labels, parents
 
 
 def _text(label: object) -> str:
@@ -194,7 +180,7 @@ def _text(label: object) -> str:
     return "" if missing else str(label)
 
 
-def _numbered(of: Observables, labels: _Labelled) -> Grouping:
+def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, str]) -> Grouping:
     """Give the groups numbers: those of images first."""
     numbers: dict[str, int] = {"": -1}
 
@@ -208,15 +194,15 @@ def _numbered(of: Observables, labels: _Labelled) -> Grouping:
         return np.fromiter(map(numbers.__getitem__, flat), np.int64, len(flat)).reshape(part.shape)
 
     # In the order of the photos, whatever that of the images is.
-    enter(labels.images[np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())
-    images = number(labels.images)
+    enter(labels["images"][np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())
+    images = number(labels["images"])
     of_images = len(numbers) - 1
-    points, photos = number(labels.points, of.point_observed), number(labels.photos, of.photo_observed)
-    observations = number(labels.observations)
+    points, photos = number(labels["points"], of.point_observed), number(labels["photos"], of.photo_observed)
+    observations = number(labels["observations"])
     names = tuple(name for name in numbers if name)
     groups = GroupsOf(
         names,
-        tuple(labels.parents.get(name, "") for name in names),
+        tuple(parents.get(name, "") for name in names),
         tuple(number < of_images for number in range(len(names))),
     )
     counts = of.commons, len(of.camera_names), of.records

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.strips import strips_of
+from photogram.show.cells import unit_written
 from photogram.show.quantity import Quantity, Table
 from photogram.words import Phrase, phrase
 
@@ -29,7 +30,10 @@ LIMIT = 4.0  # Standard deviations from which on an undetected error of a point 
 SHARE = 0.02  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Points beside the suspect that it moves at least
 UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetected
-RARE = 0.05  # Plausible errors of a set that may remain undetected
+EFFECTS = 32  # Groups with computed effects: those of the largest bias-to-noise ratios
+RARE = 0.1  # Plausible errors of a set that may remain undetected
+DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
+MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
 
@@ -49,8 +53,8 @@ DATUM = frozenset(
 """Errors that change the datum only: assumptions, unless an independent source tests them."""
 
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
-"""Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending, whose
-causes (terms of distortion) are hypotheses of their own."""
+"""Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
+whose causes (terms of distortion) are hypotheses of their own."""
 
 MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
@@ -64,6 +68,7 @@ class Effect:
     ratio: float  # largest change, standard deviations
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
+    checks: Sequence[tuple[float, float, float]] = ()  # Changes of check points
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +95,7 @@ class Hypothesis:
     effect: Effect | None
     log_odds: float = field(default=math.nan)  # against "no error"
     name: Phrase | None = None
+    checked: bool = False  # Whether check points detect it
 
     @property
     def undetected(self) -> float:
@@ -101,7 +107,7 @@ class Hypothesis:
 
     def is_harmful(self, points: int) -> bool:
         """Whether an undetected error moves too many of a number of points."""
-        if self.effect is None or self.code in UNGRADED:
+        if self.effect is None or self.checked or self.code in UNGRADED:
             return False
         if self.undetected < RARE or (self.mdb is None and self.code in DATUM):
             return False
@@ -117,6 +123,7 @@ class Hypotheses:
     points: int  # number of adjusted points
     point_ids: Sequence[str]
     axes: Sequence[str]
+    units: Callable[[str], str]  # Unit of the errors of a type
 
     @property
     def harmful(self) -> list[Hypothesis]:
@@ -124,12 +131,10 @@ class Hypotheses:
         found = [each for each in self.every if each.is_harmful(self.points)]
         wholes = {(each.group, each.index) for each in found if each.component is None}
         # A group stands for its components.
-        alone = [
-            each
-            for each in found
-            if each.component is None or (each.group, each.index) not in wholes
-        ]
-        return sorted(alone, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0))
+        alone = [each for each in found if each.component is None or (each.group, each.index) not in wholes]
+        return sorted(
+            alone, key=lambda each: (each.mdb is not None, -each.effect.ratio if each.effect else 0)
+        )
 
     def unchecked(self) -> list[Phrase]:
         """Return messages on these errors, the worst first."""
@@ -138,17 +143,25 @@ class Hypotheses:
             effect = each.effect or Effect(0, 0, 0.0, None, 0.0)
             if each.mdb is None:
                 messages.append(phrase("unchecked.any", named=each.name))
-            else:
-                messages.append(
-                    phrase(
-                        "unchecked.mdb",
-                        size=_written(each.parameters, each.mdb),
-                        named=each.name,
-                        percent=100 * effect.points / self.points,
-                        ratio=effect.ratio,
-                    )
-                )
+                continue
+            size, named = self._main_component(each, each.mdb)
+            share = 100 * effect.points / self.points
+            fields = {"size": size, "named": named, "percent": share, "ratio": effect.ratio}
+            messages.append(Phrase("unchecked.mdb", fields))
         return messages
+
+    def _main_component(self, own: Hypothesis, mdb: Sequence[float]) -> tuple[str, Phrase | None]:
+        """Return the size of an error, by its largest component if that is nearly all of it, and its name."""
+        unit = self.units(own.code)
+        squares = np.square(mdb)
+        parts = [each for each in self.every if each.component is not None]
+        of_group = [each for each in parts if (each.group, each.index) == (own.group, own.index)]
+        if len(of_group) == len(mdb) and squares.max() > MAIN * squares.sum():
+            main = int(squares.argmax())
+            return f"{abs(mdb[main]):.3g}{unit}", of_group[main].name
+        if len(mdb) == 1:
+            return f"{abs(mdb[0]):.3g}{unit}", own.name
+        return f"{math.sqrt(squares.sum()):.3g}{unit}", own.name
 
     @property
     def assumptions(self) -> list[Hypothesis]:
@@ -162,16 +175,19 @@ class Hypotheses:
 
     def tests(self) -> Table:
         """Return the declared table of all tests."""
+        every = self.every
         columns = [
             *self._names(),
-            _column("dimension", [each.rank for each in self.every], "Parameters", decimals=0),
-            _column("statistic", [each.statistic for each in self.every], "T", decimals=2),
-            _column("p", [each.probability for each in self.every], "p", figures=2),
-            _column("log_odds", [each.log_odds for each in self.every], "Log odds", decimals=1),
-            _column("estimate", [_written(each.parameters, each.estimate) for each in self.every], "Estimate", kind="name"),
-        ]  # fmt: skip
-        shown = np.array(sorted(range(len(self.every)), key=lambda k: -self.every[k].log_odds)[:10], dtype=np.int64)
-        note = "Log odds are those of the error against no error; errors of all sizes that are plausible are compared."
+            _column("dimension", [each.rank for each in every], "Parameters", decimals=0),
+            _column("statistic", [each.statistic for each in every], "T", decimals=2),
+            _column("p", [each.probability for each in every], "p", figures=2),
+            _column("log_odds", [each.log_odds for each in every], "Log odds", decimals=1),
+            _column("estimate", [_written(each, each.estimate) for each in every], "Estimate", kind="name"),
+        ]
+        shown = np.array(
+            sorted(range(len(self.every)), key=lambda k: -self.every[k].log_odds)[:10], dtype=np.int64
+        )
+        note = "Log odds compare an error of a plausible size with no error."
         return Table("hypotheses", "Tested hypotheses", columns, note, shown=shown)
 
     def external_reliability(self) -> Table:
@@ -181,23 +197,28 @@ class Hypotheses:
             "" if each.at is None else f"{self.axes[each.at[1]]} of {self.point_ids[each.at[0]]}"
             for each in effects
         ]
+        every = self.every
         columns = [
             *self._names(),
-            _column("redundancy", [each.redundancy for each in self.every], "Redundancy", decimals=4),
-            _column("mdb", [_written(each.parameters, each.mdb or ()) for each in self.every], "MDB", kind="name"),
-            _column("bias_to_noise", [each.bias_to_noise for each in self.every], "Moves up to, sd", decimals=1),
+            _column("redundancy", [each.redundancy for each in every], "Redundancy", decimals=4),
+            _column("mdb", [_written(each, each.mdb or ()) for each in every], "MDB", kind="name"),
+            _column("bias_to_noise", [each.bias_to_noise for each in every], "Moves up to, sd", decimals=1),
             _column("points", [each.points for each in effects], "Points moved", decimals=0),
             _column("ratio", [each.ratio for each in effects], "Largest effect, sd", decimals=1),
             _column("change", [each.change for each in effects], "Largest effect", decimals=3),
             _column("at", worst, "At", kind="name"),
-        ]  # fmt: skip
+        ]
         order = sorted(range(len(self.every)), key=lambda k: -np.nan_to_num(effects[k].ratio))
         note = (
-            f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of 100"
-            f" cases. Points moved change by more than {LIMIT:g} standard deviations if it is not detected."
+            f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of"
+            f" 100 cases. Otherwise, points moved change by more than {LIMIT:g} standard deviations."
         )
         return Table(
-            "external-reliability", "Undetected errors", columns, note, shown=np.array(order[:10], dtype=np.int64)
+            "external-reliability",
+            "Undetected errors",
+            columns,
+            note,
+            shown=np.array(order[:10], dtype=np.int64),
         )
 
     def _names(self) -> list[Quantity]:
@@ -208,37 +229,61 @@ class Hypotheses:
 
 
 def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
-    return Quantity(np.array(values, dtype=object if more.get("kind") == "name" else float), name=name, member=name, head=head, **more)
+    return Quantity(
+        np.array(values, dtype=object if more.get("kind") == "name" else float),
+        name=name,
+        member=name,
+        head=head,
+        **more,
+    )
 
 
-def _written(names: Sequence[str], values: Sequence[float]) -> str:
-    if not names:
-        return ", ".join(f"{value:.4g}" for value in values)
-    return ", ".join(f"{name} {value:.4g}" for name, value in zip(names, values, strict=False))
+def _written(own: Hypothesis, values: Sequence[float]) -> str:
+    names = own.parameters or [""] * len(values)
+    return ", ".join(f"{name} {value:.4g}".lstrip() for name, value in zip(names, values, strict=False))
 
 
 def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
     """Return the hypotheses of an adjusted network that is tested."""
     trial = found.trial
     estimated = None if found.known else result.sum_and_freedom
+    facts = result.hypothesis_facts()
     rows, correlations = trial.core.hypotheses(
-        **{**NO_FACTS, **result.hypothesis_facts()}, estimated=estimated, detection=DETECTION, limit=LIMIT
+        **{**NO_FACTS, **facts}, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
     )
-    name = group_names(trial.suspects, getattr(result.given, "camera_names", ()))
+    name = group_names(cast("NamedSuspects", trial.suspects), getattr(result.given, "camera_names", ()))
+    axes = result._terms().point_axes
+    length, image = unit_written(axes[2].small), result.given.image_unit
+    units = {"camera-f": f" {image}", "camera-point": f" {image}", "attitude": " rad", "boresight": " rad"}
+    units |= dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), "")
+    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if "times" in facts else " exposures")
     numbers = Counter((row["code"], row["component"] is None) for row in rows)
     every = []
     for row in rows:
         effect = None if row["effect"] is None else Effect(*row["effect"])
         own = Hypothesis(**{**row, "effect": effect}, name=name(row))
         odds = _log_odds(own, numbers[own.code, own.component is None], estimated)
-        every.append(replace(own, log_odds=odds))
+        every.append(replace(own, log_odds=odds, checked=_is_checked(result, effect)))
     return Hypotheses(
         every,
         correlations,
         points=int(np.count_nonzero(result.used_points)),
         point_ids=result.given.point_ids,
-        axes=[axis.name for axis in result._terms().point_axes],
+        axes=[axis.name for axis in axes],
+        units=lambda code: units.get(code, f" {length}"),
     )
+
+
+def _is_checked(result: AdjustedNetwork, effect: Effect | None) -> bool:
+    """Whether an error moves a check point by an amount that its test detects."""
+    if effect is None or not len(effect.checks):
+        return False
+    checks = cast("Result", result).check_points
+    if checks.agreement is None:
+        return False
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.abs(np.array(effect.checks)) / np.hypot(checks.sd, checks.given_sd)
+    return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
 
 
 def _log_odds(own: Hypothesis, count: int, estimated: tuple[float, float] | None) -> float:
@@ -259,16 +304,17 @@ NO_FACTS: dict[str, Any] = {
     "control_sets": [],
     "readouts": [],
     "widths": [],
+    "checks": [],
     "centre": None,
 }
 
 
 def block_facts(result: Result) -> dict[str, Any]:
-    """Return what hypotheses on a block need to know beside its network: velocities, sets, sizes of images."""
+    """Return the facts that hypotheses on a block require: velocities, sets, sizes of images."""
     block = result.block
     count = len(block.photo_ids)
     cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
-    facts: dict[str, Any] = {"widths": [], "readouts": []}
+    facts: dict[str, Any] = {"widths": [], "readouts": [], "checks": result.check_points.rows.tolist()}
     of_images = cameras[block.image_photos]
     for camera in range(max(len(block.cameras), 1)):
         xy = block.image_xy[of_images == camera]
@@ -303,9 +349,9 @@ def block_facts(result: Result) -> dict[str, Any]:
     _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
     own = np.unique(kinds[control])
     if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        number = {kind: k for k, kind in enumerate(own.tolist())}
+        set_of: dict[int, int] = {kind: k for k, kind in enumerate(own.tolist())}
         facts["control_sets"] = [
-            number[kind] if is_control else None
+            set_of[kind] if is_control else None
             for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
         ]
     return facts

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Iteration", "Redundancies", "SumsByKind", "SumsOfSquares"]
-
 
 @dataclass(frozen=True)
 class Iteration:
@@ -31,8 +29,6 @@ class Iteration:
 
 @dataclass(frozen=True)
 class SumsByKind:
-    """Sums over kinds of observations."""
-
     # Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras
     camera: float
     ground: float  # Of the held components of control
@@ -46,7 +42,6 @@ class SumsByKind:
 
     @property
     def total(self) -> float:
-        """All together."""
         return self.camera + self.ground + self.plates + self.observations
 
 

@@ -30,7 +30,7 @@ from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import INTERIOR, rows_of_images
+from photogram.results.distortion import INTERIOR, partials_of, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.scores import quadratic, score
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from photogram import Result
-
-__all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
 
 KEPT = 0.01  # Significance level of useful terms
 EFFECT = 0.2  # Smallest effect of useful terms on an image, in standard deviations
@@ -274,7 +272,11 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
     names, all_results = list(results), list(results.values())
     first = all_results[0]
     for name, other in zip(names[1:], all_results[1:], strict=True):
-        _check_same(names[0], first, name, other)
+        for what in ("image_xy", "image_sd"):
+            if not np.array_equal(getattr(first.block, what), getattr(other.block, what)):
+                raise InputError(phrase("models.observations", one=names[0], other=name, what=what))
+        if count := int((first.used_images != other.used_images).sum()):
+            raise InputError(phrase("models.images", n=count, one=names[0], other=name))
     taken = all(math.isinf(each.freedom_of_scale) for each in all_results) if known is None else known
     models = [_model(name, result, taken) for name, result in results.items()]
     nested = []
@@ -282,7 +284,12 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
         larger = [each for each in names if _is_within(results[small], results[each])]
         if larger:
             large = min(larger, key=lambda each: _count(results[each]))
-            nested.append(_nested(small, results[small], large, results[large], taken))
+            omega = [results[each].sums_of_squares.total for each in (small, large)]
+            freedom = [_all_freedom(results[each]) for each in (small, large)]
+            k, statistic = freedom[0] - freedom[1], omega[0] - omega[1]
+            scale = 1.0 if taken else omega[1] / freedom[1]
+            p = _probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
+            nested.append((small, large, statistic, k, p))
     return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
 
 
@@ -323,28 +330,21 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
     Forward cameras compare measured with computed images, backward ones corrected with ideal images.
     """
-    block = result.block
-    own = rows_of_images(result, camera)
-    columns = np.zeros((len(rows), len(block.image_xy), 2))
+    own, names = rows_of_images(result, camera), [camera.names[row] for row in rows]
+    columns = np.zeros((len(rows), len(result.block.image_xy), 2))
     plain = camera.camera.replace(sd=0.0, covariance=None)
-    measured, residuals = focal_images(block)[own], result.residuals[own]
-    backward = plain.direction == "backward"
-    rays = None if backward else plain.rays(measured - residuals)
+    measured, residuals = focal_images(result.block)[own], result.residuals[own]
+    rays = None if plain.direction == "backward" else plain.rays(measured - residuals)
+    # Steps that move images by about a millionth of the frame.
     reach = float(np.abs(measured).max(initial=1.0))
+    steps = {name: 1e-6 * reach ** plain.powers[name] for name in names}
 
-    def compared(parameters: Mapping[str, float]) -> Floats:
-        changed = plain.replace(parameters=parameters)
+    def compared(changed: Camera) -> Floats:
         return -_corrected(changed, measured) if rays is None else changed.project(rays)
 
-    for place, row in enumerate(rows):
-        name = camera.names[row]
-        # A step that moves images by about a millionth of the frame.
-        step, value = 1e-6 * reach ** plain.powers[name], plain.parameters[name]
-        ends = (value + step, value - step)
-        after, before = (compared({**plain.parameters, name: end}) for end in ends)
-        columns[place, own] = (after - before) / (2 * step)
-        if backward and name == "c":
-            columns[place, own] += (_corrected(plain, measured) - residuals) / value
+    columns[:, own] = partials_of(compared, plain, steps)
+    if rays is None and "c" in names:
+        columns[names.index("c"), own] += (_corrected(plain, measured) - residuals) / plain.parameters["c"]
     return np.nan_to_num(columns)
 
 
@@ -393,15 +393,6 @@ def _probability(value: float, k: int, freedom: float) -> float:
     return _photocore.fisher(value / k, k, freedom) if freedom > 0 else math.nan
 
 
-def _check_same(name: str, one: Result, other_name: str, other: Result) -> None:
-    """Refuse models of other observations."""
-    for what in ("image_xy", "image_sd"):
-        if not np.array_equal(getattr(one.block, what), getattr(other.block, what)):
-            raise InputError(phrase("models.observations", one=name, other=other_name, what=what))
-    if count := int((one.used_images != other.used_images).sum()):
-        raise InputError(phrase("models.images", n=count, one=name, other=other_name))
-
-
 def _count(result: Result) -> int:
     return sum(len(each.estimated) for each in result.cameras)
 
@@ -434,18 +425,6 @@ def _is_within(small: Result, large: Result) -> bool:
         a.given.model == b.given.model and set(a.estimated) <= set(b.estimated)
         for a, b in zip(small.cameras, large.cameras, strict=True)
     )
-
-
-def _nested(
-    small: str, first: Result, large: str, second: Result, known: bool
-) -> tuple[str, str, float, int, float]:
-    omega = [each.sums_of_squares.total for each in (first, second)]
-    freedom = [_all_freedom(each) for each in (first, second)]
-    k = freedom[0] - freedom[1]
-    statistic = omega[0] - omega[1]
-    scale = 1.0 if known else omega[1] / freedom[1]
-    probability = _probability(max(statistic, 0.0) / scale, k, math.inf if known else freedom[1])
-    return small, large, statistic, k, probability
 
 
 check_arguments(globals(), ["compare", "score_test", "terms_test"])

@@ -38,13 +38,11 @@ if TYPE_CHECKING:
     from photogram.plots import Plots
     from photogram.plots.picture_data import Pictured
     from photogram.results.axes import Determined, Terms
+    from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
-    from photogram.results.hypotheses import Hypotheses
     from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.statistics.findings import Removed
-
-__all__ = ["AdjustedNetwork", "Observed"]
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Of a `repr`
@@ -189,8 +187,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return f"Adjusted {type(self.given).__name__.lower()}{f': {title}' if title else ''}", rows
 
     @abstractmethod
-    def _members(self) -> dict[str, Any]:
-        """Return the members of the JSON document, without the sections that people read."""
+    def _members(self) -> dict[str, Any]: ...
 
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
@@ -225,24 +222,19 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return global_test(*self.sum_and_freedom)
 
     @abstractmethod
-    def _core_network(self) -> CoreNetwork:
-        """Return the network for the core."""
+    def _core_network(self) -> CoreNetwork: ...
 
     @abstractmethod
-    def _terms(self) -> Terms:
-        """Return names and components of photos, points and images."""
+    def _terms(self) -> Terms: ...
 
     @abstractmethod
-    def _determined(self) -> Determined:
-        """Return positions and poses with their cofactors."""
+    def _determined(self) -> Determined: ...
 
     @abstractmethod
-    def _plot_data(self) -> Pictured:
-        """Return the data of the plots."""
+    def _plot_data(self) -> Pictured: ...
 
     @abstractmethod
-    def _trial(self) -> NetworkTrial:
-        """Return the network as tests ask it, where the adjustment has ended."""
+    def _trial(self) -> NetworkTrial: ...
 
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
@@ -265,11 +257,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        from photogram.results.reliability import reliability_of
+        from photogram.results.reliability import Reliability
 
-        return reliability_of(
-            self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight
-        )
+        return Reliability(self._trial(), self.covariances, level=level, power=power, unit_weight=unit_weight)
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
@@ -304,8 +294,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def hypotheses(self) -> pd.DataFrame:
         """Return errors of sets and of single observations as a data frame, with their tests (docs/tests.md).
 
-        A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no error,
-        and the estimated error in the units of the observations.
+        A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no
+        error, and the estimated error in the units of the observations.
 
         Raises
         ------
@@ -431,12 +421,10 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return standard_deviations(self.point_covariances)
 
     @abstractmethod
-    def _adjusted(self) -> Adjusted:
-        """Return the adjusted values by kinds and names."""
+    def _adjusted(self) -> Adjusted: ...
 
     @abstractmethod
-    def _refused(self, error: Failure) -> Exception:
-        """Put into words what the core has refused."""
+    def _refused(self, error: Failure) -> Exception: ...
 
     def covariances(self) -> Covariances:
         """Return an object that answers for covariances of anything with anything, from one factor.

@@ -19,12 +19,11 @@ from photogram.results.network_sections import (
     points_section,
     weakest_photos,
     weakest_points,
-    weakest_tables,
 )
 from photogram.results.network_tables import (
     control,
     images,
-    iterations,
+    iteration_table,
     photos,
     points,
     stations,
@@ -33,19 +32,11 @@ from photogram.results.tests import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
-from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, about, significant
 from photogram.show.quantity import Quantities, Quantity, members, records
 from photogram.statistics.evidence import GLOBAL
 from photogram.words import phrase
 
-ORDERINGS = {
-    "input": "in input order",
-    "rcm": "by reverse Cuthill-McKee",
-    "amd": "by minimum degree",
-    "dissection": "by nested dissection",
-    "graph-dissection": "by dissection of the graph",
-    "parts": "in parts, and the separators between them",
-}
 NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
 WORST = 25  # Observations in the table of the worst
@@ -75,24 +66,20 @@ def network_document(
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
-    weak = weakest_points(result), weakest_photos(result)
+    weakest = weakest_points(result), weakest_photos(result)
     images_of_worst = worst[worst[:, 0] == 0, 1]
     worst_photos = result.given.image_photos[images_of_worst].tolist()
     worst_points = result.image_points[images_of_worst].tolist()
-    worst_photos += [each.row for each in weak[1]]
-    worst_points += [each.row for each in weak[0]]
-    intro = (
-        "The redundancy number of an observation is the share of its error that shows in its own"
-        " residual; the rest"
-        " goes into the unknowns. Their sum is the number of observations beyond what is needed."
-    )
-    intro_of_worst = (
-        "A residual alone says little: an error shows in it only by the share of its redundancy number. The"
-        " test value considers both. Names of photos and points lead to their rows below."
-    )
+    for rows, table in zip((worst_points, worst_photos), weakest, strict=True):
+        link = table.columns[0].link
+        rows += [] if link is None else link.rows.tolist()
+    history = iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
+    course_table = quantity.Table("iterations", "Iterations", history, about("iterations"))
+    course = [Fact("Status", result.status)]
+    if result.loss is not None:
+        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     summary = result.reliability_summary
     reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
-    tables = [table for table in weakest_tables(result, *weak) if len(table.columns[0].values)]
     return Document(
         what=what,
         title=title,
@@ -105,15 +92,15 @@ def network_document(
             *beside,
             size,
             Section("residuals", "Image residuals", [pictures["residuals"]]),
-            Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
+            Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], about("redundancy")),
             Section("reliability", "Reliability", reliability),
-            _tests_section(result, pictures["tests"]),
-            Section("worst", "Worst observations", _worst_table(tests, worst), intro_of_worst),
+            Section("tests", "Tests", [pictures["tests"], verdict_table(result.verdict)], about("tests")),
+            Section("worst", "Worst observations", _worst_table(tests, worst), about("worst")),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
-            Section("weakest", "Weakest points and photos", tables),
-            _iterations_section(result),
+            Section("weakest", "Weakest points and photos", [table for table in weakest if table.visible]),
+            Section("iterations", "Iterations", [course_table, Facts("Course", course)]),
         ],
         details=[
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
@@ -147,7 +134,6 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
     weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
     of_photos = Quantity(result.photo_covariances, member="covariance")
     of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
-    weak_points, weak_photos = weakest_tables(result, weakest_points(result), weakest_photos(result))
     return {
         "program": f"photogram {_photocore.__version__}",
         **members(result, "status", "degrees_of_freedom", "variance_of_unit_weight", "covariance_scale"),
@@ -156,13 +142,13 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
         "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
         "verdict": result.verdict.document(),
         "reliability": summary.document() if summary else None,
-        "iterations": records(iterations(result))[1:],
+        "iterations": records(iteration_table(result.iterations)),
         "photos": records([*photos(result), *photo_members, of_photos]),
         "points": records([*points(result), of_points]),
         "observations": records([*images(result), *([weights] if result.loss else [])]),
         "control": records(control(result)),
         "stations": records(stations(result)),
-        "weakest": {"points": records(weak_points.columns), "photos": records(weak_photos.columns)},
+        "weakest": {"points": weakest_points(result).record(), "photos": weakest_photos(result).record()},
     }
 
 
@@ -183,8 +169,18 @@ def size_section(
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
+    variance, sigma, note = (
+        result.variance_of_unit_weight,
+        "–",
+        "no degrees of freedom: covariances are scaled by 1",
+    )
+    if variance is not None:
+        sigma, note = f"{math.sqrt(variance):.3f}", ""
+        for test in result.verdict.tests:
+            if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
+                note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
     found = [
-        _unit_weight(result),
+        Fact("Standard deviation of unit weight", sigma, note=note),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
         Fact("Iterations", f"{len(result.iterations)}", note=result.status),
@@ -193,17 +189,6 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
         rms = math.sqrt(float(((result.residuals[used] * axis.factor) ** 2).mean()))
         found.append(Fact("rms of image residuals", significant(rms, 3), unit_written(axis.small)))
     return found
-
-
-def _unit_weight(result: AdjustedNetwork) -> Fact:
-    variance, name = result.variance_of_unit_weight, "Standard deviation of unit weight"
-    if variance is None:
-        return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
-    note = ""
-    for test in result.verdict.tests:
-        if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
-            note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
-    return Fact(name, f"{math.sqrt(variance):.3f}", note=note)
 
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
@@ -266,34 +251,17 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
         Quantity(largest, head="Largest"),
         Quantity(units, kind="name", head="Unit"),
     ]
-    note = "A posteriori: scaled by the unit variance where that is estimated."
-    return [quantity.Table("precision", "Precision", columns, note)]
-
-
-def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
-    parts: list[Part] = [drawing, verdict_table(result.verdict)]
-    intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
-    return Section("tests", "Tests", parts, intro)
-
-
-def _iterations_section(result: AdjustedNetwork) -> Section:
-    note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
-    table = quantity.Table("iterations", "Iterations", iterations(result), note)
-    course = [Fact("Status", result.status)]
-    if result.loss is not None:
-        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
-    return Section("iterations", "Iterations", [table, Facts("Course", course)])
+    return [quantity.Table("precision", "Precision", columns, about("precision"))]
 
 
 def _work(result: AdjustedNetwork) -> list[Fact]:
     """Return the order of elimination, and numbers of operations, also of other orders."""
-    ordering = ORDERINGS.get(result.ordering, result.ordering)
     return [
-        Fact("Photos eliminated", ordering),
+        Fact("Photos eliminated", about(f"ordering.{result.ordering}")),
         Fact("Normal equations formed", f"{result.formations}", note="times"),
         *(
             Fact(
-                f"Multiply-adds if eliminated {ORDERINGS.get(name, name)}",
+                f"Multiply-adds if eliminated {about(f'ordering.{name}')}",
                 "too large for this ordering" if math.isnan(count) else f"{count:.3e}",
             )
             for name, count in result.predictions.items()
@@ -313,60 +281,23 @@ def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
         image = each.type == "image"
         names.append(f"image {each.axes[part].name}" if image else str(each.name((row, part))))
     count = sum(int(np.count_nonzero(np.abs(each.values) > NOTABLE)) for each in tests.components)
-    note = (
-        f"The {len(places)} of the largest test values; {count} exceed {NOTABLE:g} in size. Marked"
-        " observations are the outliers of the verdict: the section Tests has the limits."
-    )
+    note = about("worst-observations", n=len(places), count=count, limit=NOTABLE)
     columns = [Quantity(names, kind="name", head="Observation")]
     columns += [each for each in tests.columns(places) if each.name != "component"]
     return [quantity.Table("worst", "Worst observations", columns, note)]
 
 
-CAPTIONS = {
-    "network": (
-        "Plan of the network",
-        "Photos with what they show, points by their number of rays, control and check points with their"
-        " differences, and error ellipses (95 percent). What is enlarged has a scale bar.",
-    ),
-    "residuals": (
-        "Image residuals over the frame",
-        "Observed minus computed, camera by camera: one by one, or the means of cells where there are many."
-        " Arrows that point alike in one part of the frame are what the camera model does not explain.",
-    ),
-    "redundancy": (
-        "Redundancy over the frame and over the network",
-        "Where the network checks itself, and where not: dark places have errors that nobody sees.",
-    ),
-    "tests": (
-        "Test values against the normal distribution",
-        "Left the histogram, right the ordered test values over those expected: they lie on the line where"
-        " the standard deviations are right, on a steeper one where these are too small; single ones"
-        " away from it"
-        " are gross errors.",
-    ),
-    "correlations": (
-        "Correlations of the parameters of cameras",
-        "Strong colours away from the diagonal: parameters that the network can hardly tell apart.",
-    ),
-    "distortion": (
-        "Radial distortion with its standard deviations",
-        "The curve, dashed where no image lies; where it is estimated, with one standard deviation beside.",
-    ),
-    "features": (
-        "Deviations of points from their features",
-        "Outside positive, of a plane on the side of its normal; bars are U to either side.",
-    ),
-    "films": (
-        "Residuals of fiducial marks, and patterns of films",
-        "Means over all photos, in the frame of the camera: marks that stay off on all of them are those of"
-        " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
-    ),
-}
+PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
 
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
     return {
-        name: Drawing(f"picture-{name}", *words, partial(sketch_of, result, name))
-        for name, words in CAPTIONS.items()
+        name: Drawing(
+            f"picture-{name}",
+            about(f"{name}.title"),
+            about(f"{name}.caption"),
+            partial(sketch_of, result, name),
+        )
+        for name in PICTURES
     }

@@ -7,16 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass
-from photogram.messages import counted, listed
 from photogram.results.axes import Determined, Terms, point_axes
-from photogram.results.network import AdjustedNetwork, Observed
+from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
     control,
     images,
+    names,
     part,
     photos,
     plan_deviations,
@@ -25,8 +23,8 @@ from photogram.results.network_tables import (
 )
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
-from photogram.show.page import Layers, Part, Section, Text, layered_tables
-from photogram.show.quantity import Link, Quantity, Table, named, of_each
+from photogram.show.page import Layers, Part, Section, Text, about, layered_tables
+from photogram.show.quantity import Quantity, Table, named
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -35,39 +33,13 @@ WORST = 10
 NEAR = 1e-3  # Points closer to a station, as a part of the median distance, are listed first
 
 
-@dataclass(frozen=True)
-class WeakestPoint:
-    """A point among those that are determined worst."""
-
-    row: int  # Among the points of the network
-    point: str  # Its name
-    # The largest of its standard deviations over the smallest, in any directions: the root of the ratio
-    # of the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
-    # parallel ones 10,000 and more. 1 if a component is held
-    ratio: float
-    # From the nearest station that sees it, in the median of these distances; NaN where scanners alone
-    # do
-    distance: float
-    rays: int  # Number of its images
-
-
-@dataclass(frozen=True)
-class WeakestPhoto:
-    """A photo among those that are determined worst."""
-
-    row: int  # Among the photos of the network
-    photo: str  # Its name
-    # Largest over smallest eigenvalue of the covariance matrix of position and attitude, scaled to a
-    # diagonal of ones. Points on a line leave a photo free to turn about it: then it has no bound
-    condition: float
-    images: int  # Number of its images
-
-
 @np.errstate(all="ignore")
-def weakest_points(result: AdjustedNetwork) -> list[WeakestPoint]:
-    """Return the points of the largest ratios, and those nearest to a station, the worst first.
+def weakest_points(result: AdjustedNetwork) -> Table:
+    """Return the points of the largest ratios of standard deviations, and those nearest to a station.
 
-    None without cofactors.
+    The ratio is that of the largest to the smallest standard deviation in any directions: the root of the
+    ratio of the eigenvalues of the covariance matrix, 1 if a component is held. The table has no rows without
+    cofactors.
     """
     network = result._determined()
     cofactors = network.point_cofactors
@@ -81,36 +53,38 @@ def weakest_points(result: AdjustedNetwork) -> list[WeakestPoint]:
     near = np.flatnonzero(distance < NEAR)
     worst = order[~np.isnan(ratio[order])][:WORST]
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
-    return [
-        WeakestPoint(
-            row,
-            result.given.point_ids[row],
-            float(ratio[row]),
-            float(distance[row]),
-            int(result.point_rays[row]),
-        )
-        for row in list(dict.fromkeys(chosen))[:WORST]
+    rows = np.array(list(dict.fromkeys(chosen))[:WORST], dtype=np.int64)
+    columns = [
+        names(result._terms(), "point", rows, "point"),
+        Quantity(ratio[rows], member="ratio", head="Largest over smallest sd", figures=4),
+        Quantity(distance[rows], member="distance", head="Distance", figures=4),
+        Quantity(result.point_rays[rows], member="rays", head="Rays", decimals=0),
     ]
+    return Table("weakest-points", "Weakest points", columns, about("weakest-points"))
 
 
 @np.errstate(all="ignore")
-def weakest_photos(result: AdjustedNetwork) -> list[WeakestPhoto]:
-    """Return the photos of the largest conditions, the worst first.
+def weakest_photos(result: AdjustedNetwork) -> Table:
+    """Return the photos of the largest conditions of their poses, the worst first.
 
-    Fixed unknowns of a photo do not count; those of which all are fixed are left out.
+    Fixed unknowns of a photo do not count; those of which all are fixed are left out. Points on a line leave
+    a photo free to turn about it: then the condition has no bound.
     """
-    network = result._determined()
-    names, photos = result.given.photo_ids, result.given.image_photos
-    images = np.bincount(photos[result.used_images], minlength=len(names))
+    network, count = result._determined(), len(result.given.photo_ids)
+    images = np.bincount(result.given.image_photos[result.used_images], minlength=count)
     known = (images > 0) & np.isfinite(network.poses).all(axis=(1, 2)) & (network.ranks > 0)
-    poses, rows = network.poses[known], np.flatnonzero(known)
+    poses = network.poses[known]
     variances = np.diagonal(poses, axis1=1, axis2=2)
     sd = np.sqrt(np.where(variances > 0, variances, 1.0))
     condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
-    return [
-        WeakestPhoto(int(rows[k]), names[rows[k]], float(condition[k]), int(images[rows[k]]))
-        for k in np.argsort(-condition, kind="stable")[:WORST].tolist()
+    order = np.argsort(-condition, kind="stable")[:WORST]
+    rows = np.flatnonzero(known)[order]
+    columns = [
+        names(result._terms(), "photo", rows, "photo"),
+        Quantity(condition[order], member="condition", head="Condition", figures=4),
+        Quantity(images[rows], member="images", head="Images", decimals=0),
     ]
+    return Table("weakest-photos", "Weakest photos", columns, about("weakest-photos"))
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
@@ -146,27 +120,25 @@ IMAGES = 1_000  # Image observations of a text report
 
 
 def component_table(
-    key: str, title: str, columns: Sequence[Quantity], tests: Floats, deviations: Floats | None = None
+    key: str,
+    title: str,
+    columns: Sequence[Quantity],
+    there: Bools,
+    tests: Floats,
+    deviations: Floats | None = None,
 ) -> list[Table]:
     """Return a table that shows the components with the largest test values; none without components.
 
-    `tests` are (n, k) test values, infinite where there is none, NaN where the component is not there.
+    Components are the (n, k) that are `there`, `tests` their test values, NaN where there is none.
     """
-    places = np.argwhere(~np.isnan(tests))
+    places = np.argwhere(there)
     if not len(places):
         return []
-    sizes = np.abs(tests[tuple(places.T)])
-    order = np.argsort(np.where(np.isinf(sizes), 1.0, -sizes), kind="stable")
-    rows = np.sort(order[:COMPONENTS])
-    some = f"The {len(rows)} of {len(places)} components with the largest test values."
-    note = "" if len(rows) == len(places) else some
-    return [Table(key, title, columns, note, deviations=deviations, shown=places[rows])]
-
-
-def is_held(control: Observed) -> Bools:
-    """Return (r,) whether points are held in all their coordinates: nothing tests them."""
-    found: Bools = (control.sd == 0).all(axis=1)
-    return found
+    sizes = np.abs(tests[there])
+    rows = np.sort(np.argsort(np.where(np.isnan(sizes), 1.0, -sizes), kind="stable")[:COMPONENTS])
+    note = "" if len(rows) == len(places) else about("components.largest", n=len(rows), all=len(places))
+    by = None if deviations is None else np.where(there, deviations, np.nan)
+    return [Table(key, title, columns, note, deviations=by, shown=places[rows])]
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
@@ -174,58 +146,28 @@ def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> S
 
     `free` are the columns of components of control that are not held.
     """
-    columns, held = control(result), is_held(result.control)
-    own = replace(result.control, sd=np.where(held[:, np.newaxis], np.nan, result.control.sd))
-    tables = _observed("control", "Control points", columns, own, result.point_sd)
+    columns, own = control(result), result.control
+    held = (own.sd == 0).all(axis=1)
+    there, sd = np.isfinite(own.sd) & ~held[:, np.newaxis], result.point_sd[own.rows]
+    tables = component_table("control", "Control points", columns, there, own.standardized, sd)
     if free:
         tables += _compared("unheld", "Components of control that are not held", free)
-    intro = (
-        "What was given for the control points, and what the adjustment made of it. A component with a"
-        " redundancy"
-        " number near 0 is not checked by the rest of the network: an error of it goes into the result"
-        " unseen."
-    )
     parts: list[Part] = [*tables]
     if held.any():
-        names = [str(name) for name in np.asarray(columns[0].values)[held]]
-        fixed = counted(len(names), "point")
-        parts.append(Text(f"{fixed} held where given, which nothing tests, are not listed: {listed(names)}."))
-    return Section("control", "Control points", parts, intro)
-
-
-def _observed(key: str, title: str, columns: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
-    """Return prior, posterior, difference and test of every observed component; none where there are none.
-
-    `sd` are (n, k) standard deviations of the adjusted values, of all photos or points.
-    """
-    there = np.isfinite(given.sd)
-    deviations = np.where(there, sd[given.rows], np.nan)
-    return component_table(key, title, columns, _tested(there, given.standardized), deviations)
-
-
-def _tested(there: np.ndarray, tests: Floats) -> Floats:
-    """Return test values: infinite where there is none, NaN where the component is not there."""
-    found: Floats = np.where(there, np.nan_to_num(tests, nan=np.inf), np.nan)
-    return found
+        fixed = [str(name) for name in np.asarray(columns[0].values)[held]]
+        parts.append(Text(about("control.fixed", n=len(fixed), names=fixed)))
+    return Section("control", "Control points", parts, about("control"))
 
 
 def check_section(result: Result) -> Section:
-    """Return check points with what they say as a whole."""
     columns = check_points(result)
     tables = _compared("check_points", "Check points one by one", columns)
     parts = [_check_summary(result), *tables, _check_tests(result, columns)] if tables else []
-    intro = (
-        "Points with known coordinates that took no part in the adjustment: the independent proof of"
-        " its accuracy."
-        " The test value is the difference over its standard deviation: that of the adjusted coordinate and"
-        " that of the given one together."
-    )
+    intro = about("check-points")
     checks = result.check_points
     if checks.assumed.any():
-        names = [result.block.point_ids[row] for row in checks.rows[checks.assumed].tolist()]
-        intro += (
-            f" The given standard deviations of {counted(len(names), 'point')} are assumed: {listed(names)}."
-        )
+        assumed = [result.block.point_ids[row] for row in checks.rows[checks.assumed].tolist()]
+        intro += f" {about('check-points.assumed', n=len(assumed), names=assumed)}"
     return Section("check-points", "Check points", parts, intro)
 
 
@@ -234,26 +176,27 @@ def _check_summary(result: Result) -> Table:
     """Return mean and rms differences by component, beside their standard deviations."""
     axes, checks = point_axes(result.block), result.check_points
     factors = np.array([axis.factor for axis in axes])
-    differences, sd = checks.differences * factors, np.hypot(checks.sd, checks.given_sd) * factors
-    rows = []
-    for axis, d, s in zip(axes, differences.T, sd.T, strict=True):
-        if (known := np.isfinite(d)).any():
-            d, s = d[known], s[known]
-            squares = (np.sqrt((values**2).mean()) for values in (d, s, d / s))
-            name = f"{axis.name}, {unit_written(axis.small)}"
-            rows.append((name, len(d), d.mean(), d[np.abs(d).argmax()], *squares))
-    names, counts, means, largest, rms, deviations, tests = zip(*rows, strict=True)
+    d, sd = checks.differences * factors, np.hypot(checks.sd, checks.given_sd) * factors
+    some = np.flatnonzero(np.isfinite(d).any(axis=0))
+    d, sd = d[:, some], sd[:, some]
+    known = np.isfinite(d)
+    count = known.sum(axis=0)
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(np.where(known, values, 0.0).sum(axis=0) / count)
+
+    largest = np.where(known, np.abs(d), -1.0).argmax(axis=0)
+    components = [f"{axes[k].name}, {unit_written(axes[k].small)}" for k in some.tolist()]
     columns = [
-        Quantity(names, kind="name", head="Component"),
-        Quantity(counts, head="Points", decimals=0),
-        Quantity(means, head="Mean difference"),
-        Quantity(rms, head="rms difference"),
-        Quantity(largest, head="Largest"),
-        Quantity(deviations, head="rms of sd"),
-        Quantity(tests, head="rms of test values", decimals=2),
+        Quantity(components, kind="name", head="Component"),
+        Quantity(count, head="Points", decimals=0),
+        Quantity(mean(d), head="Mean difference"),
+        Quantity(np.sqrt(mean(d**2)), head="rms difference"),
+        Quantity(d[largest, np.arange(len(some))], head="Largest"),
+        Quantity(np.sqrt(mean(sd**2)), head="rms of sd"),
+        Quantity(np.sqrt(mean((d / sd) ** 2)), head="rms of test values", decimals=2),
     ]
-    note = "Test values have an rms of about 1 where the standard deviations are right."
-    return Table("check-summary", "Check points together", columns, note)
+    return Table("check-summary", "Check points together", columns, about("check-summary"))
 
 
 def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
@@ -267,37 +210,35 @@ def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
 
 def _compared(key: str, title: str, columns: Sequence[Quantity]) -> list[Table]:
     """Return given and adjusted coordinates of the components that can be compared."""
-    there = np.isfinite(named(columns, "d").values)
     tests = next(column.values for column in columns if column.head == "Test value")
-    deviations = np.where(there, named(columns, "sd").values, np.nan)
-    return component_table(key, title, columns, _tested(there, tests), deviations)
+    there = np.isfinite(named(columns, "d").values)
+    return component_table(key, title, columns, there, tests, named(columns, "sd").values)
 
 
 def stations_section(result: AdjustedNetwork) -> Section:
     """Return what was given of photos as observations, layer by layer."""
     tables: list[Table] = []
-    layers = result._terms().layers
+    layers, own = result._terms().layers, result.stations
+    there, sd = np.isfinite(own.sd), result.photo_sd[own.rows]
     for caption, of in layers.items():
-        given = result.stations
         columns = [part(column, of) if column.axes else column for column in stations(result)]
-        own = replace(given, sd=given.sd[:, of], standardized=given.standardized[:, of])
         key, title = f"stations-{caption.lower()}", f"{caption} of photos"
-        tables += _observed(key, title, columns, own, result.photo_sd[:, of])
+        tables += component_table(key, title, columns, there[:, of], own.standardized[:, of], sd[:, of])
     *others, last = [caption.lower() for caption in layers]
     intro = f"{', '.join(others).capitalize()} and {last} that were given with standard deviations."
     return Section("stations", "Observed photos", layered_tables("stations", tables), intro)
 
 
 def beside_section(result: Result) -> Section:
-    """Return observations beside images, kind by kind."""
     tables = []
     for kind, observed in result.kinds.items():
         if observed.used:
-            tests = _tested(np.isfinite(observed.residuals), observed.standardized)
-            title = kind[:1].upper() + kind[1:]
-            tables += component_table(f"observations-{kind}", title, observations(observed), tests)
-    intro = "Observations beside images: observed minus adjusted, with their tests."
-    return Section("observations", "Other observations", layered_tables("beside", tables), intro)
+            key, title = f"observations-{kind}", kind[:1].upper() + kind[1:]
+            there, columns = np.isfinite(observed.residuals), observations(observed)
+            tables += component_table(key, title, columns, there, observed.standardized)
+    return Section(
+        "observations", "Other observations", layered_tables("beside", tables), about("observations")
+    )
 
 
 def images_section(result: AdjustedNetwork) -> Section:
@@ -308,53 +249,48 @@ def images_section(result: AdjustedNetwork) -> Section:
     rows = np.arange(len(sizes))
     if len(sizes) > IMAGES:
         rows = np.sort(np.argpartition(-sizes, IMAGES)[:IMAGES])
-    some = f"The {len(rows)} of {len(sizes)} with the largest test values. The table of images has all."
-    note = "" if len(rows) == len(sizes) else some
+    note = "" if len(rows) == len(sizes) else about("images.largest", n=len(rows), all=len(sizes))
     columns[2:] = [
         replace(residuals, head="Residual {}", decimals=2),
         replace(redundancy, head="Redundancy {}"),
         replace(tests, head="w {}"),
     ]
     table = Table("images", "Image observations", columns, note, shown=rows)
-    about = "Observed minus computed; w is the residual over its standard deviation, a priori unit weight."
-    return Section("images", "Image observations", [table] if len(rows) else [], about)
+    return Section("images", "Image observations", [table] if len(rows) else [], about("images"))
 
 
-def chosen_rows(count: int, named: Iterable[int], orders: Sequence[Indices]) -> tuple[Indices, bool]:
-    """Return which of many have a row, and whether these are all.
+def _chosen_rows(
+    kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices]
+) -> tuple[Indices, str]:
+    """Return which photos or points have a row, and the note on those without one.
 
     Those that other tables name come first, then by turns the worst in each order.
     """
-    if count <= ALL:
-        return np.arange(count), True
-    rows = dict.fromkeys(named)
-    share = max(SOME // max(len(orders), 1), 1)
+    if len(every) <= ALL:
+        return every, ""
+    rows = dict.fromkeys(others)
     for order in orders:
-        rows |= dict.fromkeys(order[:share].tolist())
-    return np.sort(np.array(list(rows), dtype=np.int64)), False
+        rows |= dict.fromkeys(order[: max(SOME // len(orders), 1)].tolist())
+    shown = np.intersect1d(every, np.array(list(rows), dtype=np.int64))
+    return shown, about(f"{kind}.chosen", n=len(shown), all=len(every))
 
 
-def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
-    """Return photos, those `named` elsewhere first: their unknowns, and how their images fit, in layers."""
+def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
+    """Return photos, those of `others` first: their unknowns, and how their images fit, in layers."""
     terms, fit = result._terms(), _fit_of_photos(result, result._terms())
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
-    rows, every = chosen_rows(len(terms.photos), named, orders)
-    some = (
-        f"{len(rows)} of {len(terms.photos)}: those that other tables name, the largest"
-        " residuals and test values, and the weakest. The table of photos has all."
-    )
-    note = "" if every else some
-    names, *_, values, sd = photos(result)
+    rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders)
+    own, *_, values, sd = photos(result)
     tables = []
     for caption, of in terms.layers.items():
-        columns = [names, part(values, of), part(sd, of)]
+        columns = [own, part(values, of), part(sd, of)]
         columns += plan_deviations(terms, result.photo_sd) if of.start == 0 else []
         by = result.photo_sd[:, of] if terms.split else None
         tables.append(Table(f"photos-{caption.lower()}", caption, columns, note, "", by, rows))
-        names = replace(names, link=None)  # a name leads to one row only
+        own = replace(own, link=None)  # a name leads to one row only
     x, y = terms.image_axes
     columns = [
-        names,
+        own,
         Quantity(fit[:, 5].astype(int), head="Images"),
         Quantity(fit[:, :2], (x, y), "deviation", head="rms {}", decimals=2),
         Quantity(fit[:, 2], head="Mean redundancy", decimals=3),
@@ -387,70 +323,17 @@ def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
     return found
 
 
-def points_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
-    """Return points with their standard deviations, those `named` by other tables first."""
+def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
+    """Return points with their standard deviations, those of `others` first."""
     terms, used = result._terms(), np.flatnonzero(result.used_points)
-    # What makes lengths of angles, near enough to sort by.
+    if not len(used):
+        return Section("points", "Points", [])
+    # Metres of a radian are near enough to sort by.
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
-    if len(used) <= ALL:
-        rows, every = used, True
-    else:
-        rows, every = chosen_rows(len(terms.points), named, [order])
-        rows = rows[result.used_points[rows]]
-    if not len(rows):
-        return Section("points", "Points", [])
-    some = (
-        f"{len(rows)} of {len(used)}: those that other tables name, those of the largest sd, and the weakest."
-        " The table of points has all."
-    )
+    rows, note = _chosen_rows("points", used, others, [order])
     by = result.point_sd[used] if terms.split else None
     columns = [*points(result), *plan_deviations(terms, result.point_sd[used])]
-    shown = np.searchsorted(used, rows)
-    return Section(
-        "points", "Points", [Table("points", "Points", columns, "" if every else some, "", by, shown)], intro
-    )
-
-
-def weakest_tables(
-    result: AdjustedNetwork, points: Sequence[WeakestPoint], photos: Sequence[WeakestPhoto]
-) -> tuple[Table, Table]:
-    """Return the points and photos with the weakest determination; without rows if there are no cofactors."""
-    called = int if result._terms().identity == "number" else str
-    of_points, of_photos = ([each.row for each in things] for things in (points, photos))
-    ratio = (
-        "The ratio of the standard deviations is in any directions: above 10,000 rays are nearly parallel."
-        " The distance is that from the nearest station, in the median of such distances: a point below 0.001"
-        " is at the station itself."
-    )
-    condition = "Condition of the covariance matrix of position and attitude, scaled to a diagonal of ones."
-    return (
-        Table(
-            "weakest-points",
-            "Weakest points",
-            [
-                linked("point", [called(each.point) for each in points], of_points),
-                of_each(points, "ratio", head="Largest over smallest sd", figures=4),
-                of_each(points, "distance", head="Distance", figures=4),
-                of_each(points, "rays", head="Rays", decimals=0),
-            ],
-            ratio,
-        ),
-        Table(
-            "weakest-photos",
-            "Weakest photos",
-            [
-                linked("photo", [called(each.photo) for each in photos], of_photos),
-                of_each(photos, "condition", head="Condition", figures=4),
-                of_each(photos, "images", head="Images", decimals=0),
-            ],
-            condition,
-        ),
-    )
-
-
-def linked(kind: str, names: Sequence[str | int], rows: ArrayLike) -> Quantity:
-    """Return names of photos or points that lead to their rows."""
-    link = Link(kind, np.array(rows, dtype=np.int64))
-    return Quantity(names, kind="name", name=kind, member=kind, head=kind.capitalize(), link=link)
+    table = Table("points", "Points", columns, note, "", by, np.searchsorted(used, rows))
+    return Section("points", "Points", [table], intro)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.results.axes import Terms
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork, Observed
-from photogram.show.quantity import Axis, Link, Quantity
+from photogram.show.quantity import Axis, Link, Quantity, column
 
 _FREE = {np.inf: "free", 0.0: "fixed"}
 
@@ -57,7 +58,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
     return [
         names(terms, "point", used, terms.identity, here=True),
         *terms.of_points,
-        Quantity(rays, name="rays", member="rays", head="Rays", decimals=0),
+        column("rays", rays, "Rays", decimals=0),
         Quantity(places, terms.point_axes, "value", name="", member="position", head="{}", figures=7),
         deviation(sd, terms.point_axes, member=""),
     ]
@@ -84,11 +85,6 @@ def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
         return []
     axes = tuple(Axis.of(name, terms.linear_unit) for name in ("east", "north"))
     return [Quantity(sd[:, :2] * terms.lengths[:2], axes, "deviation", head="sd {}", decimals=4)]
-
-
-def iterations(result: AdjustedNetwork) -> list[Quantity]:
-    """Return the history, first the start."""
-    return iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
 
 
 def control(result: AdjustedNetwork) -> list[Quantity]:
@@ -135,31 +131,26 @@ def _observed(
     ]
 
 
-def difference(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return adjusted minus given values."""
-    about, head = "adjusted minus given: {}", "Adjusted - given"
-    own = {"name": "d", "member": "difference", "about": about, "head": head}
-    return Quantity(values, axes, "difference", **(own | more))
-
-
-def deviation(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return standard deviations."""
-    own = {"name": "sd", "member": "sd", "about": "standard deviation: {}", "head": "sd {}"}
-    return Quantity(values, axes, "deviation", **(own | more))
-
-
-def redundancy(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return redundancy numbers."""
-    own: dict[str, Any] = dict.fromkeys(("name", "member"), "redundancy")
-    about = "redundancy number: {}"
-    return Quantity(values, axes, **own, about=about, head="Redundancy", decimals=3, **more)
-
-
-def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    """Return residuals over their standard deviations, a priori unit weight."""
-    own: dict[str, Any] = dict.fromkeys(("name", "member"), "standardized")
-    about = "residual over its standard deviation, a priori unit weight: {}"
-    return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)
+# Columns of values and axes: adjusted minus given, standard deviations, redundancy numbers, w.
+_MINUS = "adjusted minus given: {}"
+_TEST = "residual over its standard deviation, a priori unit weight: {}"
+difference = partial(
+    Quantity, kind="difference", name="d", member="difference", about=_MINUS, head="Adjusted - given"
+)
+deviation = partial(
+    Quantity, kind="deviation", name="sd", member="sd", about="standard deviation: {}", head="sd {}"
+)
+redundancy = partial(
+    Quantity,
+    name="redundancy",
+    member="redundancy",
+    about="redundancy number: {}",
+    head="Redundancy",
+    decimals=3,
+)
+test_value = partial(
+    Quantity, name="standardized", member="standardized", about=_TEST, head="Test value w", decimals=2
+)
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:

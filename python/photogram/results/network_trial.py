@@ -116,7 +116,6 @@ class NetworkTrial:
         return min(float(np.linalg.norm(product, 2)), 1.0) if product.size else 0.0
 
     def tests(self) -> Tests:
-        """Test all groups."""
         found = self._tests = self.core.tests()
         inside = ~np.isnan(found["residual"])
         return Tests(
@@ -154,7 +153,12 @@ class NetworkTrial:
         for group, point in zip(groups, points, strict=True):
             own: tuple[list[int], Floats, Floats] = next(on_points) if point >= 0 else ([], None, None)  # type: ignore[assignment]
             if own[0]:
-                found.append(self._without_out(*own))
+                of_point, values, response = own
+                rows = np.concatenate([self.suspects.rows(each) for each in of_point])
+                out = np.isnan(self._tests["residual"][rows])
+                response[out] = 0.0
+                response[:, out] = 0.0
+                found.append((of_point, np.where(out, 0.0, values), response))
             else:
                 residuals = np.nan_to_num(self._tests["residual"][self.suspects.rows(group)])
                 found.append(([group], residuals, self.own_block(group)))
@@ -167,15 +171,6 @@ class NetworkTrial:
         them.
         """
         return self.core.on_points(list(points), gone=True)
-
-    def _without_out(
-        self, groups: list[int], residuals: Floats, response: Floats
-    ) -> tuple[list[int], Floats, Floats]:
-        rows = np.concatenate([self.suspects.rows(group) for group in groups])
-        out = np.isnan(self._tests["residual"][rows])
-        response[out] = 0.0
-        response[:, out] = 0.0
-        return groups, np.where(out, 0.0, residuals), response
 
     def own_block(self, group: int) -> Floats:
         """Return R of a group."""
@@ -272,7 +267,6 @@ class NamedSuspects(Suspects):
         self._units = {IMAGE: images, CONTROL: lengths, POSITION: lengths, ATTITUDE: angles}
 
     def photos_of_point(self, point: int) -> Indices:
-        """Return the photos of the images of a point."""
         groups = self.on_point(point)
         return np.asarray(self.photos[groups[self.kinds[groups] == IMAGE]])
 
@@ -288,11 +282,9 @@ class NamedSuspects(Suspects):
         return self.other_loads(kind, subject)
 
     def photo_name(self, photo: int) -> Phrase:
-        """Return the name of a photo."""
         return Phrase("named.photo", {"photo": str(self.given.photo_ids[photo])})
 
     def name(self, group: int) -> Phrase:
-        """Return the name of a group."""
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
         points, photos = self.given.point_ids, self.given.photo_ids
         if kind == IMAGE:
@@ -305,11 +297,9 @@ class NamedSuspects(Suspects):
         return self.other_name(kind, subject)
 
     def row_name(self, row: int) -> str:
-        """Return what a row is."""
         return self._row(row)[0]
 
     def unit(self, row: int) -> str:
-        """Return the unit of a row."""
         return self._row(row)[1]
 
     def _row(self, row: int) -> tuple[str, str]:
@@ -321,16 +311,13 @@ class NamedSuspects(Suspects):
         return self.other_row(kind, int(self.subjects[group]), component)
 
     @abstractmethod
-    def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photos of what is neither an image, nor control, nor of a station."""
+    def other_loads(self, kind: int, subject: int) -> Indices: ...
 
     @abstractmethod
-    def other_name(self, kind: int, subject: int) -> Phrase:
-        """Return what that is called."""
+    def other_name(self, kind: int, subject: int) -> Phrase: ...
 
     @abstractmethod
-    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
-        """Return what one of its components is called, and its unit."""
+    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]: ...
 
 
 ANGLES = ("omega", "phi", "kappa")
@@ -344,7 +331,6 @@ LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a pa
 
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
-    """Return a block as tests ask it."""
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     # What others are on as well does not need the images of one photo.
     shared = {each.photo for each in block.timed if each.trajectory is not None}
@@ -394,7 +380,6 @@ class BlockSuspects(NamedSuspects):
 
     @cached_property
     def photo_row(self) -> dict[str, int]:
-        """The row of each photo, likewise."""
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
@@ -424,7 +409,6 @@ class BlockSuspects(NamedSuspects):
         return np.unique(np.concatenate([own, *seen]))
 
     def _flown(self, trajectory: Trajectory) -> Indices:
-        """Return the photos on a trajectory."""
         return self._on_trajectories.get(id(trajectory), np.zeros(0, dtype=np.int64))
 
     @cached_property
@@ -440,7 +424,6 @@ class BlockSuspects(NamedSuspects):
         return {id(one): each for each in every for all_ in each.coefficients for one in all_}
 
     def other_name(self, kind: int, subject: int) -> Phrase:
-        """Return the name of an observation that is no image, of a camera or of a common unknown."""
         if kind == OBSERVATION:
             observation = self.observations[subject]
             return named_observation(observation.KIND, " - ".join(observation.of))

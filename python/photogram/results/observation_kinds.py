@@ -16,8 +16,6 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["ObservedKind", "observed_kinds"]
-
 
 @dataclass(frozen=True, eq=False)
 class ObservedKind:

@@ -114,11 +114,15 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
         count = min(TOGETHER, draws - len(drawn))
         errors = np.where(used[:, np.newaxis], random.normal(size=(count, *block.image_xy.shape)), 0.0)
         drawn += [values(each) for each in core.project_images(errors, threads=0, progress=None)]
-    return [
-        _judged(pattern, float(value), by_chance)
-        for pattern, value, by_chance in zip(patterns, found, np.array(drawn).T, strict=True)
-        if math.isfinite(value)
-    ]
+    tested = []
+    for pattern, value, by_chance in zip(patterns, found.tolist(), np.array(drawn).T, strict=True):
+        if math.isfinite(value):
+            strong = int((by_chance <= value if pattern.least else by_chance >= value).sum())
+            sd = float(by_chance.std(ddof=1)) if draws > 1 else math.nan
+            p = (1 + strong) / (1 + draws)
+            mean = float(by_chance.mean())
+            tested.append(DrawnPattern(pattern.name, pattern.statistic, value, mean, sd, p, draws))
+    return tested
 
 
 def _clipped(residuals: Floats, redundancy: Floats) -> Floats:
@@ -128,19 +132,6 @@ def _clipped(residuals: Floats, redundancy: Floats) -> Floats:
         w = np.where(root > 0, residuals / root, math.nan)
     factor = float(np.nanmedian(np.abs(w))) / MEDIAN
     return np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * root
-
-
-def _judged(pattern: _Pattern, value: float, by_chance: Floats) -> DrawnPattern:
-    as_strong = by_chance <= value if pattern.least else by_chance >= value
-    return DrawnPattern(
-        name=pattern.name,
-        statistic=pattern.statistic,
-        value=value,
-        expected=float(by_chance.mean()),
-        sd=float(by_chance.std(ddof=1)) if len(by_chance) > 1 else math.nan,
-        probability=(1 + int(as_strong.sum())) / (1 + len(by_chance)),
-        draws=len(by_chance),
-    )
 
 
 def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:

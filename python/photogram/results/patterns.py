@@ -32,8 +32,6 @@ KURTOSIS = (-0.7, 1.0)  # Limits of excess kurtosis without a message
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    """The images of one camera."""
-
     name: str  # Of the camera
     photos: Bools  # (P,) which photos have it
     estimated: int  # How many of its parameters are estimated
@@ -75,7 +73,15 @@ def patterns(
     found.append(_of_photos(image_photos[used], given.photo_ids, measured[used], residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:
-        found += [*_of_stations(result, axes), _of_heights(result)]
+        # Observed positions that have a weight may drift along the order of the photos.
+        w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
+        w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
+        design = np.vander(np.linspace(-1.0, 1.0, len(w)), 3, increasing=True)
+        found += [
+            _regressed("drift", regression(w[:, k], design), axis=Phrase(f"axis.{name}"))
+            for k, name in enumerate(axes)
+        ]
+        found.append(_of_heights(result))
     return [each for each in found if each is not None]
 
 
@@ -155,16 +161,6 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
         else max(found.probability, LEVEL_OF_PATTERNS),
         level=LEVEL_OF_PATTERNS,
     )
-
-
-def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systematic | None]:
-    """Test whether observed positions that have a weight drift along the order of the photos."""
-    w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
-    w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
-    order = np.linspace(-1.0, 1.0, len(w))
-    design = np.column_stack([np.ones(len(w)), order, order**2])
-    axes = [Phrase(f"axis.{name}") for name in names]
-    return [_regressed("drift", regression(w[:, k], design), axis=axis) for k, axis in enumerate(axes)]
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:

@@ -1,4 +1,4 @@
-"""What pictures draw of an adjusted block."""
+"""The data of the pictures of an adjusted block, and pictures of its cameras."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.motion import scanners
 from photogram.network.rays import LocalAxes, local_axes
+from photogram.plots.distortion import side_by_side
 from photogram.plots.picture_data import (
     Correlated,
     Curve,
@@ -24,14 +26,18 @@ from photogram.plots.picture_data import (
     VectorField,
 )
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import DistortionCurve, distortion_curve
+from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
 from photogram.results.ellipses import metric_covariances
 from photogram.results.features import Features, directions
 from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.tests import Tests
+from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import BLUE, INK, round_length
 from photogram.statistics.findings import Tested
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -49,7 +55,6 @@ class PicturedNetwork(Pictured):
 
     @cached_property
     def images(self) -> Images:
-        """The image observations that took part."""
         result, given, used = self.result, self.result.given, self.result.used_images
         cameras, names, down = self.cameras
         return Images(
@@ -86,7 +91,6 @@ class PicturedNetwork(Pictured):
 
     @property
     def unit_weight(self) -> float:
-        """The root of the variance of unit weight."""
         return float(np.sqrt(self.result.covariance_scale))
 
 
@@ -100,12 +104,10 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def title(self) -> str:
-        """The title of the block."""
         return self.result.block.title
 
     @cached_property
     def plan(self) -> Plan:
-        """The network."""
         result, block = self.result, self.result.block
         # Differences as lengths: those of angles are too small to be taken of positions.
         lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
@@ -129,18 +131,15 @@ class PicturedBlock(PicturedNetwork):
         return local_axes(self.result.block)
 
     def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) covariances of points along the axes of the plan."""
         return np.asarray(metric_covariances(self.result)[points])
 
     @cached_property
     def footprints(self) -> Floats:
-        """(P, v, 3) outlines of photos on level ground."""
         found = footprints(self.result).positions()
         return self._metric(found.reshape(-1, 3)).reshape(found.shape)
 
     @property
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
-        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
         block = self.result.block
         _, cameras = block.core_cameras()
         names = block.camera_names
@@ -156,12 +155,10 @@ class PicturedBlock(PicturedNetwork):
 
     @cached_property
     def scanned(self) -> Bools:
-        """(P,) which photos are strips of a scanner."""
         return scanners(self.result.block)
 
     @property
     def correlations(self) -> list[Correlated]:
-        """Cameras with two or more estimated parameters."""
         found = []
         for each in self.result.cameras:
             rows = each.estimated
@@ -172,13 +169,11 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def distortion(self) -> list[Curves]:
-        """Cameras with radial distortion."""
         curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
 
     @property
     def deviations(self) -> list[Deviations]:
-        """Features with deviations of points."""
         found = self.result.features or Features(())
         return [
             Deviations(
@@ -195,7 +190,6 @@ class PicturedBlock(PicturedNetwork):
 
     @property
     def films(self) -> list[VectorField]:
-        """Mean residuals of the marks of cameras, and patterns of films."""
         if not self.result.films:
             return []
         return [*mean_mark_residuals(self.result), *film_patterns(self.result)]
@@ -224,3 +218,58 @@ def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
             Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
         ],
     )
+
+
+def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:
+    """Plot a camera's distortion: the curve, its balanced form, and the standard deviations of both.
+
+    Parameters
+    ----------
+    result, camera
+        An adjusted block, and one of its cameras.
+
+    Raises
+    ------
+    InputError
+        The camera has no radial terms, or no images.
+    """
+    curve = distortion_curve(result, camera)
+    if curve is None:
+        raise InputError(phrase("plot.distortion"))
+    return Plot(6.4, 7.5, side_by_side([curves_of(camera, curve)]), shared=True)
+
+
+def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
+    """Plot the displacements by all lens terms except the radial ones, with their standard ellipses.
+
+    Parameters
+    ----------
+    result, camera
+        An adjusted block, and one of its cameras.
+
+    Raises
+    ------
+    InputError
+        The camera has no such terms, or no images.
+    """
+    field = lens_field(result, camera)
+    if field is None:
+        raise InputError(phrase("plot.lens-field", camera=camera.name))
+    unit = str(camera.camera.unit)
+    factor, written = (1000.0, "µm") if unit == "mm" else (1.0, "px")
+    longest = float(np.hypot(*field.vectors.T).max())
+    spacing = float(np.ptp(field.positions[:, 0])) / 8
+    scale = round_length(longest) / spacing if longest > 0 else 1.0
+    ends = field.positions + field.vectors / scale
+    semi_axes, angles = ellipse_axes(field.covariances / scale**2)
+    marks = [
+        Ellipses(ends, semi_axes, angles, BLUE, 0.0, 0.4, layer=1.0),
+        Arrows(field.positions, field.vectors / scale, INK, 0.003),
+    ]
+    reach = float(semi_axes.max(initial=0.0))
+    limits = around(np.vstack([field.positions, ends - reach, ends + reach]), 0.05)
+    title = (
+        f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
+        f" {factor * scale * spacing:.3g} {written}"
+    )
+    return Plot(7.0, 6.0, [Panel(limits, marks, title, f"x, {unit}", f"y, {unit}", equal=True)])

@@ -27,15 +27,13 @@ from photogram.results.covariance import Covariances, Selection
 from photogram.results.network_trial import NetworkTrial
 from photogram.show.cells import written
 from photogram.show.forms import table_text
-from photogram.show.quantity import Quantity, Table, members, records
+from photogram.show.quantity import Table, column, members, records
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
 SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
 SEARCHED = 100  # Number of examined observations: those of the largest norm
@@ -84,10 +82,14 @@ class Reliability:
         *,
         level: float,  # alpha0 and beta0 of the test of one observation or group
         power: float,
-        known: bool,  # whether the unit weight is known; otherwise lambda0 is that of the F test
+        unit_weight: str,  # `known`, or `unknown`: lambda0 is then that of the F test
     ) -> None:
-        self.trial, self._covariances = trial, covariances
-        self.level, self.power, self.known = level, power, known
+        one_of("unit_weight", unit_weight, ("known", "unknown"))
+        self.level, self.power = (
+            probability("level", number("level", level)),
+            probability("power", number("power", power)),
+        )
+        self.trial, self._covariances, self.known = trial, covariances, unit_weight == "known"
         self.standing: Standing = trial.stand()
         self.tests: Tests = trial.tests()
         self.suspects: Suspects = trial.suspects
@@ -238,19 +240,15 @@ class Reliability:
 
     def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
         """Return pairs of observations on one point that cannot be told apart: images, and its control."""
-        return self.inseparable_on(np.unique(self.suspects.points[self.suspects.points >= 0]).tolist(), limit)
-
-    def inseparable_on(self, points: list[int], limit: float = 0.9) -> list[Inseparable]:
-        """Return the same of some points by their numbers."""
-        return [self.named(pair) for pair in self.pairs_on(points, limit)]
+        points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
+        return [self.named(*pair) for pair in self.pairs_on(points, limit)]
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return the same by the numbers of the groups, with their correlation: networks have thousands."""
-        return self.trial.core.inseparable(points, limit)
+        """Return the same of some points by the numbers of the groups, with their correlation.
 
-    def named(self, pair: tuple[int, int, float]) -> Inseparable:
-        """Return a pair of :meth:`pairs_on` with its names."""
-        return self._pair(*pair)
+        Networks have thousands.
+        """
+        return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
         """Return all other groups whose tests are correlated with that of a group, the most first.
@@ -272,7 +270,7 @@ class Reliability:
             if other != group and (np.abs(columns[:, rows]) > 0).any():
                 rho = self.trial.correlation(group, other, columns[:, rows])
                 if rho > limit:
-                    found.append(self._pair(group, other, rho))
+                    found.append(self.named(group, other, rho))
         return sorted(found, key=lambda pair: -pair.correlation)
 
     @cached_property
@@ -280,13 +278,13 @@ class Reliability:
         """Smallest error of a lone row that is found; kept, as networks have pairs by the thousand."""
         return math.sqrt(self.lambda0(1))
 
-    def _pair(self, first: int, second: int, rho: float) -> Inseparable:
+    def named(self, first: int, second: int, rho: float) -> Inseparable:
+        """Return a pair of :meth:`pairs_on` with its names."""
         factor = math.inf if rho > 1 - 1e-9 else SEPARATED / self._delta * math.sqrt(2 / (1 - rho))
         name = self.suspects.name
         return Inseparable(str(name(first)), str(name(second)), (first, second), rho, max(factor, 1.0))
 
     def row_groups(self) -> Indices:
-        """Return (M,) the group of each row."""
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
     def observations(self) -> Table:
@@ -294,9 +292,6 @@ class Reliability:
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
         names = np.array([str(suspects.name(group)) for group in range(len(suspects))], dtype=object)
-
-        def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
-            return Quantity(values, name=name, member=name, head=head, **more)
 
         columns = [
             column("kind", [suspects.kind(int(group)) for group in groups], "Kind", kind="name"),
@@ -344,22 +339,6 @@ class Reliability:
             "unit_weight": "known" if self.known else "unknown",
             "observations": records(self.observations().columns),
         }
-
-
-def reliability_of(
-    trial: NetworkTrial,
-    covariances: Callable[[], Covariances],
-    *,
-    level: float,
-    power: float,
-    unit_weight: str,
-) -> Reliability:
-    """Return the reliability of a network that is adjusted, with checked options."""
-    one_of("unit_weight", unit_weight, ("known", "unknown"))
-    for name, value in (("level", level), ("power", power)):
-        probability(name, number(name, value))
-    known = unit_weight == "known"
-    return Reliability(trial, covariances, level=level, power=power, known=known)
 
 
 def _shown(redundancy: Floats) -> Floats:

@@ -7,6 +7,7 @@ and selected inverse at the adjusted values.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.hypotheses import Hypotheses
 from photogram.results.reliability import Inseparable, Reliability
-from photogram.show.page import Part, Remarks
-from photogram.show.quantity import Quantities, Quantity, Table, members, records
+from photogram.show.page import Part, Remarks, about
+from photogram.show.quantity import Quantities, Quantity, Table, column, members, records
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests
 
@@ -57,22 +58,16 @@ class ReliabilitySummary:
         return self.tests.testable(self.suspects.row_starts)
 
     def kinds_table(self) -> Table:
-        """Return the declared table of the kinds of observations."""
-        note = (
-            "No other observation checks the unchecked groups. An error of a one-sided group shows in no"
-            " residual if it has some direction."
-        )
+        note = about("reliability-kinds")
         return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
 
     def weakest_table(self, unit: str = "") -> Table:
         """Return the declared table of the weakest observations; `unit` is that of the object space."""
         *columns, own_point = self.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
-        about = (
-            f"Tests of the level {self.level:g} find the detectable errors in {100 * self.power:.0f} of 100"
-            f" cases, unit weight {'known' if self.known else 'estimated'}. They are the largest."
-        )
-        return Table("reliability-weakest", "Largest undetected errors", columns, about)
+        weight = "known" if self.known else "estimated"
+        note = about("reliability-weakest", level=self.level, percent=100 * self.power, weight=weight)
+        return Table("reliability-weakest", "Largest undetected errors", columns, note)
 
     def table(self) -> pd.DataFrame:
         """Return the weakest observations as a data frame."""
@@ -93,7 +88,6 @@ class ReliabilitySummary:
         return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences)]
 
     def document(self) -> dict[str, Any]:
-        """Return the member `reliability` of JSON documents."""
         return {
             **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",
@@ -106,9 +100,7 @@ class ReliabilitySummary:
         }
 
 
-def reliability_summary(
-    found: Reliability, hypotheses: Hypotheses, *, heights: bool
-) -> ReliabilitySummary:
+def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: bool) -> ReliabilitySummary:
     """Return what a report says of the reliability of a network.
 
     Parameters
@@ -133,7 +125,7 @@ def reliability_summary(
         kinds=_kinds(found),
         weakest=_weakest(found, heights=heights),
         two_rays=two,
-        pairs=tuple(map(found.named, pairs[:PAIRS])),
+        pairs=tuple(found.named(*pair) for pair in pairs[:PAIRS]),
         pairs_found=len(pairs),
         points_looked_into=len(points),
         suspects=suspects,
@@ -143,26 +135,21 @@ def reliability_summary(
 
 
 def _kinds(found: Reliability) -> list[Quantity]:
-    suspects, tests, redundancy = found.suspects, found.tests, found.redundancy
-    of_rows = np.repeat(suspects.kinds, np.diff(suspects.row_starts))
-    rows = []
-    for kind, name in enumerate(suspects.kind_names):
-        active = tests.active & (suspects.kinds == kind)
-        tested = (of_rows == kind) & ~np.isnan(redundancy)
-        if active.any():
-            untestable = active & found.untestable
-            invisible = active & found.invisible & ~untestable
-            numbers = [np.count_nonzero(each) for each in (active, tested, untestable, invisible)]
-            rows.append((name, *numbers, float(redundancy[tested].sum())))
-    names, *counts, sums = zip(*rows, strict=True) if rows else ((),) * 6
-    groups, components, unchecked, one_sided = map(np.array, counts)
-    mean = np.array(sums) / np.maximum(components, 1)
+    suspects, active, redundancy = found.suspects, found.tests.active, found.redundancy
+    of_rows, known = np.repeat(suspects.kinds, np.diff(suspects.row_starts)), ~np.isnan(redundancy)
+    untestable, count = active & found.untestable, partial(np.bincount, minlength=len(suspects.kind_names))
+    invisible = active & found.invisible & ~untestable
+    there = np.flatnonzero(count(suspects.kinds[active]))
+    components, sums = (count(of_rows[known], own)[there] for own in (None, redundancy[known]))
+    groups, unchecked, one_sided = (
+        count(suspects.kinds[own])[there] for own in (active, untestable, invisible)
+    )
     return [
-        Quantity(names, kind="name", member="kind", head="Kind"),
+        Quantity([suspects.kind_names[k] for k in there.tolist()], kind="name", member="kind", head="Kind"),
         Quantity(groups, member="groups", head="Groups", decimals=0),
         Quantity(components, member="components", head="Components", decimals=0),
         Quantity(sums, member="redundancy", head="Redundancy", decimals=3),
-        Quantity(mean, head="Mean", decimals=3),
+        Quantity(sums / np.maximum(components, 1), head="Mean", decimals=3),
         Quantity(unchecked, member="unchecked", head="Unchecked", decimals=0),
         Quantity(one_sided, member="one_sided", head="One-sided", decimals=0),
     ]
@@ -180,22 +167,14 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
             least = np.partition(external[own], -LISTED)[-LISTED]
             own = own[external[own] >= least]
         groups += own[np.argsort(-external[own], kind="stable")[:LISTED]].tolist()
-    names = [[suspects.kind(group) for group in groups], [str(suspects.name(group)) for group in groups]]
-    least, moved = tests.least[groups], found.own_points(groups, heights=heights)
+    own_points = np.array(found.own_points(groups, heights=heights))
     return [
-        *(
-            Quantity(texts, kind="name", name=name, member=name, head=head)
-            for texts, name, head in zip(names, ("kind", "name"), ("", "Group"), strict=True)
-        ),
-        *(
-            Quantity(values, name=name, member=name, head=head, decimals=decimals)
-            for values, name, head, decimals in (
-                (least, "redundancy", "Least redundancy", 3),
-                (detectable[groups], "detectable_sd", "Detectable error, sd", 2),
-                (external[groups], "external_sd", "Moves up to, sd", 2),
-                (np.array(moved), "own_point", "Own point", 4),
-            )
-        ),
+        column("kind", [suspects.kind(group) for group in groups], kind="name"),
+        column("name", [str(suspects.name(group)) for group in groups], "Group", kind="name"),
+        column("redundancy", tests.least[groups], "Least redundancy", decimals=3),
+        column("detectable_sd", detectable[groups], "Detectable error, sd", decimals=2),
+        column("external_sd", external[groups], "Moves up to, sd", decimals=2),
+        column("own_point", own_points, "Own point", decimals=4),
     ]
 
 

@@ -54,8 +54,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
-__all__ = ["Result"]
-
 NOT_PHOTOGRAPHED = "not photographed"
 REJECTED = "all its image observations are rejected"
 """Reasons why a point without image observations is left out: it never had any, or none was used."""
@@ -357,21 +355,16 @@ class Result(OnFilm, AdjustedNetwork):
 
         Longitudes and attitudes differ by half a turn at the most.
         """
-        residuals = self._photo_observed - np.hstack([self.photo_positions, self.photo_attitudes])
+        block = self.block
+        positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
+        observed = [
+            block.photo_positions if positions is None else positions,
+            block.photo_attitudes if attitudes is None else attitudes,
+        ]
+        residuals = np.hstack(observed) - np.hstack([self.photo_positions, self.photo_attitudes])
         turning = [0, 3, 4, 5] if self.block.geographic else [3, 4, 5]
         residuals[:, turning] = _least_turns(residuals[:, turning])
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
-
-    @property
-    def _photo_observed(self) -> Floats:
-        block = self.block
-        positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
-        return np.hstack(
-            [
-                block.photo_positions if positions is None else positions,
-                block.photo_attitudes if attitudes is None else attitudes,
-            ]
-        )
 
     @property
     def photo_rotation_covariances(self) -> Floats:

@@ -143,8 +143,6 @@ def image_parts(given: str, unit: str) -> list[Part]:
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """A folder that was read."""
-
     folder: Path  # Where it is
     summary: Mapping[str, Any]  # The document
     decoder: Decoder  # For what it keeps
@@ -237,7 +235,14 @@ def written(
     first, and `stands` what is written for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
-    about = _about(result, frame)
+    place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}
+    about = {
+        "photogram.version": _photocore.__version__,
+        "photogram.format": str(FORMAT),
+        "photogram.frame": json.dumps(place),
+        "photogram.variance_of_unit_weight": repr(result.variance_of_unit_weight),
+        "photogram.scaled": "covariance",
+    }
     sheets: dict[str, Sequence[Column]] = {
         table: [*leading[table], *(column for each in own for column in each.columns(result))]
         for table, own in parts.items()
@@ -287,17 +292,6 @@ def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Pa
         texts = isinstance(values, list)
         digest.update(orjson.dumps(values) if texts else np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()
-
-
-def _about(result: AdjustedNetwork, frame: Frame) -> dict[str, str]:
-    place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}
-    return {
-        "photogram.version": _photocore.__version__,
-        "photogram.format": str(FORMAT),
-        "photogram.frame": json.dumps(place),
-        "photogram.variance_of_unit_weight": repr(result.variance_of_unit_weight),
-        "photogram.scaled": "covariance",
-    }
 
 
 def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any]) -> Saved:

@@ -9,17 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from photogram.io.parquet import Sheet
 from photogram.network.block import Block
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import CLASSES, VALUE_CLASSES, parts_of_block
 from photogram.results.result import Result
-from photogram.results.result_files import (
-    read_saved,
-    rows_of,
-)
+from photogram.results.result_files import read_saved, rows_of
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
@@ -37,12 +33,14 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
         )
         given[f"{kind}_ids"] = names[kind]
         given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
+    columns = saved.sheets["photos"].columns
+    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
     parts = parts_of_block(
         geographic=given["spheroid"] is not None,
         unit=given["linear_unit"],
         image_unit=str(document["image_unit"]),
-        distances="principal_distance" in saved.sheets["photos"].columns,
-        observed=_observed(saved.sheets["photos"]),
+        distances="principal_distance" in columns,
+        observed=[name for name, own in first.items() if any(each in columns for each in own)],
     )
     own_arrays, block_arrays = saved.arrays(parts, "block")
     block = Block(**given, **block_arrays)
@@ -52,11 +50,6 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
         pairs = zip(members["unknowns"], block.unknowns, strict=True)
         members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
     return Result(**members, **own_arrays, block=block, state=saved.state())
-
-
-def _observed(photos: Sheet) -> list[str]:
-    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
-    return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
 
 
 def _below(base: type) -> Iterator[type]:

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["Snooped", "log_table", "recorded"]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Snooped(Brief, Documented):
@@ -220,7 +218,6 @@ def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def log_table(log: Sequence[Removal]) -> Table:
-    """Return the declared table of removed observations, in order."""
     log_p = np.array([each.log_probability for each in log], dtype=float)
     after = [each.prediction_log_probability for each in log]
     rivals = [
@@ -263,7 +260,6 @@ def log_table(log: Sequence[Removal]) -> Table:
 
 
 def _tests_table(log: Sequence[Removal]) -> Table:
-    """Return the tests of removed observations, also against the rest of the network."""
     nothing = math.nan
     after = [(each.prediction, each.prediction_log_probability) for each in log]
     columns = [

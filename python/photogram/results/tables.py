@@ -25,7 +25,7 @@ from photogram.results.network_tables import (
 )
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity, attribute, component, joined, long
+from photogram.show.quantity import Axis, Quantity, attribute, column, component, joined, long
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
@@ -41,9 +41,7 @@ def check_points(result: Result) -> list[Quantity]:
     return [
         *_compared(result, checks.rows, checks.differences, checks.given_sd),
         attribute(checks, "assumed", about="whether standard deviations of control are assumed"),
-        Quantity(
-            statistic, name="statistic", member="statistic", about="T, or F if the unit weight is estimated"
-        ),
+        column("statistic", statistic, about="T, or F if the unit weight is estimated"),
         Quantity(p, name="probability", member="p", about="of a larger statistic without errors"),
     ]
 
@@ -78,17 +76,16 @@ def observations(kind: ObservedKind) -> list[Quantity]:
     axes = tuple(map(component_axis, kind.components, kind.units))
     kinds, names = (np.array(texts, dtype=object) for texts in ([kind.kind] * len(kind.names), kind.names))
     return [
-        Quantity(kinds, kind="name", name="kind", member="kind", about="what it is"),
+        column("kind", kinds, kind="name", about="what it is"),
         Quantity(names, kind="name", name="of", about="names of points and photos", head="Of"),
         deviation(kind.sd, axes, head="sd given"),
-        Quantity(
+        column(
+            "residual",
             kind.residuals,
-            axes,
-            "deviation",
-            "residual",
-            "residual",
-            "observed minus adjusted",
-            head="Residual",
+            "Residual",
+            axes=axes,
+            kind="deviation",
+            about="observed minus adjusted",
         ),
         redundancy(kind.redundancy, axes),
         test_value(kind.standardized, axes),

@@ -29,16 +29,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
-    from photogram.show.quantity import Quantity
-
-__all__ = [
-    "AdjustedTrajectory",
-    "TrajectoryPoses",
-    "adjusted_trajectories",
-    "corrections",
-    "project",
-    "restarted_motion",
-]
+    from photogram.show.quantity import Table
 
 Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by name
 
@@ -86,7 +77,6 @@ class AdjustedTrajectory:
 
     @property
     def name(self) -> str:
-        """Its name."""
         return self.given.name
 
     def restarted(self, observed: Collection[int] = (), turn: Floats | None = None) -> Trajectory:
@@ -295,69 +285,69 @@ def _observed(
     return own
 
 
-POSES = (
-    "Of photos on trajectories these are the poses at their own times; of scanners without one, in the middle"
-    " of their images."
-)
-
 STEPS = 8  # Places in each interval of knots, or for each coefficient of a polynomial
 COEFFICIENTS = 24  # Number up to which all coefficients are listed
 NOTABLE = 3.0  # Test value from which coefficients of longer lists are listed
 LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """Positions or rotations of a trajectory after the adjustment."""
+def trajectories_table(result: Result) -> Table:
+    """Return positions and rotations of trajectories: their largest corrections, the largest test values.
 
-    trajectory: str  # Its name; `position` or `rotation`
-    what: str
-    basis: str  # What its corrections are made of, and of how many coefficients
-    count: int
-    first: float  # The span of its table, in seconds
-    last: float
-    # The length of the largest correction in it, in the linear unit or in radians, and its time
-    largest: float
-    at: float
-    tested: float  # The largest of the test values of its coefficients; NaN where none is weighted
+    They are in the order of the block, of many those with the largest test values.
+    """
+    from photogram.show.page import about  # an adjustment needs no tables
+    from photogram.show.quantity import Axis, Quantity, Table
 
-
-def courses(result: Result) -> list[Course]:
-    """Return positions and rotations of all trajectories that have corrections, in the order of the block."""
     # By names: those of photos of their own are made anew with their block.
     adjusted = {(each.kind, each.name): each for each in result.unknowns}
-    found = []
-    for each in result.block.all_trajectories:
-        for what, basis, own in zip(
-            ("position", "rotation"), (each.position, each.rotation), each.coefficients, strict=True
-        ):
-            if basis is not None:
-                of = [adjusted[one.KIND, one.name] for one in own]
-                found.append(_course(each, what, basis, of))
-    return found
+    rows = [
+        (each.name, part, *_correction(each, part, basis, [adjusted[one.KIND, one.name] for one in own]))
+        for each in result.block.all_trajectories
+        for part, (basis, own) in enumerate(
+            zip((each.position, each.rotation), each.coefficients, strict=True)
+        )
+        if basis is not None
+    ]
+    note = about("trajectories")
+    if len(rows) > LISTED:
+        note = about("trajectories.chosen", n=LISTED, all=len(rows))
+        order = sorted(range(len(rows)), key=lambda row: -np.nan_to_num(rows[row][-1]))[:LISTED]
+        rows = [rows[row] for row in sorted(order)]
+    names, parts, bases, count, first, last, largest, at, tests = (
+        zip(*rows, strict=True) if rows else ((),) * 9
+    )
+    axes = (Axis.of("position", result.block.linear_unit), Axis.turned("rotation"))
+    of = np.array(parts, dtype=np.int64)
+    columns = [
+        Quantity(names, kind="name", member="trajectory", head="Trajectory"),
+        Quantity([axes[k].name for k in parts], axes, "name", member="what", head="Of", of=of),
+        Quantity(bases, kind="name", head="Basis"),
+        Quantity(count, head="Coefficients", decimals=0),
+        Quantity(first, member="first", head="From s", decimals=3),
+        Quantity(last, member="last", head="To s", decimals=3),
+        Quantity(largest, axes, "deviation", member="largest", head="Largest correction", figures=4, of=of),
+        Quantity(at, member="at", head="At s", decimals=3),
+        Quantity(tests, head="Largest |w|", decimals=2),
+    ]
+    return Table("trajectories", "Trajectories", columns, note)
 
 
-def _course(trajectory: Trajectory, what: str, basis: Basis, own: Sequence[AdjustedUnknown]) -> Course:
+def _correction(
+    trajectory: Trajectory, part: int, basis: Basis, own: Sequence[AdjustedUnknown]
+) -> tuple[str, int, float, float, float, float, float]:
+    """Return basis, number of coefficients, span, largest correction with its time, largest test value."""
     first, last = trajectory.table.span
     times, values = _times(basis, first, last), np.array([each.position for each in own])
     # The others count for nothing.
     none = [np.zeros((len(each), 3)) for each in trajectory.coefficients]
-    part = ("position", "rotation").index(what)
     none[part] = values
     sizes = np.linalg.norm(corrections(trajectory, times, *none)[part], axis=1)
     worst = int(np.argmax(np.nan_to_num(sizes, nan=-1.0)))
     tests = np.abs(np.concatenate([each.standardized for each in own]))
-    return Course(
-        trajectory=trajectory.name,
-        what=what,
-        basis=f"{type(basis).__name__.lower()} of degree {basis.degree}",
-        count=len(own),
-        first=first,
-        last=last,
-        largest=float(sizes[worst]),
-        at=float(times[worst]),
-        tested=float(np.nanmax(tests)) if np.isfinite(tests).any() else float("nan"),
-    )
+    largest = float(np.nanmax(tests)) if np.isfinite(tests).any() else float("nan")
+    name = f"{type(basis).__name__.lower()} of degree {basis.degree}"
+    return name, len(own), first, last, float(sizes[worst]), float(times[worst]), largest
 
 
 def _times(basis: Basis, first: float, last: float) -> Floats:
@@ -368,35 +358,6 @@ def _times(basis: Basis, first: float, last: float) -> Floats:
     inner = np.clip(np.unique(knots[p : len(knots) - p]), first, last)
     parts = (np.arange(STEPS) / STEPS)[:, np.newaxis]
     return np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
-
-
-def notable_courses(result: Result) -> tuple[list[Course], str]:
-    """Return those that reports list, and what they say of the others: the largest test values come first."""
-    every = courses(result)
-    if len(every) <= LISTED:
-        return every, ""
-    order = sorted(range(len(every)), key=lambda row: -np.nan_to_num(every[row].tested))[:LISTED]
-    shown = [every[row] for row in sorted(order)]
-    return shown, f"{LISTED} of {len(every)}, with the largest test values; the table of unknowns has all"
-
-
-def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
-    """Return trajectories, quantity by quantity."""
-    from photogram.show.quantity import Axis, Quantity, of_each  # an adjustment needs no tables
-
-    axes = (Axis.of("position", linear_unit), Axis.turned("rotation"))
-    of = np.array([("position", "rotation").index(each.what) for each in every], dtype=np.int64)
-
-    numbers = (("count", "Coefficients", 0), ("first", "From s", 3), ("last", "To s", 3))
-    return [
-        of_each(every, "trajectory", kind="name", head="Trajectory"),
-        Quantity(np.array([axes[k].name for k in of], dtype=object), axes, "name", head="Of", of=of),
-        of_each(every, "basis", kind="name", head="Basis"),
-        *(of_each(every, name, head=head, decimals=count) for name, head, count in numbers),
-        of_each(every, "largest", axes, "deviation", head="Largest correction", figures=4, of=of),
-        of_each(every, "at", head="At s", decimals=3),
-        of_each(every, "tested", head="Largest |w|", decimals=2),
-    ]
 
 
 _MANY = (Coefficient, Knot)  # Types with thousands of unknowns
@@ -418,8 +379,5 @@ def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], st
     both = {isinstance(each.given, Knot): None for each in own}
     kinds = " and ".join("knots of lenses" if knot else "coefficients of trajectories" for knot in both)
     which = f"{len(kept)} of " if kept else ""
-    what = f"with |test value| > {NOTABLE:g}, " if kept else ""
-    return shown, (
-        f"{which}{len(own)} {kinds} {what}{'are listed' if kept else 'are not listed'}:"
-        " the table of unknowns has all"
-    )
+    what = f"with |test value| > {NOTABLE:g}, are" if kept else "are not"
+    return shown, f"{which}{len(own)} {kinds} {what} listed: the table of unknowns has all."

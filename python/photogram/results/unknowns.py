@@ -15,8 +15,6 @@ from photogram.network.unknowns import Unknown
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["AdjustedUnknown", "adjusted_unknowns"]
-
 
 _PLACED = frozenset(
     (
@@ -77,12 +75,10 @@ class AdjustedUnknown:
 
     @property
     def name(self) -> str:
-        """Its own name."""
         return self.given.name
 
     @property
     def kind(self) -> str:
-        """The name of its type."""
         return self.given.KIND
 
     @property

@@ -14,7 +14,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import Brief, Documented
 from photogram.show.page import Document, Fact, Facts, Section
-from photogram.show.quantity import Quantity, Table, members, of_each
+from photogram.show.quantity import Table, column, members, of_each
 from photogram.show.sketch.marks import Line, Markers, Panel, error_bars, spread
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
@@ -22,8 +22,6 @@ from photogram.statistics.variance_function import FunctionEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Bin", "VarianceFunction"]
 
 OUTSIDE = 0.025  # Probability on each side of an interval
 
@@ -118,17 +116,14 @@ class VarianceFunction(Documented, Brief):
     def bins_table(self) -> Table:
         """Return the declared table: mean of the bin, redundancy, factors by residuals and function."""
         low, high = np.array([each.interval for each in self.bins]).reshape(-1, 2).T
-        function = [self.factor(each.value) for each in self.bins]
-        factors = {"low": (low, "From"), "high": (high, "To"), "function": (function, "Function")}
         columns = [
             of_each(self.bins, "value", name=self.name, head=self.name.capitalize(), figures=4),
             of_each(self.bins, "count", name="coordinates", head="Number", decimals=0),
             of_each(self.bins, "redundancy", name="redundancy", head="Redundancy", decimals=2),
             of_each(self.bins, "factor", name="factor", head="Factor", decimals=3),
-            *(
-                Quantity(values, name=name, member=name, head=head, decimals=3)
-                for name, (values, head) in factors.items()
-            ),
+            column("low", low, "From", decimals=3),
+            column("high", high, "To", decimals=3),
+            column("function", [self.factor(each.value) for each in self.bins], "Function", decimals=3),
         ]
         return Table("bins", "Quantiles: factor of the given variance", columns)
 

@@ -1,11 +1,10 @@
-"""Tables of quantities on a page: a column for each component, or a row."""
+"""Declared tables as cells: a column for each component, or a row. No other code writes their numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,21 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.show import quantity
 from photogram.show.angles import degrees_written
-from photogram.show.page import Cell, Column, Table, decimals_of, fixed, probability_written, significant
-from photogram.show.quantity import Axis, Quantities, Quantity, chosen, long
+from photogram.show.page import (
+    Cell,
+    Column,
+    Document,
+    Drawing,
+    Layers,
+    Part,
+    Picture,
+    Section,
+    Table,
+    decimals_of,
+    number_text,
+    probability_written,
+)
+from photogram.show.quantity import Axis, Quantity, chosen, long
 
 _SIGNS = {
     "arc seconds": "″",
@@ -28,149 +40,137 @@ _SIGNS = {
 }
 _MOST_OF_DEGREES = 9
 
-Written = Cell | str | float | None  # Content of a cell
-
 
 def unit_written(unit: str) -> str:
     """Return a unit with the signs that a page has for it."""
     return _SIGNS.get(unit, unit)
 
 
-def page_table(caption: str, table: Quantities, note: str = "", by: Floats | None = None) -> Table:
-    """Return a table of quantities, a column for each component, or one where each row is of one component.
-
-    Those without a head are left out. `by` are deviations (r, k) that say how many decimals the components
-    have: two figures of the median.
-    """
-    written = [pair for each in table if each.head for pair in _columns(each, by)]
-    rows = zip(*(cells for _, cells in written), strict=True)
-    return Table(caption, [column for column, _ in written], [*rows], note)
+def written_sections(
+    document: Document, draw: Callable[[Drawing], Picture | None] = lambda _: None
+) -> list[Section]:
+    """Return the sections that people see: tables of cells, drawn pictures, and no empty parts."""
+    whole = [replace(each, parts=_written(each.parts, document.numeral, draw)) for each in document.sections]
+    return [section for section in whole if section.parts]
 
 
-def written(part: Any) -> Any:
-    """Return a part of a document; a declared table becomes a table of cells."""
-    if isinstance(part, quantity.Table):
-        columns = part.columns
-        if part.shown is not None:
-            columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
-        return page_table(part.title, columns, part.note, part.deviations)
-    return part
-
-
-def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Written]]]:
-    if each.of is not None and each.kind == "name":
-        mixed = _mixed(each)
-        names = [
-            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
-            for axis in each.axes
-        ]
-        return [(Column(each.head, text=True), [names[k] for k in each.of.tolist()])]
-    if not each.axes:
-        return [(_column(each, each.head, "", None), _with_marks(_cells(each), each.marked))]
-    if each.of is not None:
-        decimals = [] if by is None or each.kind == "deviation" else _decimals(each, by)
-        known = [count for count in decimals if count is not None]
-        unit = "" if _mixed(each) else _unit(each, each.axes[0])
-        rows = each.of.tolist()
-        counts, axes = [decimals[k] for k in rows] if decimals else [], [each.axes[k] for k in rows]
-        cells = _numbers(each, each.outward(), axes, counts, each.marked)
-        return [(_column(each, each.head, unit, max(known, default=None)), cells)]
-    values = np.reshape(each.outward(), (-1, len(each.axes)))
-    marked = None if each.marked is None else np.reshape(each.marked, values.shape)
-    found = []
-    own = [None] * len(each.axes) if by is None else _decimals(each, by)
-    for k, (axis, count) in enumerate(zip(each.axes, own, strict=True)):
-        column = _column(each, each.head.format(axis.label or axis.name), _unit(each, axis), count)
-        marks = None if marked is None else marked[:, k]
-        found.append((column, _numbers(each, values[:, k], [axis] * len(values), [count], marks)))
+def _written(
+    parts: Sequence[Part], numeral: Callable[[str], str], draw: Callable[[Drawing], Picture | None]
+) -> list[Any]:
+    found: list[Any] = []
+    for part in parts:
+        if isinstance(part, Layers):
+            layers = _written(part.parts, numeral, draw)
+            found += layers if len(layers) < 2 else [replace(part, parts=layers)]
+        elif isinstance(part, Drawing):
+            found += [picture] if (picture := draw(part)) else []
+        elif not isinstance(part, quantity.Table) or part.visible:
+            found.append(written(part, numeral))
     return found
 
 
-def _mixed(each: Quantity) -> bool:
-    return len({axis.small for axis in each.axes}) > 1
+def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
+    """Return a part of a document; a declared table becomes a table of cells.
+
+    Columns without a head are left out. The deviations of a table give the decimals of its components: two
+    figures of the median. `numeral` writes numbers in another language.
+    """
+    if not isinstance(part, quantity.Table):
+        return part
+    columns = part.columns
+    if part.shown is not None:
+        columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
+    pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
+    rows = [
+        [cell if cell.number is None else replace(cell, text=numeral(cell.text)) for cell in row]
+        for row in zip(*(cells for _, cells in pairs), strict=True)
+    ]
+    return Table(part.title, [column for column, _ in pairs], rows, part.note)
 
 
-def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Column:
-    count = each.decimals if decimals is None else decimals
-    return Column(head, unit, decimals=count, figures=each.figures, text=each.kind == "name")
+def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:
+    """Yield each column of a quantity with its cells."""
+    axes, of, text = each.axes, each.of, each.kind == "name"
+    mixed = len({axis.small for axis in axes}) > 1  # If components share a column, each has its own unit
+    if not axes or (text and of is None):
+        yield Column(each.head, text=text), _marked(_plain(each), each.marked)
+    elif of is not None and text:
+        names = [
+            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name for axis in axes
+        ]
+        yield Column(each.head, text=True), [Cell(names[k]) for k in of.tolist()]
+    elif of is not None:
+        decimals = _decimals(each, by, mixed)
+        rows = zip(each.outward().tolist(), of.tolist(), strict=True)
+        cells = [_cell(each, value, axes[k], decimals[k]) for value, k in rows]
+        yield Column(each.head, "" if mixed else _unit(each, axes[0])), _marked(cells, each.marked)
+    else:
+        values = np.reshape(each.outward(), (-1, len(axes)))
+        marked = None if each.marked is None else np.reshape(each.marked, values.shape)
+        for k, (axis, count) in enumerate(zip(axes, _decimals(each, by, False), strict=True)):
+            cells = [_cell(each, value, axis, count) for value in values[:, k].tolist()]
+            head = each.head.format(axis.label or axis.name)
+            yield Column(head, _unit(each, axis)), _marked(cells, None if marked is None else marked[:, k])
 
 
 def _unit(each: Quantity, axis: Axis) -> str:
-    if each.kind == "value" and axis.angle == "dms":
-        return "° ′ ″"
-    return unit_written(each.unit(axis))
+    return "° ′ ″" if each.kind == "value" and axis.angle == "dms" else unit_written(each.unit(axis))
 
 
-def _decimals(each: Quantity, by: Floats) -> list[int | None]:
+def _decimals(each: Quantity, by: Floats | None, mixed: bool) -> list[int | None]:
     """Return the decimals of components: two figures of the median deviation, of degrees four more.
 
     None where nothing tells: in a column of several components whose deviation is not known.
     """
-    if each.kind == "number" or each.decimals is not None:
-        return [each.decimals] * len(each.axes)
+    count, of_rows = len(each.axes), each.of is not None
+    if (
+        each.decimals is not None
+        or each.kind == "number"
+        or by is None
+        or (of_rows and each.kind == "deviation")
+    ):
+        return [each.decimals] * count
     found: list[int | None] = []
-    alone = each.of is not None and _mixed(each)
-    for axis, column in zip(each.axes, np.reshape(by, (-1, len(each.axes))).T, strict=True):
-        count = decimals_of(column * axis.factor)
-        if alone and not (column > 0).any():
-            found.append(None)
-            continue
+    for axis, column in zip(each.axes, np.reshape(by, (-1, count)).T, strict=True):
+        own = decimals_of(column * axis.factor) + (each.kind == "difference")
         if each.kind == "value" and axis.angle:
-            count = min(count + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
-        elif each.kind == "difference":
-            count += 1
-        found.append(count)
+            own = min(own + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
+        found.append(None if of_rows and mixed and not (column > 0).any() else own)
+    if of_rows and each.kind == "value" and not mixed:
+        return [max(own for own in found if own is not None)] * count
     return found
 
 
-def _cells(each: Quantity) -> list[Written]:
-    """Write names, and numbers that have no axis."""
+def _plain(each: Quantity) -> list[Cell]:
+    """Return names, and numbers that have no axis."""
     if each.kind == "probability":
         values = np.asarray(each.values, dtype=float).tolist()
-        return [Cell(probability_written(p), sorts=p) if math.isfinite(p) else None for p in values]
+        return [Cell(probability_written(p), p) if math.isfinite(p) else Cell("") for p in values]
+    plain = np.asarray(each.values)
     if each.kind != "name":
-        values = np.asarray(each.values)
-        return [*(values if each.seen is None else np.where(each.seen, values, np.nan)).tolist()]
-    plain = np.asarray(each.values).tolist()
+        shown = plain if each.seen is None else np.where(each.seen, plain, np.nan)
+        texts = [number_text(value, each.decimals, each.figures) for value in shown.tolist()]
+        return [
+            Cell(text, None if isinstance(value, str) else value)
+            for text, value in zip(texts, shown.tolist(), strict=True)
+        ]
     if each.link is None:
-        return [*map(str, plain)]
+        return [Cell(str(name)) for name in plain.tolist()]
     ids = [f"{each.link.kind}-{row}" for row in each.link.rows.tolist()]
-    if each.link.here:
-        return [Cell(str(name), id=own) for name, own in zip(plain, ids, strict=True)]
-    return [Cell(str(name), goes_to=own) for name, own in zip(plain, ids, strict=True)]
+    pairs = zip(map(str, plain.tolist()), ids, strict=True)
+    return [Cell(name, id=own) if each.link.here else Cell(name, goes_to=own) for name, own in pairs]
 
 
-def _numbers(
-    each: Quantity,
-    values: Floats,
-    axes: Sequence[Axis],
-    decimals: Sequence[int | None],
-    marked: Bools | None = None,
-) -> list[Written]:
-    """Write numbers as people see them, with the axis and the decimals of each."""
-    words = each.words or {}
-    counts = cycle(decimals or [None])
-    # What shares a column and is of several components has decimals of its own.
-    own = each.kind == "difference" or (each.kind == "value" and each.of is not None and _mixed(each))
-    found = [
-        words[value] if value in words else _number(each, value, axis, count, own=own)
-        for value, axis, count in zip(values.tolist(), axes, counts, strict=False)
-    ]
-    return _with_marks(found, marked)
+def _cell(each: Quantity, value: float, axis: Axis, decimals: int | None) -> Cell:
+    """Return a number as people see it, with the unit of its axis and its decimals."""
+    if each.words and value in each.words:
+        return Cell(each.words[value])
+    if each.kind == "value" and axis.angle == "dms" and math.isfinite(value):
+        return Cell(degrees_written(value, decimals or 0), math.degrees(value))
+    return Cell(number_text(value, decimals, each.figures), value)
 
 
-def _number(each: Quantity, value: float, axis: Axis, decimals: int | None, *, own: bool) -> Written:
-    if not math.isfinite(value):
-        return value
-    if each.kind == "value" and axis.angle == "dms":
-        return Cell(degrees_written(value, decimals or 0), sorts=math.degrees(value))
-    if not own:
-        return value
-    return Cell(significant(value, each.figures) if decimals is None else fixed(value, decimals), sorts=value)
-
-
-def _with_marks(cells: list[Written], marked: Bools | None) -> list[Written]:
+def _marked(cells: list[Cell], marked: Bools | None) -> list[Cell]:
     if marked is None:
         return cells
-    whole = [cell if isinstance(cell, Cell) else Cell(cell) for cell in cells]
-    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(whole, marked, strict=True)]
+    return [replace(cell, tone="look") if mark else cell for cell, mark in zip(cells, marked, strict=True)]

@@ -9,7 +9,7 @@ from typing import Any
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import replace
-from photogram.show.cells import written
+from photogram.show.cells import written, written_sections
 from photogram.show.page import Document, Fact, Facts, Layers, Part, Remarks, Section, Table, Text
 
 WIDTH = 100  # characters of a line of prose
@@ -76,9 +76,10 @@ def _judged(document: Document) -> list[TitledLines]:
 def _sections(document: Document, keys: Sequence[str]) -> list[TitledLines]:
     """Return the lines of key figures and sections below their titles; none without lines."""
     figures = fact_lines([*document.head, *document.highlights])
+    whole = replace(document, sections=[*document.sections, *document.details])
     titled = [("Key figures", figures)] + [
-        (section.title, _section_lines(replace(section, intro="") if keys else section))
-        for section in (*document.sections, *document.details)
+        (section.title, _section_lines(section, "" if keys else section.intro))
+        for section in written_sections(whole)
         if section.key in keys or not keys
     ]
     return [(title, "\n".join(lines).split("\n")) for title, lines in titled if lines]
@@ -89,11 +90,9 @@ def _sentence(message: object) -> str:
     return f"{line[:1].upper()}{line[1:]}".removesuffix(".") + "."
 
 
-def _section_lines(section: Section) -> list[str]:
-    parts = [lines for part in section.visible if (lines := part_lines(part, section.title))]
-    if not parts:
-        return []
-    return _spaced([textwrap.wrap(section.intro, WIDTH), *parts])
+def _section_lines(section: Section, intro: str) -> list[str]:
+    parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
+    return _spaced([textwrap.wrap(intro, WIDTH), *parts]) if parts else []
 
 
 def _spaced(parts: Iterable[list[str]]) -> list[str]:
@@ -104,8 +103,8 @@ def part_lines(part: Part, title: str = "") -> list[str]:
     """Return the lines of a part below a title; none for plots."""
     match written(part):
         case Table() as table if table.rows:
-            caption = [table.caption] if table.caption not in ("", title) else []
-            return [*caption, *table_text(table), *textwrap.wrap(table.note, WIDTH)]
+            head = [table.title] if table.title not in ("", title) else []
+            return [*head, *table_text(table), *textwrap.wrap(table.note, WIDTH)]
         case Facts(caption=caption, facts=facts) if facts:
             return [*([caption] if caption not in ("", title) else []), *fact_lines(facts)]
         case Layers(parts=layers):
@@ -134,10 +133,10 @@ def summary(document: Document, *keys: str) -> list[str]:
 def table_text(table: Table) -> list[str]:
     """Return the lines of a table: names to the left, numbers to the right, `*` behind marked numbers."""
     columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
-    for row in table.cells():
-        for texts, (column, cell) in zip(columns, row, strict=True):
+    for row in table.rows:
+        for texts, column, cell in zip(columns, table.columns, row, strict=True):
             mark = "*" if cell.tone == "look" and not column.text else ""
-            texts.append(f"{column.written(cell.value)}{mark}".translate(PLAIN))
+            texts.append(f"{cell.text}{mark}".translate(PLAIN))
     longest = max(len(text) for texts in columns for text in texts)
     if longest > WIDTH // 2 and all(
         column.text for column in table.columns

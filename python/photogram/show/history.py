@@ -19,7 +19,7 @@ from photogram.show.style import FAINT, INK, MARKED
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.statistics.history import History, Series
+    from photogram.statistics.history import Change, History, Series
     from photogram.statistics.verdict import Verdict
 
 ACROSS = 3  # Charts beside each other
@@ -27,18 +27,14 @@ ACROSS = 3  # Charts beside each other
 
 def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
     """Return the document of a thing: changes, introduced by `about`, all values, and further members."""
-    sums = history.constancy
+    own = quantity.members(history, "occasions", "times", "tests", "level", "limit")
+    names, p = ("variance", "degrees_of_freedom"), "probability_above"
+    constancy = quantity.members(history.constancy, *names, probability=p)
     return Document(
         what="",
         title=whose,
         sections=[Section.of(series(history, about)), Section.of(values(history))],
-        members={
-            **members,
-            **quantity.members(history, "occasions", "times", "tests", "level", "limit"),
-            "constancy": quantity.members(
-                sums, "variance", "degrees_of_freedom", probability="probability_above"
-            ),
-        },
+        members={**members, **own, "constancy": constancy},
     )
 
 
@@ -46,7 +42,9 @@ def series(history: History, about: str = "") -> Table:
     """Return a row for each quantity: mean, drift, the largest test of a step, and the changes."""
     own = history.series
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
-    of, changes = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
+    of, found = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
+    changes = [[_change(history, change) for change in each.changes] for each in own]
+    marked = np.array([bool(text) for text in found])
     steps = [max((t for t in each.steps.tolist() if t == t), key=abs, default=np.nan) for each in own]
     p = [each.test.probability_above if each.test else None for each in own]
     columns = [
@@ -58,13 +56,8 @@ def series(history: History, about: str = "") -> Table:
         of_each(own, "drift_sd", axes, "deviation", of=of, head="sd", figures=2),
         Quantity(np.array(steps), head="Largest t of a step", decimals=2),
         Quantity(p, head="p of constancy", member="probability", figures=2),
-        Quantity(
-            [kinds or "constant" for kinds in changes],
-            kind="name",
-            head="Found",
-            marked=np.array([bool(kinds) for kinds in changes]),
-        ),
-        Quantity([_changes(history, each) for each in own], member="changes"),
+        Quantity([text or "constant" for text in found], kind="name", head="Found", marked=marked),
+        Quantity(changes, member="changes"),
     ]
     note = (
         f"Of {history.tests} single tests together one rejects by chance with probability {history.level:g}:"
@@ -73,12 +66,9 @@ def series(history: History, about: str = "") -> Table:
     return Table("series", "What changed", columns, note, about, _deviations(history))
 
 
-def _changes(history: History, own: Series) -> list[dict[str, object]]:
-    return [
-        quantity.members(change, "kind", "size", "sd", "log10_p", "sentence", t="statistic")
-        | {"occasion": None if change.at is None else history.occasions[change.at]}
-        for change in own.changes
-    ]
+def _change(history: History, change: Change) -> dict[str, object]:
+    members = quantity.members(change, "kind", "size", "sd", "log10_p", "sentence", t="statistic")
+    return members | {"occasion": None if change.at is None else history.occasions[change.at]}
 
 
 def values(history: History) -> Table:
@@ -86,9 +76,8 @@ def values(history: History) -> Table:
     own, occasions = history.series, history.occasions
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
     of = np.repeat(np.arange(len(own)), len(occasions))
-    values, sd, off, off_sd = (
-        np.concatenate([getattr(each, name) for each in own]) for name in ("values", "sd", "off", "off_sd")
-    )
+    names = ("values", "sd", "off", "off_sd")
+    values, sd, off, off_sd = (np.concatenate([getattr(each, name) for each in own]) for name in names)
     t = off / off_sd
     columns = [
         component(axes, of)[0],
@@ -162,20 +151,15 @@ def control_charts(history: History, title: str) -> Plot:
 
 def _chart(history: History, own: Series) -> Panel:
     t, beyond = history.times, abs(own.off) > history.limit * own.off_sd
-    places, expected, room = (
-        np.column_stack([t, own.values]),
-        own.values - own.off,
-        history.limit * own.off_sd,
-    )
+    places = np.column_stack([t, own.values])
+    expected, room = own.values - own.off, history.limit * own.off_sd
     marks: list[Mark] = [
         Line(error_bars(places, own.values - own.sd, own.values + own.sd), INK, 1.0),
         Markers(places, "o", 3.5),
         *(Line(np.column_stack([t, expected + sign * room]), FAINT, 0.8, "--") for sign in (-1, 1)),
         Level(own.mean, FAINT, 0.8),
     ]
-    if own.changes:
-        marks.append(Line(np.column_stack([t, own.model]), MARKED, 1.2))
-    else:
-        marks.append(Markers(places[beyond], "o", 6.0, MARKED, "none"))
+    changed = Line(np.column_stack([t, own.model]), MARKED, 1.2)
+    marks.append(changed if own.changes else Markers(places[beyond], "o", 6.0, MARKED, "none"))
     up = spread(own.values - own.sd, own.values + own.sd, expected - room, expected + room)
     return Panel(np.column_stack([spread(t), up]), marks, own.name, "", unit_written(own.unit))

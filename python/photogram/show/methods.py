@@ -85,16 +85,11 @@ class Brief:
 
     def __repr__(self) -> str:
         title, rows = self._lines()
-        width = max((len(name) for name, _ in rows), default=0)
-        lines = [_cut(title)]
-        for name, told in rows:
-            if name == WHOLE:
-                parts = wrap(told, WIDEST - width - 4)
-                heads = [name, *[""] * len(parts)]
-                lines += [f"  {head:<{width}}  {part}" for head, part in zip(heads, parts, strict=False)]
-            else:
-                lines.append(_cut(f"  {name:<{width}}  {told}"))
-        return "\n".join(lines)
+        width, lines = max((len(name) for name, _ in rows), default=0), [title]
+        for name, text in rows:
+            parts = wrap(text, WIDEST - width - 4) if name == WHOLE else [text]
+            lines += [f"  {'' if k else name:<{width}}  {part}" for k, part in enumerate(parts)]
+        return "\n".join(line if len(line) <= WIDEST else f"{line[: WIDEST - 3]}..." for line in lines)
 
     def _repr_html_(self) -> str:
         from html import escape
@@ -106,10 +101,6 @@ class Brief:
             for name, told in rows
         )
         return f"<div><p><strong>{escape(title)}</strong></p><table><tbody>{cells}</tbody></table></div>"
-
-
-def _cut(line: str) -> str:
-    return line if len(line) <= WIDEST else f"{line[: WIDEST - 3]}..."
 
 
 def few(names: Sequence[str]) -> str:

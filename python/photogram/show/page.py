@@ -7,7 +7,7 @@ documents.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show import quantity
-from photogram.words import Phrase
+from photogram.words import Phrase, words_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,64 +31,33 @@ LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell that is more than its text."""
+    """A cell as people read it."""
 
-    value: str | float | None  # Text, number, or None for an empty cell
-    goes_to: str = ""  # `id` of the cell that it links to, if the page has one
+    text: str
+    number: float | None = None  # Value that the text is of
     id: str = ""  # Target of links
+    goes_to: str = ""  # `id` of the cell that it links to, if the page has one
     tone: Tone = ""  # Marked cells have the tone `look`
-    sorts: float | None = None  # Sort key of a text
-
-
-Row = Sequence[Cell | str | float | None]  # Cells of a table
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table."""
+    """Head of a column: its name, and the unit of its numbers."""
 
-    # Name, and unit of the numbers
     head: str
     unit: str = ""
-    # Of fixed-point numbers; None: `figures` significant figures
-    decimals: int | None = None
-    figures: int = 4
     text: bool = False  # Whether the column contains texts, aligned left
-
-    def written(self, value: str | float | None) -> str:
-        """Return a value as it stands in the column."""
-        if value is None:
-            return ""
-        if isinstance(value, str):
-            return value
-        if isinstance(value, int):
-            return f"{value}"
-        if math.isnan(value):
-            return "–"
-        if math.isinf(value):
-            return "∞" if value > 0 else "-∞"
-        if self.decimals is None:
-            return significant(value, self.figures)
-        return fixed(value, self.decimals)
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a caption; `note` says what is not in it."""
+    """A table whose cells are written; `note` says what is not in it."""
 
-    caption: str
+    title: str
     columns: Sequence[Column]
-    rows: Sequence[Row]
+    rows: Sequence[Sequence[Cell]]
     note: str = ""
     kind: str = field(default="table", init=False)
-
-    def cells(self) -> Iterable[list[tuple[Column, Cell]]]:
-        """Return the rows as cells with their columns."""
-        for row in self.rows:
-            yield [
-                (column, each if isinstance(each, Cell) else Cell(each))
-                for column, each in zip(self.columns, row, strict=True)
-            ]
 
 
 @dataclass(frozen=True)
@@ -146,10 +115,6 @@ class Layers:
     parts: Sequence[Drawing | Picture | Table | quantity.Table]
     kind: str = field(default="layers", init=False)
 
-    def titles(self) -> list[str]:
-        """Return what the parts are called."""
-        return [each.caption if isinstance(each, Table) else each.title for each in self.parts]
-
 
 @dataclass(frozen=True)
 class Text:
@@ -180,11 +145,6 @@ class Section:
     parts: Sequence[Part]
     intro: str = ""
     annex: bool = False
-
-    @property
-    def visible(self) -> list[Part]:
-        """Parts without the tables that only programs read."""
-        return [part for part in self.parts if not isinstance(part, quantity.Table) or part.visible]
 
     @classmethod
     def of(cls, table: quantity.Table) -> Section:
@@ -226,6 +186,7 @@ class Document:
     contents: str = "Sections"
     more: str = "{} more"
     numbers: str = "Page {number} of {total}"
+    numeral: Callable[[str], str] = str  # Writes numbers of tables as the language does
 
     def with_sections(self, *more: Section) -> Document:
         """Return the page with more sections at its end."""
@@ -233,13 +194,14 @@ class Document:
 
     def tables(self, *, layers: bool = False) -> list[quantity.Table]:
         """Return the tables of all sections and details, with those in layers on request."""
-        return [part for part in self._parts(layers) if isinstance(part, quantity.Table)]
+        return [part for part in self.parts(layers=layers) if isinstance(part, quantity.Table)]
 
     def drawings(self) -> list[Drawing]:
         """Return the plots of all sections and details."""
-        return [part for part in self._parts(True) if isinstance(part, Drawing)]
+        return [part for part in self.parts(layers=True) if isinstance(part, Drawing)]
 
-    def _parts(self, layers: bool) -> list[Part]:
+    def parts(self, *, layers: bool = False) -> list[Part]:
+        """Return the parts of all sections and details; parts of layers instead of layers on request."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
         if layers:
             parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
@@ -248,6 +210,11 @@ class Document:
     def table(self, key: str) -> quantity.Table:
         """Return the table with a key, the first of several layers."""
         return next(table for table in self.tables(layers=True) if table.key == key)
+
+
+def about(code: str, **fields: Any) -> str:
+    """Return the explanation of a section, table or fact that the words of documents have for a code."""
+    return words_of("en")(f"about.{code}", **fields)
 
 
 def layered_tables(name: str, tables: Sequence[quantity.Table]) -> Sequence[Layers | quantity.Table]:
@@ -278,9 +245,16 @@ def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -
     )
 
 
+def number_text(value: float | str | None, decimals: int | None, figures: int = 4) -> str:
+    """Return a value in a column with so many decimals, or significant figures; integers and texts stay."""
+    if value is None or isinstance(value, str | int):
+        return "" if value is None else f"{value}"
+    return significant(value, figures) if decimals is None else fixed(value, decimals)
+
+
 def fixed(value: float, decimals: int) -> str:
     """Return a number in fixed point, zero without a sign; one that is too long for it with an exponent."""
-    if abs(value) >= 1e15:
+    if not abs(value) < 1e15:
         return significant(value)
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0 else text

@@ -14,10 +14,9 @@ from typing import Any
 import typst
 
 from photogram.lazy_dataclasses import fields, replace
-from photogram.show import quantity
-from photogram.show.cells import written
+from photogram.show.cells import written_sections
 from photogram.show.html import inlined
-from photogram.show.page import Column, Document, Drawing, Picture, Section, Table
+from photogram.show.page import Column, Document, Picture, Table
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import LETTERS
 from photogram.words import Phrase
@@ -33,15 +32,11 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
     `author` is a property of the file.
     """
-    titled = replace(page, title=page.title or page.what, members={}, phases={})
+    sections = written_sections(page, inlined)
+    titled = replace(page, title=page.title or page.what, sections=sections, details=())
     footer = f"{page.what} – {page.title}" if page.title else page.what
-    further: dict[str, object] = {
-        "author": author or [],
-        "footer": footer,
-        "fonts": FONTS,
-        "longest": LONGEST,
-    }
-    data = json.dumps({**_record(titled), **further}, default=_record, ensure_ascii=False)
+    record = _record(titled) | {"author": author or [], "footer": footer, "fonts": FONTS, "longest": LONGEST}
+    data = json.dumps(record, default=_record, ensure_ascii=False)
     data = data.encode(errors="replace").decode()  # Names of files may contain bytes that are not UTF-8.
     template = files("photogram.show").joinpath("templates", "page.typ").read_bytes()
     content: bytes = typst.compile(template, sys_inputs={"document": data})
@@ -49,26 +44,19 @@ def page_pdf(page: Document, *, author: str = "") -> bytes:
 
 
 def _record(part: Any) -> Any:
-    """Return the fields of a part of a document; pictures are drawn, and the cells of tables are texts."""
-    if isinstance(part, Drawing):
-        return inlined(part)
-    if isinstance(part, quantity.Table):
-        return written(part)
+    """Return the fields of a part of a document."""
     if isinstance(part, Phrase):
         return str(part)
-    record: dict[str, Any] = {each.name: getattr(part, each.name) for each in fields(part)}
-    if isinstance(part, Section):
-        record["parts"] = part.visible
-    elif isinstance(part, Picture):
+    names = (each.name for each in fields(part) if each.name not in ("members", "phases", "numeral"))
+    record: dict[str, Any] = {name: getattr(part, name) for name in names}
+    if isinstance(part, Picture):
         # Width and height follow from the view box.
         record["markup"] = re.sub('^(<svg[^>]*) width="[^"]*"', r"\1", part.markup).replace(LETTERS, FONTS[0])
     elif isinstance(part, Table):
-        rows = [
-            [{"tone": cell.tone, "text": column.written(cell.value)} for column, cell in row]
-            for row in part.cells()
+        record["rows"] = [[{"tone": cell.tone, "text": cell.text} for cell in row] for row in part.rows]
+        record["columns"] = [
+            _column(column, [row[k].text for row in part.rows]) for k, column in enumerate(part.columns)
         ]
-        columns = [_column(column, [row[k]["text"] for row in rows]) for k, column in enumerate(part.columns)]
-        record |= {"rows": rows, "columns": columns}
     return record
 
 

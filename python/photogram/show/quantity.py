@@ -115,6 +115,17 @@ class Quantity:
             values = values * (factors if self.of is None else factors[self.of])
         return values
 
+    def at(self, rows: Indices, axes: Indices | None = None) -> Quantity:
+        """Return the quantity of some things; with `axes`, one component of each if it has several."""
+        one = axes is not None and not self.single
+        parts: dict[str, Any] = {
+            name: np.asarray(part)[(rows, axes) if one else rows]
+            for name in ("values", "seen", "marked", "of")
+            if (part := getattr(self, name)) is not None
+        }
+        link = self.link and replace(self.link, rows=self.link.rows[rows])
+        return replace(self, **{**parts, "link": link, "of": axes if one else parts.get("of")})
+
 
 Quantities = Sequence[Quantity]  # Quantities of the same things
 
@@ -173,6 +184,11 @@ def attribute(
     return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
 
 
+def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
+    """Return a quantity with the same name in files and in JSON documents."""
+    return Quantity(values, **{"name": name, "member": name, "head": head, **more})
+
+
 def named(table: Quantities, name: str) -> Quantity:
     """Return the quantity with a name of its columns."""
     return next(column for column in table if column.name == name)
@@ -180,46 +196,26 @@ def named(table: Quantities, name: str) -> Quantity:
 
 def chosen(table: Quantities, rows: Indices) -> list[Quantity]:
     """Return the table of some of its things."""
-    return [
-        replace(
-            each,
-            values=np.asarray(each.values)[rows],
-            seen=_picked(each.seen, rows),
-            marked=_picked(each.marked, rows),
-            link=each.link and replace(each.link, rows=each.link.rows[rows]),
-            of=_picked(each.of, rows),
-        )
-        for each in table
-    ]
-
-
-def _picked(part: Any, places: Any) -> Any:
-    return None if part is None else part[places]
+    return [each.at(rows) for each in table]
 
 
 def long(table: Quantities, places: Indices) -> list[Quantity]:
     """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
-    rows, axis = places[:, 0], places[:, 1]
-    axes = next(each.axes for each in table if not each.single)
-    found = [*chosen([each for each in table if each.single], rows), *component(axes, axis)]
-    for each in table:
-        if not each.single:
-            seen, marked = _picked(each.seen, (rows, axis)), _picked(each.marked, (rows, axis))
-            found.append(replace(each, values=each.values[rows, axis], seen=seen, marked=marked, of=axis))
-    return found
+    rows, axis = places.T
+    several = [each for each in table if not each.single]
+    found = chosen([each for each in table if each.single], rows) + component(several[0].axes, axis)
+    return found + [each.at(rows, axis) for each in several]
 
 
 def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
     """Return which component each row of a table is of, and its unit."""
     names, units = (
-        np.array([getattr(each, what) for each in axes], dtype=object) for what in ("name", "unit")
+        np.array([getattr(axis, what) for axis in axes], dtype=object)[of] for what in ("name", "unit")
     )
-    about = "unit of values, residuals and deviations of this row; empty if dimensionless"
+    which, about = "which of its components", "of this row; empty if dimensionless"
     return [
-        Quantity(
-            names[of], axes, "name", "component", "", "which of its components", head="Component", of=of
-        ),
-        Quantity(units[of], (), "name", "unit", "", about),
+        Quantity(names, axes, "name", "component", about=which, head="Component", of=of),
+        Quantity(units, kind="name", name="unit", about=f"unit of values, residuals and deviations {about}"),
     ]
 
 
@@ -246,9 +242,8 @@ def units(table: Quantities) -> dict[str, list[str]]:
     """Return the names of the columns of `frame` by their units, if the names do not have the unit."""
     names: dict[str, list[str]] = {}
     for name, unit, _ in _columns(table):
-        if unit:
-            names.setdefault(unit, []).append(name)
-    return names
+        names.setdefault(unit, []).append(name)
+    return {unit: own for unit, own in names.items() if unit}
 
 
 def unit_comments(table: Quantities) -> list[str]:

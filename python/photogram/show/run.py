@@ -11,10 +11,11 @@ from pathlib import Path
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import printable
-from photogram.show.page import Column, Fact, Facts, Part, Section, Table
+from photogram.show.page import Fact, Facts, Part, Section
+from photogram.show.quantity import Axis, Quantity, Table
 
-PIECE = 1 << 20
 LISTED = 200  # Listed input files
+BYTES, SECONDS = (Axis.of("", "bytes"),), (Axis.of("", "s"),)
 
 
 @dataclass(frozen=True)
@@ -44,13 +45,9 @@ def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
     found = []
     every = [each for each in dict.fromkeys(paths) if each.is_file()]
     for path in every[:LISTED]:
-        total = hashlib.sha256()
-        size = 0
         with path.open("rb") as file:
-            while piece := file.read(PIECE):
-                total.update(piece)
-                size += len(piece)
-        found.append(InputFile(path, size, total.hexdigest()))
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+            found.append(InputFile(path, file.tell(), digest))
     return found, len(every) - len(found)
 
 
@@ -66,17 +63,26 @@ def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
         ]
     parts: list[Part] = [Facts("Made by", made)]
     if run is not None and run.inputs:
-        columns = (Column("File", text=True), Column("Size", "bytes"), Column("SHA-256", text=True))
-        rows = [(printable(str(each.path)), each.size, each.sha256) for each in run.inputs]
         note = f"and {run.others} more" if run.others else ""
-        parts.append(Table("Input files", columns, rows, note))
+        columns = [
+            Quantity([printable(str(each.path)) for each in run.inputs], kind="name", head="File"),
+            Quantity([each.size for each in run.inputs], BYTES, "deviation", head="Size", decimals=0),
+            Quantity([each.sha256 for each in run.inputs], kind="name", head="SHA-256"),
+        ]
+        parts.append(Table("", "Input files", columns, note))
     if run is not None and run.options:
-        given = {name: printable(value) for name, value in run.options.items()}
-        heads, note = ("Option", "Value"), "Those that were not given have their defaults."
-        parts.append(Table("Options", [Column(head, text=True) for head in heads], [*given.items()], note))
+        note = "Those that were not given have their defaults."
+        columns = [
+            Quantity([*run.options], kind="name", head="Option"),
+            Quantity([*map(printable, run.options.values())], kind="name", head="Value"),
+        ]
+        parts.append(Table("", "Options", columns, note))
     if phases:
-        spent = (Column("Phase", text=True), Column("Time", "s", decimals=3))
-        parts.append(Table("Time spent in the adjustment", spent, [*phases.items()]))
+        columns = [
+            Quantity([*phases], kind="name", head="Phase"),
+            Quantity([*phases.values()], SECONDS, "deviation", head="Time", decimals=3),
+        ]
+        parts.append(Table("", "Time spent in the adjustment", columns))
     intro = (
         "What is needed to make this page again. Everything above is the same in every run; times are not."
     )

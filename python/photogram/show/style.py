@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 BLUE = "#0072b2"
@@ -25,8 +25,6 @@ INK, MARKED, FAINT = "#222222", VERMILION, "#8c8c8c"
 SOFT = "#5c5c5c"
 """Of letters that are not to stand out: 6.7 to 1 on white; FAINT, of lines, has 3.4."""
 """What is drawn as it is, what a reader should look at, and what only helps."""
-ORDERED = "cividis"  # Colour map of values from small to large
-
 DPI = 120  # Dots per inch of PNG files
 
 SETTINGS: dict[str, Any] = {
@@ -55,15 +53,20 @@ SETTINGS: dict[str, Any] = {
 }
 
 
+def need(package: str, user: str, extra: str) -> None:
+    """Raise an error with the name of the extra if a package is absent."""
+    try:
+        import_module(package)
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        message = f"{user} need {package}: pip install 'photogram[{extra}]'"
+        raise ModuleNotFoundError(message, name=package) from None
+
+
 def need_matplotlib() -> None:
     """Raise an error with the name of the extra if matplotlib is absent."""
-    try:
-        import matplotlib  # noqa: F401
-    except ModuleNotFoundError as error:
-        if error.name != "matplotlib":
-            raise
-        said = "plots in formats other than SVG need matplotlib: pip install 'photogram[plots]'"
-        raise ModuleNotFoundError(said, name="matplotlib") from None
+    need("matplotlib", "plots in formats other than SVG", "plots")
 
 
 def styled() -> AbstractContextManager[None]:
@@ -73,13 +76,6 @@ def styled() -> AbstractContextManager[None]:
 
     settings: Any = SETTINGS
     return mpl.rc_context(settings)
-
-
-def signed() -> Colormap:
-    """Return the colour map of values from minus to plus: blue, white, vermilion."""
-    from matplotlib.colors import LinearSegmentedColormap
-
-    return LinearSegmentedColormap.from_list("signed", [BLUE, "#ffffff", VERMILION])
 
 
 def new_figure(width: float, height: float) -> Figure:

@@ -29,8 +29,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.words import Phrase
 
-__all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
-
 LEAST_REDUNDANCY = 5.0  # Smallest redundancy of a group with an estimated variance
 LEAST_SHARE = 0.01  # Smallest ratio of its redundancy and its number of observations
 REFUSED = 1.0  # Smallest redundancy for any estimate of a variance

@@ -33,16 +33,6 @@ from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Bools, Floats
 from photogram.statistics.distributions import critical_normal
 
-__all__ = [
-    "circular_error",
-    "linear_error",
-    "mixture_circular",
-    "mixture_linear",
-    "sample_radius",
-    "spherical_error",
-    "upper_order",
-]
-
 INDEFINITE = 1e-9  # Largest negative variance or asymmetry by rounding, as a part of the largest variance
 
 

@@ -191,6 +191,7 @@ class Findings:
     global_test: GlobalTest | None = None  # Of all residuals; None if there is none
     untested: Text = Phrase("untested.weight")  # Why there is no global test
     undetermined: Sequence[Text] = ()  # Unknowns that the observations do not determine, or hardly
+    duplicates: Sequence[Text] = ()  # Photos and points that were entered twice
     hints: Sequence[Text] = ()  # Accepted hypotheses on mistakes in the data
     exchanged: Sequence[Text] = ()  # Names that are probably exchanged
     shortfall: Phrase | None = None  # A required accuracy that the result misses

@@ -21,8 +21,6 @@ from photogram.errors import InputError
 from photogram.statistics.distributions import LEVEL, critical_student
 from photogram.words import phrase
 
-__all__ = ["coverage_factor", "effective_freedom", "joint_freedom", "rmse_interval", "welch_satterthwaite"]
-
 ROUNDING = 1e-9
 """Of a number of degrees of freedom that is whole but for rounding, and of traces, in their size."""
 

@@ -25,16 +25,6 @@ from numpy.typing import ArrayLike
 from photogram.arguments.types import Floats
 from photogram.statistics.distributions import lambda0
 
-__all__ = [
-    "ROUNDING",
-    "TESTABLE",
-    "largest_effect",
-    "minimal_detectable_error",
-    "noncentrality",
-    "standardized",
-]
-
-
 TESTABLE = 0.01
 """With less redundancy a gross error hides in the unknowns, and the test value repeats that of another
 observation."""

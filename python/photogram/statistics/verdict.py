@@ -418,6 +418,12 @@ RULES = (
         EXIT_NOT_CONVERGED,
         ("determine",),
     ),
+    Rule(
+        "duplicates",
+        _listing("duplicates", "duplicates", "duplicates"),
+        EXIT_NOT_USABLE,
+        ("remove-duplicates",),
+    ),
     Rule("hint", _listing("hint", "hints", "hints"), EXIT_NOT_USABLE, ("correct",)),
     Rule("identification", _listing("identification", "names", "doubtful"), EXIT_NOT_USABLE, ("exposures",)),
     Rule(

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.results.document import block_members
-from photogram.show.cells import page_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
-from photogram.show.quantity import Quantity, members, records
+from photogram.show.quantity import Quantity, Table, members, records
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
 from photogram.targets.drawing import (
@@ -60,10 +59,10 @@ def calibration_page(calibrated: Calibrated) -> Document:
     sections = [
         worth_section(worth),
         Section("board", "Board", board),
-        Section("views", "Views", [page_table("Views", table)], intro),
+        Section("views", "Views", [Table("", "Views", table)], intro),
         Section("corners", "Residuals of corners", _residuals(calibrated)),
         Section("splines", "Splined lenses", [Remarks(told)] if (told := spline_lines(calibrated)) else []),
-        Section("priors", "Priors of cameras", [page_table("What they have moved", moved)] if moved else []),
+        Section("priors", "Priors of cameras", [Table("", "What they have moved", moved)] if moved else []),
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
     return replace(
@@ -87,8 +86,9 @@ def _residuals(calibrated: Calibrated) -> list[Part]:
             partial(plot_poorest_views, calibrated),
         ),
     ]
-    tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
-    return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
+    tables = [Table("", title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
+    several = (table for table in tables if len(table.columns[0].values) > 1)
+    return [Layers("corner-residuals", drawings), *several]
 
 
 _GROUPS: dict[Groups, str] = {

@@ -86,7 +86,9 @@ struct LocalRows {
     ends: Vec<(usize, usize)>,
     others: Vec<(usize, f64)>,
     partials: Vec<(usize, f64)>,
+    /// Room for the coefficients and the partials of one equation.
     coefficients: Vec<(usize, f64)>,
+    scratch: Vec<(usize, f64)>,
 }
 
 /// A problem at given values with additional parameters.
@@ -113,17 +115,10 @@ impl LocalRows {
         first: usize,
         width: usize,
     ) {
-        let from = self.partials.len();
-        let equation = Equation { of, sd, coefficients: &self.coefficients };
-        to.parameters.partials(&equation, &mut self.partials);
-        let mut kept = from;
-        for k in from..self.partials.len() {
-            if self.partials[k].1 != 0.0 {
-                self.partials[kept] = self.partials[k];
-                kept += 1;
-            }
-        }
-        self.partials.truncate(kept);
+        let Self { partials, scratch, coefficients, .. } = self;
+        scratch.clear();
+        to.parameters.partials(&Equation { of, sd, coefficients }, scratch);
+        partials.extend(scratch.iter().filter(|own| own.1 != 0.0));
         let mut own = vec![0.0; width];
         for &(unknown, value) in self.coefficients.iter().filter(|own| !to.fixed[own.0]) {
             match unknown.checked_sub(first) {

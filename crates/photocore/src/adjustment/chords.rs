@@ -1,8 +1,8 @@
-//! Chords one after the other with one factor, each corrected by those before: where full steps swing or creep, near the end.
+//! Chains of chord steps with one factor and Anderson acceleration, for full steps that oscillate or creep near the solution.
 //!
-//! With the factor N = L L^T of the last normal equations a chord from any values is p = N^-1 A^T l, A and l formed there: it is found from
-//! y = L^-1 A^T l, and y^T y' is p^T N p'. What chords have shown ([`super::secants`]) therefore costs no pass over the observations. They fall
-//! slowly because of what all of them leave out, and not because the factor is that of other values: a new one would not help.
+//! N = L L^T is the factor of the last normal equations. A chord at any values is p = N^-1 A^T l, with A and l formed there. It is
+//! computed from y = L^-1 A^T l, and y^T y' equals p^T N p'. Acceleration ([`super::secants`]) therefore needs no pass over the
+//! observations. Slow convergence is due to the neglected second derivatives; a new factor would not improve it.
 
 use std::time::Instant;
 
@@ -16,16 +16,15 @@ use super::run::{Run, State, between};
 use super::secants::Secants;
 use crate::normals::{Chord, dot};
 
-/// Steps that change the unknowns by less than this multiple of their standard deviations leave the normal equations as they are; from farther
-/// away chords lead higher.
+/// Maximum change, in standard deviations, of a step followed by chords; farther from the solution chords raise the sum of squares.
 const CLOSE: f64 = 3.0;
-/// So many chords follow a step at the most, and are remembered;
+/// Maximum number of chords after a step, and of stored differences.
 const MOST: usize = 40;
-/// so many leave this part of the first of them at the most: else normal equations of other values do better.
+/// Number of chords, and the ratio that their lengths must fall below; otherwise new normal equations are more effective.
 const LONG: usize = 10;
 const FALL: f64 = 0.5;
 
-/// A link of the chain: values with the chord from there.
+/// Values with the chord from them.
 struct Link {
     values: Vec<f64>,
     sum_of_squares: f64,
@@ -33,7 +32,7 @@ struct Link {
 }
 
 impl<'a> Run<'a, '_> {
-    /// Whether a full step is followed by chords until these have led to the solution.
+    /// Whether a full step is followed by chords until convergence.
     pub(super) fn is_followed(&self, state: &State<'a>, step: &Iteration) -> bool {
         step.damping == 0.0
             && step.largest_change < CLOSE
@@ -42,7 +41,7 @@ impl<'a> Run<'a, '_> {
             && state.linearized.factor.has_cached()
     }
 
-    /// The values that chords lead to from those after a step.
+    /// Returns the values after chords from given values.
     pub(super) fn chords(
         &mut self,
         state: &State<'a>,
@@ -54,8 +53,8 @@ impl<'a> Run<'a, '_> {
         Ok(found.map_or(values, |(values, _)| values))
     }
 
-    /// The lowest values that chords lead to, the first of them from those given, and the length of the chord there; None where the first
-    /// would begin higher than `best`.
+    /// Returns the best values of a chain of chords and the length of the chord there. None if the sum of squares at the given values is
+    /// above `best`.
     fn followed(
         &mut self,
         state: &State<'a>,
@@ -73,7 +72,7 @@ impl<'a> Run<'a, '_> {
         while lengths.len() < MOST && falls(&lengths) && !is_enough(stop, &here) {
             let taken = here.corrected(&secants, &differences);
             let next = self.link(state, self.problem.advanced(&here.values, &taken))?;
-            // What a chord learns may lead higher before it leads lower: by no more than the last was to lower.
+            // An accelerated chord may temporarily raise the sum of squares, by no more than the last predicted decrease.
             if next.is_higher_than(lowest + here.chord.decrease) {
                 break;
             }
@@ -89,14 +88,14 @@ impl<'a> Run<'a, '_> {
         Ok(Some(end))
     }
 
-    /// The chord from given values, with the sum of squares there.
+    /// Computes the chord and the sum of squares at given values.
     fn link(&mut self, state: &State<'a>, values: Vec<f64>) -> Result<Link, AdjustError> {
         let (equations, chord) = self.chord_at(state, &values)?;
         let sum_of_squares = self.objective_at(&values, equations.at());
         Ok(Link { values, sum_of_squares, chord })
     }
 
-    /// The equations at given values, and the chord to them.
+    /// Forms the equations at given values and computes their chord.
     pub(super) fn chord_at(
         &mut self,
         state: &State<'a>,
@@ -113,12 +112,12 @@ impl<'a> Run<'a, '_> {
 }
 
 impl Link {
-    /// The length of the chord in standard deviations.
+    /// Length of the chord in standard deviations.
     fn change(&self) -> f64 {
         self.chord.decrease.sqrt()
     }
 
-    /// Corrected by what those before have shown: by how much y was another after each.
+    /// Returns the chord after Anderson acceleration with the stored steps and differences of y.
     fn corrected(&self, secants: &Secants, differences: &[Vec<f64>]) -> Vec<f64> {
         if !secants.correct() {
             return self.chord.step.clone();
@@ -129,8 +128,7 @@ impl Link {
         shares.map_or_else(|| self.chord.step.clone(), |shares| secants.corrected(&self.chord.step, &shares))
     }
 
-    /// Whether it begins higher than a sum of squares, rounding apart, which is more than the square of a chord that is negligible; also
-    /// where something is not a number.
+    /// Whether the sum of squares exceeds a limit, apart from rounding errors and negligible chords, or is not finite.
     fn is_higher_than(&self, sum_of_squares: f64) -> bool {
         let highest = sum_of_squares * (1.0 + ROUNDING);
         !(self.sum_of_squares <= highest || self.change() <= NEGLIGIBLE && self.sum_of_squares.is_finite())
@@ -138,18 +136,18 @@ impl Link {
     }
 }
 
-/// Whether full steps would end where a chord is as short.
+/// Whether the chord satisfies the stopping rule of full steps.
 fn is_enough(stop: Stop, link: &Link) -> bool {
     stop.at_change(link.change()) || stop.at_decrease(link.chord.decrease, link.sum_of_squares)
 }
 
-/// Whether chords of these lengths go on to fall.
+/// Whether the chord lengths are still decreasing.
 fn falls(lengths: &[f64]) -> bool {
     let before = lengths.len().checked_sub(LONG + 1).map(|first| lengths[first]);
     before.is_none_or(|before| lengths[lengths.len() - 1] < FALL * before)
 }
 
-/// How far some numbers are from others.
+/// Returns the elementwise difference.
 fn minus(to: &[f64], from: &[f64]) -> Vec<f64> {
     to.iter().zip(from).map(|(to, from)| to - from).collect()
 }

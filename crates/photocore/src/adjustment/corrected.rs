@@ -1,12 +1,11 @@
-//! Full steps where they fall slowly, or lead higher: corrected by those before them, or shortened.
+//! Acceleration or shortening of full steps that converge slowly or raise the sum of squares.
 //!
-//! A second step with the same factor: the chord method (Kelley 1995, "Iterative Methods for Linear and Nonlinear Equations", chapter 5).
+//! Chord method: a second step with the same factor (Kelley 1995, "Iterative Methods for Linear and Nonlinear Equations", chapter 5).
 //!
-//! Gauss-Newton steps leave out the second derivatives of the observations times their residuals. Where unknowns are determined well this is
-//! nothing, and steps fall quadratically; where photos share cameras that are calibrated, combinations of these with attitudes, positions and
-//! heights are determined weakly, and steps fall at last by a constant factor, 30 to 50 in practice. A chord step from the values reached,
-//! N_k^-1 A^T l with A and l formed there, falls by as much as the next full step would: it needs no normal matrix but those of the local
-//! blocks, and no new factor.
+//! Gauss-Newton steps neglect second derivatives times residuals. For well-determined unknowns this term is irrelevant, and convergence is
+//! quadratic. If photos share self-calibrated cameras, some combinations of camera parameters, poses and heights are determined weakly.
+//! Convergence is then linear, with a factor of 30 to 50 in practice. A chord N_k^-1 A^T l, with A and l formed at the new values,
+//! converges as fast as the next full step. It only needs normal matrices of the local blocks, but not a new factor.
 
 use std::time::Instant;
 
@@ -14,19 +13,19 @@ use super::options::{History, Iteration, NEGLIGIBLE};
 use super::result::AdjustError;
 use super::run::{Run, State};
 
-/// Steps that fall to no less than this part of the one before are corrected, and so are all after them.
+/// Minimum ratio of two successive step lengths for acceleration, which continues for all later steps.
 const SLOW: f64 = 0.5;
-/// So many differences are remembered.
+/// Maximum number of stored differences.
 const MOST: usize = 6;
-/// Parts of a step that leads higher, at the least and at the most,
+/// Minimum and maximum fraction of a step that raises the sum of squares,
 const LEAST: f64 = 0.05;
 const LARGEST: f64 = 0.5;
-/// and how many are tried.
+/// and maximum number of tested fractions.
 const PARTS: usize = 3;
 
 impl<'a> Run<'a, '_> {
-    /// The step in the place of a full one where steps fall slowly, or where that leads higher, and what it is by then as an iteration; None
-    /// where the step stays, and of damped ones. Where chords follow it, they are corrected instead.
+    /// Returns an accelerated or shortened step with its iteration record, if the full step converges slowly or raises the sum of squares.
+    /// None if the step is unchanged or damped. Steps followed by chords are not accelerated.
     pub(super) fn corrected(
         &mut self,
         state: &State<'a>,
@@ -61,17 +60,17 @@ impl<'a> Run<'a, '_> {
         }
     }
 
-    /// Whether a step is hardly shorter than the one before.
+    /// Whether a step is hardly shorter than its predecessor.
     pub(super) fn is_slow(&self, step: &Iteration) -> bool {
         self.iterations.last().is_some_and(|former| step.largest_change >= SLOW * former.largest_change)
     }
 
-    /// The sum of squares that a step leads to.
+    /// Returns the sum of squares after a step.
     fn reached(&self, state: &State<'a>, step: &[f64]) -> f64 {
         self.objective(&self.problem.advanced(state.values(), step))
     }
 
-    /// The step that has learnt from those before.
+    /// Returns the step after Anderson acceleration.
     fn learnt(
         &self,
         state: &State<'a>,
@@ -86,8 +85,8 @@ impl<'a> Run<'a, '_> {
         Some((own, Iteration { largest_change, ..*iteration }))
     }
 
-    /// The part of a step that leads lowest on the parabola through what is known of the sum of squares along it, if that is lower. A damping
-    /// instead would hold what the step is to move: what is determined weakly.
+    /// Returns the fraction of a step with the lowest sum of squares on a fitted parabola, if that is an improvement. Damping would
+    /// suppress the weakly determined combinations that the step must change.
     fn shortened(
         &self,
         state: &State<'a>,
@@ -115,7 +114,7 @@ impl<'a> Run<'a, '_> {
 }
 
 impl<'a> Run<'a, '_> {
-    /// The values after a step, and after a chord from there where that pays.
+    /// Returns the values after a step, including a chord if that is useful.
     pub(super) fn stepped(
         &mut self,
         state: &State<'a>,
@@ -144,7 +143,7 @@ impl<'a> Run<'a, '_> {
             && self.history().is_for_chord(step.largest_change)
     }
 
-    /// What the steps so far say of the next.
+    /// Returns the history of the steps so far.
     pub(super) fn history(&self) -> History<'_> {
         let unknowns = self.problem.layout().unknowns();
         History { iterations: &self.iterations, chord: self.chord, unknowns }

@@ -1,4 +1,4 @@
-//! Full steps: with step control, damped where they fail, or whatever becomes of the sum of squares, as published programs took them.
+//! Full steps: with step control and damping after failures, or uncontrolled as in published programs.
 
 use std::ops::ControlFlow;
 
@@ -6,49 +6,46 @@ use super::options::{self, Iteration, NEGLIGIBLE, Published, Status, Stop};
 use super::result::AdjustError;
 use super::run::{End, NEAR, Run, State};
 
-/// A step is accepted when the sum of squares does not rise by more than its own rounding error.
+/// Relative increase of the sum of squares that is accepted as rounding error.
 pub(super) const ROUNDING: f64 = 1e-12;
-/// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
-/// hundredth of a standard deviation of the combination of unknowns that they follow.
+/// Maximum decrease of the sum of squares by three damped steps that counts as stagnation, as a multiple of the variance of unit weight. It
+/// corresponds to 0.01 standard deviations of a combination of unknowns.
 const STILL: f64 = 1e-4;
-/// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
-/// unknowns are better computed afresh than linearized.
+/// Minimum mean change, in standard deviations, for a recomputation of local unknowns instead of their linearization.
 const FAR: f64 = 30.0;
-/// First damping after a step that failed; it falls by ten after a success, and below [`LEAST_DAMPING`] to zero.
+/// Damping after the first failure; it is divided by ten after a success, and set to zero below [`LEAST_DAMPING`].
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-5;
-/// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
+/// Maximum damping: the step is parallel to the gradient and must lower the sum of squares if any step does.
 const MOST_DAMPING: f64 = 1e9;
-/// One group of so many may touch blocks that the layout does not have on the way.
+/// Reciprocal of the fraction of groups that may leave the layout before convergence.
 const FEW: usize = 20;
-/// None may any more after a step that changes no unknown by more than this multiple of its standard deviation: what is left out is found before
-/// the last steps, not after them.
+/// Maximum change, in standard deviations, after which groups must not leave the layout: missing columns are detected before the last
+/// steps.
 const SETTLED: f64 = 0.1;
 
-/// A full step that changes no unknown by more than this multiple of its standard deviation, and fails, follows a combination that is
-/// so weakly determined that the others bend off the straight line on the way: it is followed along the curve (see
-/// [`Run::along_valley`]).
+/// Maximum change, in standard deviations, of a failed full step that is followed along a valley. Its combination is determined so weakly
+/// that the other unknowns change nonlinearly along it (see [`Run::along_valley`]).
 const VALLEY: f64 = 30.0;
-/// Parts of such a step that are taken in turn, each half of the one before,
+/// Number of fractions of such a step, each half of its predecessor.
 const PARTS: usize = 4;
-/// and how many steps are taken so in one adjustment at the most: a valley that goes on and on is for the names of its unknowns.
+/// Maximum number of valley steps in an adjustment; afterwards the unknowns of the valley are reported.
 const MOST_ALONG: usize = 8;
-/// Damping of the steps that lead back to the floor of a valley: it holds what is weak, and lets all else go.
+/// Damping of the steps back to the floor of a valley: it restrains only weakly determined combinations.
 const HOLDING: f64 = 1e-6;
-/// How many of these steps there are at the most, at each part.
+/// Maximum number of these steps per fraction.
 const BACK: usize = 3;
-/// A part of a step is good when it lowers the sum of squares by this fraction of what the linearized equations predict: where they predict
-/// badly, the combination is determined so weakly that its standard deviation is no measure of a step.
+/// Minimum ratio of actual to predicted decrease for an accepted fraction of a step. With a poor prediction, the standard deviation of the
+/// combination is not a measure of the step.
 const GAIN: f64 = 0.5;
 
-/// So many full steps may fail; after more the steps are controlled by how well they are predicted, as in a trust region: full steps do not
-/// lead there, since what the linearized equations leave out, residuals times second derivatives, is larger than what they have of a
-/// combination of unknowns, and damping that is taken away each time makes them creep.
+/// Maximum number of failed full steps; after more failures, a trust region controls the steps. Full steps then do not converge: the
+/// neglected term, residuals times second derivatives, dominates a combination of unknowns. Repeated damping only makes them creep.
 const MOST_FAILURES: usize = 4;
-/// A full step from where a trust region has ended that changes no unknown by more than this multiple of its standard deviation.
+/// Maximum change, in standard deviations, of a full step that confirms convergence of a trust region.
 const SHORT: f64 = 1e-2;
 
-/// The constants of these rules by name, for whoever controls the steps of a problem in parts (see [`super::Linearized::of_part`]).
+/// Returns the constants of the step control by name, for partitioned problems (see [`super::Linearized::of_part`]).
 pub fn step_rules() -> [(&'static str, f64); 8] {
     [
         ("rounding", ROUNDING),
@@ -62,39 +59,39 @@ pub fn step_rules() -> [(&'static str, f64); 8] {
     ]
 }
 
-/// What the control of the steps remembers from one to the next.
+/// State of the step control between steps.
 struct Control {
     stop: Stop,
-    /// The lowest sum of squares.
+    /// Lowest sum of squares.
     best: f64,
-    /// What it was when a full step failed last, and the unknowns that this has moved most.
+    /// Sum of squares at the last failure of a full step, and the unknowns that the step moved most.
     refused: Option<(f64, Vec<usize>)>,
-    /// Whether that was a step along a valley.
+    /// Whether the failed step followed a valley.
     in_valley: bool,
-    /// How many have been taken along one.
+    /// Number of valley steps.
     along: usize,
-    /// How many full steps have failed.
+    /// Number of failed full steps.
     failures: usize,
 }
 
-/// The damping after a step that failed.
+/// Returns the damping after a failed step.
 fn harder(damping: f64) -> f64 {
     (10.0 * damping).max(FIRST_DAMPING)
 }
 
-/// The damping after a step that did not.
+/// Returns the damping after a successful step.
 fn relaxed(damping: f64) -> f64 {
     if damping / 10.0 < LEAST_DAMPING { 0.0 } else { damping / 10.0 }
 }
 
-/// The next values, or the end.
+/// Next linearization, or the end of the iterations.
 type Next<'a> = Result<ControlFlow<End<'a>, State<'a>>, AdjustError>;
 
 impl<'a> Run<'a, '_> {
-    /// Gauss-Newton with step control.
+    /// Iterates with damped Gauss-Newton steps.
     ///
-    /// With dx the step and N the normal matrix, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz), and dx^T N dx is the predicted
-    /// decrease of the sum of squares: its root bounds every correction in standard deviations, without an inverse.
+    /// For the step dx and normal matrix N, dx_i^2 <= q_ii dx^T N dx (Cauchy-Schwarz). The predicted decrease of the sum of squares is dx^T
+    /// N dx. Its root bounds every correction in standard deviations, without an inverse.
     pub(super) fn damped_steps(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut control = Control {
@@ -122,8 +119,8 @@ impl<'a> Run<'a, '_> {
         self.stay(state, status)
     }
 
-    /// Whether a full step leads to where groups touch other blocks than the layout has: more than a few groups, or any once steps are short. What
-    /// is left out of their equations would lead chords, and the last steps, elsewhere.
+    /// Whether a full step makes too many groups leave the layout: more than a fraction, or any after a short step. Missing columns would
+    /// disturb chords and last steps.
     fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
         let short = followed || step.largest_change <= SETTLED;
         let most = if short { 0 } else { self.problem.layout().groups() / FEW };
@@ -132,7 +129,7 @@ impl<'a> Run<'a, '_> {
             && self.threads.install(|| self.problem.model.outgrown(values)) > most
     }
 
-    /// Takes a step to where groups touch other blocks than the layout has, unless it leads higher: whether it was taken.
+    /// Applies a step that leaves the layout if it does not raise the sum of squares; returns whether it was applied.
     fn leaves_layout(
         &mut self,
         iteration: Iteration,
@@ -148,7 +145,7 @@ impl<'a> Run<'a, '_> {
         Ok(lower)
     }
 
-    /// Solves, and takes the step or ends with it.
+    /// Solves, and applies the step or ends with it.
     fn step_from(&mut self, state: State<'a>, control: &mut Control) -> Next<'a> {
         let damping = state.linearized.damping();
         let Some(step) = self.step(&state)? else {
@@ -173,7 +170,7 @@ impl<'a> Run<'a, '_> {
         self.take(iteration, state, &step, control)
     }
 
-    /// Takes a step, unless it fails.
+    /// Applies a step unless it fails.
     fn take(
         &mut self,
         iteration: Iteration,
@@ -205,7 +202,7 @@ impl<'a> Run<'a, '_> {
         let next = self.form(trial, relaxed(damping))?;
         let negligible = damping == 0.0 && change <= NEGLIGIBLE;
         let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };
-        // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
+        // A NaN sum of squares or a newly deficient local block is also a failure.
         let sum = next.linearized.sum_of_squares;
         if !(sum <= highest && next.linearized.factor.deficient_locals.is_empty()) {
             next.recycle();
@@ -214,7 +211,7 @@ impl<'a> Run<'a, '_> {
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
         self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, next.reached())?;
         if damping > 0.0 {
-            // What harms all others makes full steps fail.
+            // Ill-conditioned local blocks make full steps fail.
             return Ok(match self.has_collapsed(&unknowns, next.equations.at()) {
                 true => ControlFlow::Break(End::at(Status::NotConverged, next.recycle())),
                 false => ControlFlow::Continue(next),
@@ -229,8 +226,8 @@ impl<'a> Run<'a, '_> {
         Ok(ControlFlow::Continue(next))
     }
 
-    /// Goes on after a step that has failed, and the unknowns that it moves most: along a valley where full steps have led here, which says that the
-    /// linearized equations are worth following; with more damping otherwise. A step that the bends of a loss make fail follows no valley.
+    /// Continues after a failed step: along a valley if previous full steps succeeded, otherwise with more damping. Valley steps are not
+    /// used with a loss, whose kinks also make steps fail. `moved` contains the unknowns that the step moves most.
     fn failed(
         &mut self,
         iteration: Iteration,
@@ -261,8 +258,8 @@ impl<'a> Run<'a, '_> {
         self.refuse(unknowns, damping, control, moved)
     }
 
-    /// Goes on from the same values with more damping; or ends there, where the sum of squares has stood still although full steps,
-    /// which move the unknowns `moved` most, have failed.
+    /// Continues from the same values with more damping. Ends there if the sum of squares has stagnated although full steps, which move the
+    /// unknowns `moved` most, have failed.
     fn refuse(
         &mut self,
         unknowns: Vec<f64>,
@@ -282,8 +279,8 @@ impl<'a> Run<'a, '_> {
         self.form(unknowns, harder(damping)).map(ControlFlow::Continue)
     }
 
-    /// Goes on in a trust region, to its end. It has converged where a full step from there is short, which damping may hide, or where the
-    /// sum of squares has crept to rest along a combination that is named.
+    /// Continues in a trust region to its end. It has converged if a full step from there is short, or if the sum of squares stagnates
+    /// along a reported combination.
     fn handed_over(&mut self, unknowns: Vec<f64>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let state = self.form(unknowns, options::FIRST_DAMPING)?;
         let end = self.in_trust_region(state, stop)?;
@@ -302,17 +299,17 @@ impl<'a> Run<'a, '_> {
         Ok(if rests { end } else { End { status: Status::NotConverged, ..end } })
     }
 
-    /// Whether a full step is the last one, by its length or by those that would follow.
+    /// Whether a full step is the last one, by its length or by the predicted lengths of further steps.
     fn is_last(&self, stop: Stop, change: f64) -> bool {
         stop.at_change(change)
             || matches!(stop, Stop::Fraction(fraction) if self.leaves_less_than(fraction, change))
     }
 
-    /// Whether the next step after a full one would be negligible, by the sum of squares that this one leads to.
+    /// Whether the step after a full step would be negligible, judged by the sum of squares after the full step.
     fn is_foreseen(&self, control: &Control, state: &State<'a>, step: &[f64]) -> bool {
         let Stop::Foreseen(limit) = control.stop else { return false };
         let foreseen = control.best - state.linearized.change().powi(2);
-        // A smaller difference than this one is rounding.
+        // A smaller difference is a rounding error.
         if limit.powi(2) <= ROUNDING * control.best {
             return false;
         }
@@ -320,26 +317,26 @@ impl<'a> Run<'a, '_> {
         (reached - foreseen).abs() <= limit.powi(2)
     }
 
-    /// Whether the sum of squares has stood still between two full steps that failed, `refused` at the first and `sum` at the second:
-    /// what it still falls by, damped, no unknown is determined well enough to show.
+    /// Whether the sum of squares stagnated between two failed full steps, `refused` at the first and `sum` at the second. Further damped
+    /// steps would not change any unknown significantly.
     fn stands_still(&self, refused: &mut Option<(f64, Vec<usize>)>, sum: f64, moved: Vec<usize>) -> bool {
         let still = self.is_still(refused, sum);
         *refused = Some((sum, moved));
         still
     }
 
-    /// Whether the sum of squares has fallen by next to nothing since a full step failed.
+    /// Whether the sum of squares has hardly decreased since the last failed full step.
     fn is_still(&self, refused: &Option<(f64, Vec<usize>)>, sum: f64) -> bool {
         let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
         let least = STILL * (sum / freedom).max(1.0);
         refused.as_ref().is_some_and(|(before, _)| before - sum <= least)
     }
 
-    /// Follows a full step that has failed along the valley of the combination that it moves: a part of it, then back to the floor by
-    /// steps so damped that they hold the combination. The values reached and the sum of squares there; None where no part is good.
+    /// Follows a failed full step along a valley: a fraction of the step, then steps back to the floor with a damping that preserves the
+    /// combination. Returns the values and the sum of squares there; None if all fractions fail.
     ///
-    /// Principal distance and flying height of a flat block make such a valley: a change that no image shows, as long as points and
-    /// attitudes follow it, and they follow a curve. A step back damped at random crosses the valley to and fro, and creeps.
+    /// Example: principal distance and flying height of a flat block. Their change leaves the residuals unchanged if points and attitudes
+    /// follow it along a curve. Steps with arbitrary damping would cross the valley repeatedly and creep.
     fn along_valley(
         &mut self,
         unknowns: &[f64],
@@ -370,13 +367,13 @@ impl<'a> Run<'a, '_> {
         Ok(None)
     }
 
-    /// Whether all further steps together would not exceed a limit; secants say nothing of a rate.
+    /// Whether the sum of all further steps is within a limit; unknown for accelerated steps.
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
         let learns = self.secants.correct() || self.problem.model.steps_swing() && self.chord.is_some();
         !learns && self.history().leaves_less_than(limit, change)
     }
 
-    /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
+    /// Recomputes the local unknowns if that lowers the sum of squares.
     fn relocated(&self, unknowns: Vec<f64>) -> Vec<f64> {
         let mut other = unknowns.clone();
         let relocated = self.threads.install(|| self.problem.model.relocate(&mut other));
@@ -384,7 +381,7 @@ impl<'a> Run<'a, '_> {
         if lower { other } else { unknowns }
     }
 
-    /// Takes the last step and ends there.
+    /// Applies the last step and ends there.
     fn stay_after(
         &mut self,
         last: Iteration,
@@ -401,7 +398,7 @@ impl<'a> Run<'a, '_> {
 }
 
 impl<'a> Run<'a, '_> {
-    /// Full steps, whatever becomes of the sum of squares.
+    /// Iterates with full steps, without control of the sum of squares.
     pub(super) fn full_steps(&mut self, start: State<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut previous: Option<f64> = None;

@@ -1,16 +1,15 @@
-//! Datums of free networks: solution and cofactors taken from one to another without adjusting again (S-transformation, Baarda 1973,
-//! "S-transformations and criterion matrices").
+//! Datums of free networks: transformation of solution and cofactors to another datum without a new adjustment (S-transformation, Baarda
+//! 1973, "S-transformations and criterion matrices").
 //!
-//! Where observations leave d degrees of freedom of a network open (its position, its orientation, its scale), the columns of G, the
-//! *null vectors*, say how the unknowns move along them: A G = 0 (see [`Motions`]). A datum is a choice of d conditions; here
-//! B^T (x - x_0) = 0, B being G in the rows of the unknowns that carry the datum and zero elsewhere: these unknowns move least (inner
-//! constraints over all of them, Meissl 1969), their rows of B being multiplied by the squares of their factors. The network is moved
-//! there as a whole, exactly; with Q in any datum there,
+//! If the observations leave d degrees of freedom (position, orientation, scale), the columns of G are the *null vectors*: A G = 0 (see
+//! [`Motions`]). A datum is a set of d conditions B^T (x - x_0) = 0. B has the rows of G for the unknowns that carry the datum, times their
+//! squared factors, and zeros elsewhere. Changes of these carriers are minimal (inner constraints if all unknowns are carriers, Meissl
+//! 1969). The network is transformed exactly, as a whole. From the cofactors Q in any datum at these values,
 //!
-//! S = I - G (B^T G)^-1 B^T,    Q_S = S Q S^T,
+//! S = I - G (B^T G)^-1 B^T,    Q_S = S Q S^T.
 //!
-//! and with T = G (B^T G)^-1 and W = Q B, which takes d further right-hand sides, a block of it is
-//! Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T. Redundancy numbers and residuals are the same in every datum.
+//! W = Q B requires d additional right-hand sides. With T = G (B^T G)^-1, a block of Q_S is Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W)
+//! T_j^T. Redundancy numbers and residuals are the same in every datum.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -23,86 +22,84 @@ use super::result::AdjustError;
 use super::transformation::Transformation;
 use crate::Threads;
 
-/// A datum of a network whose observations leave one open.
+/// Datum of a free network.
 #[derive(Debug, Clone, Default)]
 pub struct Datum {
-    /// The unknowns that carry it, each with the factor that makes its changes comparable with those of the others: units of length in
-    /// one of its own.
+    /// Unknowns that carry the datum, each with a scale factor that converts its changes to a common unit of length.
     pub carriers: Vec<(usize, f64)>,
-    /// Those of the model's motions that stay with the unknowns that are held: their numbers. A network keeps its scale so.
+    /// Indices of motions that remain defined by the constrained unknowns, such as the scale of a network.
     pub left: Vec<usize>,
-    /// Whether the other motions are taken, all of them, whether or not the observations leave them open: cofactors are then those of
-    /// the unknowns relative to the carriers.
+    /// Whether all other motions are transformed, even those that the observations define. Cofactors are then relative to the carriers.
     pub relative: bool,
 }
 
 impl Datum {
-    /// A vector over all unknowns in the rows of the carriers, times their factors.
+    /// Returns the elements of a vector over all unknowns at the carriers, times their factors.
     fn of_carriers<'a>(&'a self, vector: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         self.carriers.iter().map(|&(carrier, factor)| factor * vector[carrier])
     }
 }
 
-/// Why an adjusted network cannot be taken to a datum.
+/// Error of a transformation to a datum.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum DatumError {
-    /// Observations and weights leave nothing open: there is one datum only, that which they give.
+    /// Observations and weights define a unique datum.
     #[error("the network is not free: its observations and weights give its datum")]
     NotFree,
-    /// The adjustment ended where unknowns are not determined.
+    /// The adjustment ended with undetermined unknowns.
     #[error("the adjusted network has no cofactors")]
     NoCofactors,
-    /// The carriers do not tell all motions apart: too few, on one line, in one place.
+    /// The carriers do not separate all motions: they are too few, collinear or coincident.
     #[error("what is to carry the datum does not determine it")]
     NotCarried,
-    /// What ends adjustments.
+    /// Error of the adjustment.
     #[error(transparent)]
     Adjust(#[from] AdjustError),
 }
 
-/// Null vectors that the carriers tell apart by less than this share are not carried.
+/// Minimum eigenvalue of the scaled normal matrix of the carriers, for separable null vectors.
 const SEPARABLE: f64 = 1e-10;
-/// The network is moved until so many moves have left the carriers no nearer than any before: rounding then.
+/// Maximum number of transformations without approach of the carriers; later changes are rounding errors.
 const STALLS: usize = 3;
-/// Moves converge quadratically where carriers come near to their places; where these contradict what they are to each other, by a few
-/// per cent each.
+/// Maximum number of transformations. They converge quadratically if carriers approach their references, otherwise linearly, by a few per
+/// cent each.
 const MOST_MOVES: usize = 1000;
 
-/// Where an adjustment has ended.
+/// Result of an adjustment, as input of a datum transformation.
 #[derive(Debug, Clone, Copy)]
 pub struct Adjusted<'a> {
     /// The adjusted unknowns.
     pub unknowns: &'a [f64],
-    /// Those held for a datum.
+    /// Unknowns constrained for a datum.
     pub held: &'a [usize],
-    /// What has weighted the observations.
+    /// Robust loss of the observations.
     pub loss: Option<Loss>,
 }
 
-/// The datum that an adjustment is to end in, and the values from which its carriers move least.
+/// Requested datum of an adjustment, and the values from which its carriers move least.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Target<'a> {
     pub datum: &'a Datum,
     pub reference: &'a [f64],
 }
 
-/// What a network that is adjusted in parts is taken to a datum by: columns over all unknowns, one after the other.
+/// Matrices for the datum transformation of a partitioned network: columns over all unknowns, one after the other.
 #[derive(Debug)]
 pub struct DatumColumns {
-    /// B.
+    /// The matrix B.
     pub b: Vec<f64>,
     /// T = G (B^T G)^-1.
     pub t: Vec<f64>,
-    /// Of B^T G, its columns scaled.
+    /// Condition of B^T G with scaled columns.
     pub condition: f64,
-    /// Whether there are no more carriers than columns: they do not move in this datum.
+    /// Whether the number of carriers equals the number of columns: they are then fixed by the datum.
     pub exact: bool,
 }
 
-/// Moves a network to a datum, as it is adjusted, with what takes its cofactors there.
+/// Transforms an adjusted network to a datum; also returns the matrices for its cofactors.
 ///
 /// # Errors
-/// A network that is not free, carriers that do not carry all null vectors.
+/// The network is not free, or the carriers do not separate all null vectors.
 pub fn moved_with_columns(
     problem: &AnyProblem<'_>,
     adjusted: Adjusted<'_>,
@@ -114,21 +111,21 @@ pub fn moved_with_columns(
     Ok((unknowns, basis.columns()))
 }
 
-/// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
+/// Rows of B for the carriers, and T = G (B^T G)^-1, with columns such that B without the factors is orthonormal.
 #[derive(Debug)]
 pub(super) struct Basis {
     carriers: Vec<usize>,
     b: Mat<f64>,
-    /// A row for each unknown, one after the other.
+    /// One row per unknown.
     t: Vec<f64>,
-    /// How many columns there are.
+    /// Number of columns.
     d: usize,
-    /// Of B^T G, its columns scaled.
+    /// Condition of B^T G with scaled columns.
     condition: f64,
 }
 
 impl Basis {
-    /// Both over all unknowns.
+    /// Returns both matrices over all unknowns.
     fn columns(self) -> DatumColumns {
         let Self { carriers, b: of_carriers, t, d, condition } = self;
         let (count, mut b) = (t.len() / d.max(1), vec![0.0; t.len()]);
@@ -139,8 +136,8 @@ impl Basis {
         DatumColumns { b, t, condition, exact: carriers.len() == d }
     }
 
-    /// The right-hand sides B, over all unknowns, one after the other. Held unknowns stand in the normal equations with unit weight: their
-    /// columns of Q are zero.
+    /// Returns the right-hand sides B over all unknowns, one after the other. They are zero for constrained and fixed unknowns, whose
+    /// normal equations have unit weight.
     pub fn rights(&self, problem: &AnyProblem<'_>, held: &[usize]) -> Vec<f64> {
         let (count, mut rights) = (problem.layout().unknowns(), vec![0.0; self.t.len()]);
         let free = |unknown: usize| !held.contains(&unknown) && problem.sd[unknown] != 0.0;
@@ -151,7 +148,7 @@ impl Basis {
         rights
     }
 
-    /// Takes a step, in whatever datum it is, to this one: S dx = dx - T B^T dx.
+    /// Transforms a step of any datum to this one: S dx = dx - T B^T dx.
     pub fn take(&self, step: &mut [f64]) {
         let mut along = vec![0.0; self.d];
         for (row, &carrier) in self.carriers.iter().enumerate() {
@@ -162,7 +159,7 @@ impl Basis {
         }
     }
 
-    /// The transformation, with the columns of W = Q B, one after the other.
+    /// Returns the transformation, from the columns of W = Q B, one after the other.
     pub fn transformation(self, columns: &[f64]) -> Transformation {
         let Self { carriers, b, t, d, condition } = self;
         let count = t.len() / d.max(1);
@@ -177,9 +174,9 @@ impl Basis {
     }
 }
 
-/// Moves a network as a whole to where its carriers are as near to their references as they come.
+/// Transforms a network as a whole so that its carriers are as near to their references as possible.
 ///
-/// Gauss and Newton's method for least squares of the distances, with exact motions.
+/// Uses the Gauss-Newton method for the sum of squared distances, with exact motions.
 pub(super) fn moved(
     problem: &AnyProblem<'_>,
     adjusted: Adjusted<'_>,
@@ -191,7 +188,7 @@ pub(super) fn moved(
     let (mut least, mut stalls) = (f64::INFINITY, 0);
     let square = |&(carrier, factor): &(usize, f64)| (factor * reference[carrier]).powi(2);
     let rounding = f64::EPSILON * datum.carriers.iter().map(square).sum::<f64>().sqrt();
-    // What was found to leave all motions open leaves them open wherever it is moved to.
+    // If all motions are free at first, they remain free at all transformed values.
     let mut all_open = datum.relative;
     for _ in 0..MOST_MOVES {
         let (motions, retained) =
@@ -201,7 +198,7 @@ pub(super) fn moved(
             return Err(DatumError::NotCarried);
         }
         all_open |= adjusted.held.len() == retained.1;
-        // Coefficients of trajectories follow turns exactly at first only: what was held for is open to the end.
+        // Trajectory coefficients follow rotations exactly only at first; constrained motions therefore remain free to the end.
         let were_open = if datum.left.is_empty() { adjusted.held.len() } else { 0 };
         let combinations = match all_open {
             true => None,
@@ -230,7 +227,7 @@ pub(super) fn moved(
     Err(DatumError::NotCarried)
 }
 
-/// The motions that the datum does not leave, their numbers, and how many there are in all.
+/// Returns the motions of the datum, their indices and the total number of motions.
 fn motions_of(
     problem: &AnyProblem<'_>,
     unknowns: &[f64],
@@ -246,26 +243,26 @@ fn motions_of(
     Some((Motions { vectors, preferred }, (retained, all)))
 }
 
-/// How carriers would come nearer to their references.
+/// Least-squares fit of the carriers to their references.
 struct Carried {
-    /// Motions (rows) in each of the open ones (columns): G is that of the motions, times these.
+    /// Motions (rows) in each free combination (columns): G is the matrix of the motions times this one.
     combinations: Mat<f64>,
-    /// F G, the rows of the carriers, F being their factors.
+    /// F G for the carriers, with their factors F.
     rows: Mat<f64>,
-    /// The reciprocal lengths of its columns.
+    /// Reciprocal norms of its columns.
     scale: Vec<f64>,
-    /// The Cholesky factor of its normal matrix, the columns being scaled.
+    /// Cholesky factor of its normal matrix, with scaled columns.
     factor: Mat<f64>,
     condition: f64,
-    /// Of each open combination.
+    /// Amount of each free combination.
     amounts: Mat<f64>,
-    /// By how much they would, in units of length, all taken together.
+    /// Norm of the change of the carriers, in units of length.
     length: f64,
 }
 
 impl Carried {
-    /// The carriers are the step `apart` away from their references. Without combinations all motions are open. None where the carriers do
-    /// not carry all open motions.
+    /// Fits carriers whose step to their references is `apart`. Without combinations all motions are free. None if the carriers do not
+    /// separate all free motions.
     fn new(motions: &Motions, combinations: Option<Mat<f64>>, datum: &Datum, apart: &[f64]) -> Option<Self> {
         let (count, carriers) = (motions.vectors.len(), &datum.carriers);
         let d = combinations.as_ref().map_or(count, Mat::ncols);
@@ -297,14 +294,14 @@ impl Carried {
         Some(Self { combinations, rows, scale, factor, condition: most / least, amounts, length })
     }
 
-    /// By how much to go along each motion.
+    /// Returns the amount of each motion.
     fn along(&self) -> Vec<f64> {
         let along = product(self.combinations.as_ref(), self.amounts.as_ref());
         along.col(0).iter().copied().collect()
     }
 
-    /// With F G C orthonormal, B^T G C = I for B = F F G C, and T = G C. C comes from two Cholesky factors, the second of what the first
-    /// has left.
+    /// Returns the basis. With F G C orthonormal, B^T G C = I for B = F F G C, and T = G C. C is the product of two inverse Cholesky
+    /// factors; the second removes the rounding errors of the first.
     fn basis(self, motions: &Motions, datum: &Datum) -> Option<Basis> {
         let Self { combinations, rows, scale, factor, condition, .. } = self;
         let d = scale.len();
@@ -334,7 +331,7 @@ impl Carried {
     }
 }
 
-/// A matrix of columns that are filled one by one.
+/// Creates a matrix from its columns.
 fn by_columns<I: Iterator<Item = f64>>(rows: usize, columns: usize, values: impl Fn(usize) -> I) -> Mat<f64> {
     let mut found = Mat::zeros(rows, columns);
     for column in 0..columns {
@@ -343,7 +340,7 @@ fn by_columns<I: Iterator<Item = f64>>(rows: usize, columns: usize, values: impl
     found
 }
 
-/// A product on one thread: the same bits for any number of threads.
+/// Multiplies on one thread, for bitwise identical results with any number of threads.
 fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut found = Mat::zeros(a.nrows(), b.ncols());
     matmul(found.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);

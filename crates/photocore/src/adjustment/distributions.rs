@@ -1,9 +1,9 @@
-//! Tails and quantiles of the distributions that the tests of an adjustment need.
+//! Tail probabilities and quantiles of test distributions.
 //!
-//! Tails come from the incomplete gamma and beta functions of `statrs`; quantiles are bisected on the tail that is asked for,
-//! so that small probabilities keep their digits (chi-square values below 1e-15 count as zero). Upper tails too small for a number
-//! have logarithms, from the continued fractions of the same functions (Abramowitz and Stegun 1964, 6.5.31 and 26.5.8). Arguments
-//! outside a distribution's range give NaN.
+//! Tail probabilities use the incomplete gamma and beta functions of `statrs`. Quantiles are bisected on the requested tail, so that small
+//! probabilities are precise (chi-square values below 1e-15 count as zero). For upper tails below the floating-point range, logarithms are
+//! computed from continued fractions (Abramowitz and Stegun 1964, 6.5.31 and 26.5.8). Arguments outside the range of a distribution give
+//! NaN.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -11,19 +11,19 @@ use statrs::function::beta::{checked_beta_reg, ln_beta};
 use statrs::function::erf::erfc;
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur, ln_gamma};
 
-/// Probabilities above it have all their digits; the logarithm of smaller ones comes from a continued fraction.
+/// Probability above which tails have full precision; logarithms of smaller ones use a continued fraction.
 const SMALL: f64 = 1e-200;
 
-/// On which side of a value a probability lies.
+/// Tail of a distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tail {
-    /// Of values smaller than it.
+    /// Values smaller than the argument.
     Lower,
-    /// Of values larger than it.
+    /// Values larger than the argument.
     Upper,
 }
 
-/// Probability that a chi-square variable of `dof` degrees of freedom lies on the given side of `x`.
+/// Probability that a chi-square variable with `dof` degrees of freedom is in the given tail of `x`.
 pub fn chi_square(x: f64, dof: f64, tail: Tail) -> f64 {
     if !(dof > 0.0 && dof.is_finite() && x >= 0.0) {
         return f64::NAN;
@@ -38,7 +38,7 @@ pub fn chi_square(x: f64, dof: f64, tail: Tail) -> f64 {
     .unwrap_or(f64::NAN)
 }
 
-/// The value beyond which, on the given side, a chi-square variable of `dof` degrees of freedom lies with `probability`.
+/// Returns the quantile of a chi-square variable with `dof` degrees of freedom for a tail of `probability`.
 pub fn chi_square_quantile(probability: f64, dof: f64, tail: Tail) -> f64 {
     if !(dof > 0.0 && dof.is_finite()) {
         return f64::NAN;
@@ -46,9 +46,9 @@ pub fn chi_square_quantile(probability: f64, dof: f64, tail: Tail) -> f64 {
     quantile(probability, tail, |x| chi_square(x, dof, tail))
 }
 
-/// Natural logarithm of the probability that a chi-square variable of `dof` degrees of freedom exceeds `x`.
+/// Natural logarithm of the probability that a chi-square variable with `dof` degrees of freedom exceeds `x`.
 pub fn log_chi_square(x: f64, dof: f64) -> f64 {
-    // Of two degrees of freedom it is exp(-x / 2): most groups that are tested are images.
+    // Closed form exp(-x / 2) for two degrees of freedom: most tested groups are image observations.
     if dof == 2.0 && x >= 0.0 {
         return -0.5 * x;
     }
@@ -62,7 +62,7 @@ pub fn log_chi_square(x: f64, dof: f64) -> f64 {
     a * x.ln() - x - ln_gamma(a) - fraction.ln()
 }
 
-/// Natural logarithm of the probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+/// Natural logarithm of the probability that an F variable with `first` and `second` degrees of freedom exceeds `x`.
 pub fn log_fisher(x: f64, first: f64, second: f64) -> f64 {
     let probability = fisher(x, first, second);
     if probability.is_nan() || probability > SMALL || x.is_infinite() {
@@ -83,7 +83,7 @@ pub fn log_fisher(x: f64, first: f64, second: f64) -> f64 {
     -a * ratio.ln_1p() - b * ratio.recip().ln_1p() - a.ln() - ln_beta(a, b) - fraction.ln()
 }
 
-/// The continued fraction `first + a1 / (b1 + a2 / (b2 + ...))` of the terms `(ak, bk)`, by the method of Lentz.
+/// Evaluates the continued fraction `first + a1 / (b1 + a2 / (b2 + ...))` with terms `(ak, bk)` by the method of Lentz.
 fn continued_fraction(first: f64, term: impl Fn(f64) -> (f64, f64)) -> f64 {
     let nonzero = |value: f64| if value == 0.0 { f64::MIN_POSITIVE } else { value };
     let mut fraction = nonzero(first);
@@ -100,18 +100,18 @@ fn continued_fraction(first: f64, term: impl Fn(f64) -> (f64, f64)) -> f64 {
     fraction
 }
 
-/// Probability that a normal variable lies below `z`.
+/// Probability that a standard normal variable is below `z`.
 pub fn normal(z: f64) -> f64 {
     0.5 * erfc(-z * FRAC_1_SQRT_2)
 }
 
-/// Probability that the absolute value of Student's variable of `dof` degrees of freedom exceeds that of `t`.
+/// Probability that the absolute value of a Student variable with `dof` degrees of freedom exceeds `|t|`.
 pub fn student(t: f64, dof: f64) -> f64 {
-    // t^2 is F(1, dof).
+    // The square of t has the distribution F(1, dof).
     fisher(t * t, 1.0, dof)
 }
 
-/// The value that the absolute value of Student's variable of `dof` degrees of freedom exceeds with `probability`.
+/// Returns the value that the absolute value of a Student variable with `dof` degrees of freedom exceeds with `probability`.
 pub fn student_limit(probability: f64, dof: f64) -> f64 {
     if dof.is_nan() || dof <= 0.0 {
         return f64::NAN;
@@ -119,7 +119,7 @@ pub fn student_limit(probability: f64, dof: f64) -> f64 {
     quantile(probability, Tail::Upper, |t| student(t, dof))
 }
 
-/// Probability that Fisher's variable of `first` and `second` degrees of freedom exceeds `x`.
+/// Probability that an F variable with `first` and `second` degrees of freedom exceeds `x`.
 pub fn fisher(x: f64, first: f64, second: f64) -> f64 {
     if !(first > 0.0 && second > 0.0 && first.is_finite() && second.is_finite() && x >= 0.0) {
         return f64::NAN;
@@ -130,7 +130,7 @@ pub fn fisher(x: f64, first: f64, second: f64) -> f64 {
     checked_beta_reg(second / 2.0, first / 2.0, second / (second + first * x)).unwrap_or(f64::NAN)
 }
 
-/// The value that Fisher's variable of `first` and `second` degrees of freedom exceeds with `probability`.
+/// Returns the value that an F variable with `first` and `second` degrees of freedom exceeds with `probability`.
 pub fn fisher_limit(probability: f64, first: f64, second: f64) -> f64 {
     if !(first > 0.0 && second > 0.0) {
         return f64::NAN;
@@ -138,12 +138,12 @@ pub fn fisher_limit(probability: f64, first: f64, second: f64) -> f64 {
     quantile(probability, Tail::Upper, |x| fisher(x, first, second))
 }
 
-/// Bisects the positive numbers, by their exponents first, for the value whose tail holds the probability.
+/// Bisects the positive numbers, in the order of their bits, for the quantile of a tail.
 pub(super) fn quantile(probability: f64, tail: Tail, of: impl Fn(f64) -> f64) -> f64 {
     if !(probability > 0.0 && probability < 1.0) {
         return f64::NAN;
     }
-    // Positive floating-point numbers are ordered as their bits are.
+    // Positive floating-point numbers have the order of their bit patterns.
     let (mut low, mut high) = (0_u64, f64::MAX.to_bits());
     while high - low > 1 {
         let middle = low + (high - low) / 2;
@@ -161,7 +161,7 @@ mod tests {
         (value / expected - 1.0).abs() < 1e-9
     }
 
-    /// Printed in the tables of every textbook.
+    /// Values from standard tables.
     #[test]
     fn quantiles_are_those_of_the_tables() {
         assert!(close(chi_square_quantile(0.05, 1.0, Tail::Upper), 3.841_458_821));
@@ -186,12 +186,12 @@ mod tests {
 
     #[test]
     fn logarithms_go_on_where_probabilities_end() {
-        // Two degrees of freedom have closed forms: exp(-x / 2), and (1 + 2 x / f)^(-f / 2).
+        // Closed forms for two degrees of freedom: exp(-x / 2), and (1 + 2 x / f)^(-f / 2).
         for x in [1.0, 900.0, 1000.0, 1e5] {
             assert!(close(log_chi_square(x, 2.0), -x / 2.0));
             assert!(close(log_fisher(x, 2.0, 400.0), -200.0 * (x / 200.0).ln_1p()), "{x}");
         }
-        // Both sides of where the continued fraction begins.
+        // Both sides of the transition to the continued fraction.
         for dof in [1.0, 3.0, 250.0] {
             let (before, after) = (log_chi_square(900.0, dof), log_chi_square(900.0001, dof));
             let near = quantile(SMALL, Tail::Upper, |x| chi_square(x, dof, Tail::Upper));

@@ -1,6 +1,6 @@
-//! Adjustments put together where they have ended.
+//! Construction of adjustment results.
 //!
-//! Adjusted networks in another datum, without adjusting again.
+//! Transformation of adjusted networks to another datum, without a new adjustment.
 
 use super::datum::{Adjusted, Datum, DatumError, moved};
 use super::equations::ObservationEquations;
@@ -13,7 +13,7 @@ use crate::Threads;
 use crate::normals::{Between, FactorOptions, InvertOptions};
 
 impl Adjustment {
-    /// At the values that were reached, without iterations and cofactors.
+    /// Creates the result at final values, without iterations and cofactors.
     pub(super) fn at(
         problem: &AnyProblem<'_>,
         loss: Option<Loss>,
@@ -57,9 +57,9 @@ impl Adjustment {
         }
     }
 
-    /// After the last step, without cofactors.
+    /// Creates the result after the last step, without cofactors.
     ///
-    /// * `loss`: what weights the observations.
+    /// * `loss`: robust loss of the observations.
     pub fn between(
         problem: &AnyProblem<'_>,
         loss: Option<Loss>,
@@ -76,9 +76,9 @@ impl Adjustment {
         Self { history, last_local_corrections: corrections, counts, datum, ..after }
     }
 
-    /// Where the normal equations were inverted, without iterations.
+    /// Creates the result from inverted normal equations, without iterations.
     ///
-    /// * `loss`: what has weighted the observations.
+    /// * `loss`: robust loss of the observations.
     pub fn inverted(
         problem: &AnyProblem<'_>,
         loss: Option<Loss>,
@@ -90,7 +90,7 @@ impl Adjustment {
         adjustment
     }
 
-    /// Puts in cofactors and redundancy numbers, with one more formation that they come from.
+    /// Sets cofactors and redundancy numbers, and adds the effort of their formation.
     pub(super) fn put(&mut self, problem: &AnyProblem<'_>, inverted: Inverted) {
         self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
         self.counts = problem.counts(&inverted.held);
@@ -111,10 +111,10 @@ impl Adjustment {
 }
 
 impl Linearized {
-    /// Moves an adjusted network to another datum, and factors its normal equations there.
+    /// Transforms an adjusted network to another datum and factors its normal equations there.
     ///
     /// # Errors
-    /// A network that is not free, carriers that do not carry all null vectors; what ends adjustments.
+    /// The network is not free, the carriers do not separate all null vectors, or the adjustment fails.
     pub fn in_datum(
         problem: &AnyProblem<'_>,
         adjusted: Adjusted<'_>,
@@ -137,10 +137,10 @@ impl Linearized {
         Ok(linearized)
     }
 
-    /// All cofactors, in the datum that it was taken to.
+    /// Computes all cofactors, in the datum of the linearization.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn inverted(
         self,
         problem: &AnyProblem<'_>,
@@ -153,14 +153,14 @@ impl Linearized {
 }
 
 impl Adjustment {
-    /// Takes an adjusted network to another datum: unknowns and, where so asked, all cofactors and redundancy numbers. It need not have any
-    /// before. Returns about how large a part of its variances may be rounding.
+    /// Transforms an adjusted network to another datum: the unknowns and, if requested in the options, all cofactors and redundancy
+    /// numbers. Earlier cofactors are not required. Returns the approximate relative rounding error of the variances.
     ///
-    /// * `options`: those of the adjustment;
-    /// * `reference`: the values x_0 from which the carriers move least, usually the initial ones.
+    /// * `options`: options of the adjustment;
+    /// * `reference`: values x_0 from which the carriers move least, usually the initial ones.
     ///
     /// # Errors
-    /// A network that is not free, carriers that do not carry all null vectors, unknowns that are not determined; an interruption.
+    /// The network is not free, carriers do not separate all null vectors, unknowns are undetermined, or an interruption.
     pub fn take_to(
         &mut self,
         problem: &AnyProblem<'_>,

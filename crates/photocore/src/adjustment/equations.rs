@@ -1,6 +1,6 @@
-//! The observation equations of a problem at given values of the unknowns, in unit weight.
+//! Observation equations of a problem at given values of the unknowns, in unit weight.
 //!
-//! What a step does to the observations of one group.
+//! Changes of the observations of a group by a step.
 
 use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
@@ -8,22 +8,22 @@ use super::walk::Buffers;
 use crate::Threads;
 use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, TieRows, dot};
 
-/// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
+/// Equations of a problem at given values: in unit weight, reweighted by a loss, with zero columns for fixed unknowns.
 pub(super) struct ObservationEquations<'a> {
     problem: &'a AnyProblem<'a>,
     at: Box<dyn Evaluated + 'a>,
     /// Standard deviations of the observations; infinite for excluded ones.
     observation_sd: &'a [f64],
-    /// Which unknowns are fixed or held; None where none is.
+    /// Flags of fixed or constrained unknowns; None if all are free.
     fixed: Option<Vec<bool>>,
     reweighting: Option<Reweighting>,
-    /// What systems below have left (see [`super::Linearized::of_part`]).
+    /// Contributions of child systems (see [`super::Linearized::of_part`]).
     contributions: &'a [Contribution<'a>],
 }
 
-/// One equation of unit weight.
+/// Single equation of unit weight.
 pub(super) struct Row<'a> {
-    /// Its number, in the order of groups and rows, then of ties and rows.
+    /// Its index, in the order of groups and rows, then of ties and rows.
     pub number: usize,
     /// Observed minus computed.
     pub constant: f64,
@@ -32,7 +32,7 @@ pub(super) struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// The unknowns that it takes, with their coefficients.
+    /// Returns the unknowns of the equation, with their coefficients.
     #[inline(always)]
     pub fn taken(&self) -> impl Iterator<Item = (usize, f64)> {
         let [first, second, third] = self.coefficients;
@@ -41,7 +41,7 @@ impl Row<'_> {
 }
 
 impl<'a> ObservationEquations<'a> {
-    /// At the given values, some unknowns held there; weights are those that the loss has left.
+    /// Creates the equations at given values, with some unknowns constrained and weights modified by the loss.
     pub fn new(
         problem: &'a AnyProblem<'a>,
         reweighting: Option<Reweighting>,
@@ -52,7 +52,7 @@ impl<'a> ObservationEquations<'a> {
         threads.install(|| Self::evaluated(problem, problem.model.at(values), held, reweighting))
     }
 
-    /// Of a model that is evaluated already.
+    /// Creates the equations of an evaluated model.
     pub fn evaluated(
         problem: &'a AnyProblem<'a>,
         at: Box<dyn Evaluated + 'a>,
@@ -64,17 +64,17 @@ impl<'a> ObservationEquations<'a> {
         Self { problem, at, observation_sd, fixed, reweighting, contributions: &[] }
     }
 
-    /// The same with what systems below have left.
+    /// Adds contributions of child systems.
     pub fn with_contributions(self, contributions: &'a [Contribution<'a>]) -> Self {
         Self { contributions, ..self }
     }
 
-    /// The same equations with other standard deviations of the observations.
+    /// Replaces the standard deviations of the observations.
     pub fn with_deviations(self, observation_sd: &'a [f64]) -> Self {
         Self { observation_sd, ..self }
     }
 
-    /// The same with some unknowns as they are given by other standard deviations: the others stay as they are.
+    /// Fixes or releases some unknowns according to other standard deviations.
     pub fn with_unknowns(mut self, unknowns: impl Iterator<Item = usize>, sd: &[f64]) -> Self {
         if let Some(fixed) = &mut self.fixed {
             unknowns.for_each(|unknown| fixed[unknown] = sd[unknown] == 0.0);
@@ -82,19 +82,19 @@ impl<'a> ObservationEquations<'a> {
         self
     }
 
-    /// With the columns of fixed unknowns, and without a loss.
+    /// Creates the equations with all columns, including fixed unknowns, and without a loss.
     pub fn of_all(problem: &'a AnyProblem<'a>, values: &[f64], threads: &Threads) -> Self {
         let at = threads.install(|| problem.model.at(values));
         let observation_sd = &problem.observation_sd;
         Self { problem, at, observation_sd, fixed: None, reweighting: None, contributions: &[] }
     }
 
-    /// With the columns of fixed and held unknowns.
+    /// Restores the columns of fixed and constrained unknowns.
     pub fn with_fixed_columns(self) -> Self {
         Self { fixed: None, ..self }
     }
 
-    /// The problem that they are of.
+    /// Returns the problem of the equations.
     pub fn problem(&self) -> &'a AnyProblem<'a> {
         self.problem
     }
@@ -104,17 +104,17 @@ impl<'a> ObservationEquations<'a> {
         self.observation_sd[observation]
     }
 
-    /// What a loss makes of their weights.
+    /// Returns the reweighting by the loss.
     pub fn reweighting(&self) -> Option<Reweighting> {
         self.reweighting
     }
 
-    /// The model at the values that the equations are of.
+    /// Returns the model, evaluated at the linearization point.
     pub fn at(&self) -> &dyn Evaluated {
         &*self.at
     }
 
-    /// Hands out the rows of a local block.
+    /// Calls `take` with the rows of a local block.
     #[inline(always)]
     pub fn each_row(&self, buffers: &mut Buffers, local: usize, mut take: impl FnMut(&Row<'_>)) {
         let layout = self.problem.layout();
@@ -139,7 +139,7 @@ impl<'a> ObservationEquations<'a> {
         buffers.columns = columns;
     }
 
-    /// Hands out the rows of all ties, with the numbers of these.
+    /// Calls `take` with the tie number and row of every tie.
     pub fn each_row_of_ties(&self, mut take: impl FnMut(usize, &Row<'_>)) {
         let layout = self.problem.layout();
         let groups = layout.groups() * layout.rows();
@@ -153,7 +153,7 @@ impl<'a> ObservationEquations<'a> {
         });
     }
 
-    /// By how much a step lowers the weighted sum of squares of these equations and the priors: sum of Ax (2 l - Ax).
+    /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
     pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
         let layout = self.problem.layout();
         let observed = self.problem.for_locals(threads, |buffers, local| {
@@ -197,7 +197,7 @@ impl Equations for ObservationEquations<'_> {
 
     fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
         let written = self.at.observe_alike(locals, groups, self.observation_sd, rows);
-        // Most equations are as they shall be; to look for the parts of each takes a division.
+        // Shortcut for most equations, because the division into parts is slow.
         if written && self.reweighting.is_none() && self.fixed.is_none() {
             return;
         }
@@ -231,7 +231,7 @@ impl Equations for ObservationEquations<'_> {
 }
 
 impl ObservationEquations<'_> {
-    /// Takes weight off equations of unit weight where a loss says so, and leaves out the columns of fixed unknowns.
+    /// Reweights equations of unit weight by the loss, and zeroes the columns of fixed unknowns.
     #[inline(always)]
     fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         let GroupRows { constant, local: own, retained, shared } = rows;
@@ -249,7 +249,7 @@ impl ObservationEquations<'_> {
 }
 
 impl GroupRows<'_> {
-    /// Gives the equations of a group unit weight.
+    /// Divides the equations of a group by their standard deviations.
     #[inline(always)]
     pub(crate) fn weigh(&mut self, sd: &[f64]) {
         weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);
@@ -262,7 +262,7 @@ impl GroupRows<'_> {
     }
 }
 
-/// Gives equations unit weight, and excludes observations of infinite standard deviation.
+/// Divides equations by their standard deviations, and excludes observations of infinite standard deviation.
 #[inline(always)]
 fn weigh<const N: usize>(sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
     let widths = parts.each_ref().map(|part| part.len() / constant.len());
@@ -279,7 +279,7 @@ fn weigh<const N: usize>(sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64
     }
 }
 
-/// Sets an equation to 0 = 0. A weight of zero does not: the observation and its partials may not be finite.
+/// Sets an equation to 0 = 0. Zero weight is insufficient, because the observation and its partials may not be finite.
 #[cold]
 fn exclude(row: usize, constant: &mut [f64], parts: &mut [&mut [f64]]) {
     for part in parts {
@@ -289,7 +289,7 @@ fn exclude(row: usize, constant: &mut [f64], parts: &mut [&mut [f64]]) {
     constant[row] = 0.0;
 }
 
-/// Takes the columns of fixed unknowns out of some equations; `fixed` tells of each column whether it is.
+/// Zeroes the columns of fixed unknowns; `fixed` has one flag per column.
 #[inline(always)]
 fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     let width = part.len() / rows;
@@ -298,7 +298,7 @@ fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     }
 }
 
-/// What a step does to the unknowns of one group.
+/// Changes of the unknowns of one group by a step.
 pub(super) struct GroupStep<'s> {
     pub local: &'s [f64],
     pub retained: &'s [f64],
@@ -314,7 +314,7 @@ impl<'s> GroupStep<'s> {
         }
     }
 
-    /// By how much it changes a row of the group: A v.
+    /// Returns the change of a row of the group: A v.
     pub fn change(&self, rows: &GroupRows<'_>, row: usize) -> f64 {
         let part = |values: &[f64], step: &[f64]| dot(&values[row * step.len()..][..step.len()], step);
         part(rows.local, self.local) + part(rows.retained, self.retained) + part(rows.shared, &self.shared)

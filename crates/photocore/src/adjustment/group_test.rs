@@ -1,41 +1,41 @@
 //! Tests of groups of observations for a gross error, from the cofactor matrix of their residuals.
 //!
-//! With ~v the residuals of a group over their standard deviations and R their cofactor matrix (its eigenvalues are the redundancy numbers
-//! of directions), the sum of squares falls by T = ~v^T R^- ~v when the group is left out, ~d = R^- ~v being the error that it then shows.
-//! T is chi-square with as many degrees of freedom as R has rank (Cook and Weisberg 1982; Teunissen 2000). The rank is lower than the number
-//! of observations where an error in some direction shows in no residual: across the only base of a point, for one.
+//! ~v are the residuals of a group divided by their standard deviations, and R their cofactor matrix. The eigenvalues of R are redundancy
+//! numbers of directions. Exclusion of the group lowers the sum of squares by T = ~v^T R^- ~v, and ~d = R^- ~v is the estimated error. T
+//! has a chi-square distribution with rank(R) degrees of freedom (Cook and Weisberg 1982; Teunissen 2000). The rank is deficient if an
+//! error in some direction leaves all residuals unchanged, for example across the only base of a point.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use smallvec::SmallVec;
 
-/// Redundancy of a direction from which on an error along it shows.
+/// Minimum redundancy of a direction in which an error is detectable.
 pub const VISIBLE: f64 = 1e-6;
 
-/// The values of a group: nearly all have two rows, and there are as many groups as images.
+/// Values of a group, on the stack: nearly all groups have two rows, and there are as many groups as image observations.
 pub type Few = SmallVec<[f64; 4]>;
 
-/// A group of observations as the hypothesis that it holds a gross error.
+/// Test of the hypothesis that a group of observations has a gross error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupTest {
-    /// Directions in which an error shows.
+    /// Number of directions in which an error is detectable.
     pub rank: usize,
-    /// T: by how much the sum of squares falls without the group.
+    /// T: decrease of the sum of squares without the group.
     pub statistic: f64,
-    /// ~d: the estimated error, in standard deviations; in directions that do not show it is zero.
+    /// Estimated error ~d in standard deviations; zero in undetectable directions.
     pub error: Few,
-    /// R^-, row by row: the cofactors of the estimated error.
+    /// R^-, row by row: cofactors of the estimated error.
     pub cofactors: Few,
-    /// The smallest redundancy of a direction that shows; NaN where none does.
+    /// Smallest redundancy of a detectable direction; NaN if there is none.
     pub least: f64,
-    /// The largest part of a direction's redundancy that others than the own point take up, in that redundancy: h of the sharp bound of
-    /// correlations, |rho| <= root of the product of both h. NaN where it is not known what the own point takes up.
+    /// Maximum fraction h of the redundancy of a direction that unknowns other than the own point absorb. It bounds correlations: |rho| <=
+    /// root of the product of both h. NaN without `known`.
     pub shared: f64,
 }
 
 impl GroupTest {
-    /// Of residuals of unit weight with their cofactor matrix, row by row.
+    /// Tests residuals of unit weight with their cofactor matrix, row by row.
     ///
-    /// * `known`: the same matrix with all unknowns known but those of the own point, where that is asked for.
+    /// * `known`: cofactor matrix with only the unknowns of the own point free, if h is requested.
     pub fn new(residuals: &[f64], cofactors: &[f64], known: Option<&[f64]>) -> Self {
         match residuals.len() {
             2 => Self::of_two(residuals, cofactors, known),
@@ -43,7 +43,7 @@ impl GroupTest {
         }
     }
 
-    /// The same test in closed form: nearly all groups are images.
+    /// Tests a group of two rows in closed form.
     fn of_two(residuals: &[f64], cofactors: &[f64], known: Option<&[f64]>) -> Self {
         let v = Vector2::from_column_slice(residuals);
         let r = Matrix2::from_row_slice(cofactors);
@@ -96,40 +96,40 @@ impl GroupTest {
     }
 }
 
-/// Eigenvalues, the larger first, and eigenvectors of a symmetric matrix.
+/// Returns eigenvalues, larger first, and eigenvectors of a symmetric matrix.
 fn eigen(matrix: &Matrix2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let (a, b, c) = (matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 1)]);
     let half = ((a - c) / 2.0).hypot(b);
     let larger = f64::midpoint(a, c) + half;
     let smaller = if larger > 0.0 { (a * c - b * b) / larger } else { larger - 2.0 * half };
-    // Of the two rows of matrix - larger the one that keeps its digits.
+    // The row of matrix - larger without cancellation.
     let along = if a > c { Vector2::new(larger - c, b) } else { Vector2::new(b, larger - a) };
     let along = along.try_normalize(0.0).unwrap_or(Vector2::x());
     let vectors = Matrix2::from_columns(&[along, Vector2::new(-along.y, along.x)]);
     (Vector2::new(larger, smaller), vectors)
 }
 
-/// Rounding of a bound of correlations, relatively.
+/// Relative rounding error of a bound of correlations.
 const BARELY: f64 = 1e-9;
 
-/// h / (1 - h) of a group whose leverages by itself are these, H, with h their largest eigenvalue, which is no more than the norm; infinite where
-/// that may be 1.
+/// Returns h / (1 - h) for the leverage matrix H of a group, with its norm as upper bound of the largest eigenvalue h. Infinite if h may be
+/// 1.
 pub fn leverage_odds(leverages: impl Iterator<Item = f64>) -> f64 {
     let norm = leverages.map(|value| value.powi(2)).sum::<f64>().sqrt();
     if norm < 1.0 { norm / (1.0 - norm) } else { f64::INFINITY }
 }
 
-/// Whether the tests of two groups may be correlated by a limit: rho^2 <= h h' / ((1 - h) (1 - h')), by the odds of both.
+/// Whether the correlation of two tests may reach a limit: rho^2 <= h h' / ((1 - h) (1 - h')), from the odds of both.
 pub fn may_correlate(odds: f64, other: f64, limit: f64) -> bool {
     limit <= 0.0 || odds * other >= limit * limit * (1.0 - BARELY)
 }
 
-/// The largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2.
+/// Returns the largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2.
 ///
-/// An error of one of them moves the test value of the other by this share of its own: from 0.9 on the two cannot be told apart.
+/// An error in one group changes the test value of the other by this fraction. Groups with a value above 0.9 are not separable.
 ///
 /// * `first`, `second`: their cofactor matrices, row by row;
-/// * `between`: the cofactors of the first with the second, row by row.
+/// * `between`: cofactors of the first with the second, row by row.
 pub fn canonical_correlation(first: &[f64], second: &[f64], between: &[f64]) -> f64 {
     let half = |values: &[f64]| {
         let count = values.len().isqrt();
@@ -146,7 +146,7 @@ pub fn canonical_correlation(first: &[f64], second: &[f64], between: &[f64]) -> 
 mod tests {
     use super::*;
 
-    /// R of a group as a part of a projector, and residuals in its range.
+    /// R of a group as a block of a projector, and residuals in its range.
     fn block(rows: usize) -> (Vec<f64>, Vec<f64>) {
         let a = DMatrix::from_fn(9, 3, |i, j| ((3 * i + 7 * j + i * j) as f64).sin());
         let q = a.tr_mul(&a).try_inverse().unwrap();

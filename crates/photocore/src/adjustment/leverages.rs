@@ -1,7 +1,7 @@
-//! What tests of groups of observations need of a problem at adjusted values: residuals, cofactors, and leverages a Q a^T of any equations.
+//! Residuals, cofactors and leverages a Q a^T of a problem at adjusted values, for tests of groups of observations.
 //!
-//! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
-//! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
+//! Excluded observations have infinite standard deviations, so that their normal equations are zero. The pattern, order and symbolic
+//! factorisation are unchanged and include the cofactors of excluded observations.
 
 use std::ops::ControlFlow;
 
@@ -20,42 +20,41 @@ use crate::sorting::sort_by;
 use crate::{Threads, parallel};
 use nalgebra::DMatrix;
 
-/// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
+/// Problem at adjusted values, with all cofactors inside the pattern of its normal equations.
 #[derive(Debug)]
 pub struct Leverages {
-    /// The unknowns, in the order of the layout.
+    /// Unknowns, in the order of the layout.
     pub values: Vec<f64>,
-    /// Those of them that were held for a datum.
+    /// Unknowns constrained for a datum.
     pub held: Vec<usize>,
-    /// Observed minus computed, also of what is left out, in the units of the observations.
+    /// Residuals (observed minus computed), including excluded observations, in the units of the observations.
     pub residuals: Vec<f64>,
-    /// Cofactors, those of groups among them.
+    /// Cofactors, including leverage matrices of groups.
     pub cofactors: Cofactors,
     selected: SelectedInverse,
 }
 
-/// Cofactors of the equations a of a tie, whether or not they take part.
+/// Cofactors of the equations a of a tie, included or excluded.
 #[derive(Debug, Clone)]
 pub struct TieCofactors {
-    /// a Q a^T: square, row by row.
+    /// Leverage matrix a Q a^T, row by row.
     pub equations: Vec<f64>,
-    /// Q a^T of each retained block that the tie touches: its unknowns, those of each equation together.
+    /// Q a^T for each retained block of the tie, one vector over its unknowns per equation.
     pub blocks: Vec<(usize, Vec<f64>)>,
 }
 
 impl Leverages {
-    /// Takes over what an adjustment by groups ([`super::adjust_by_groups`]) has kept, at the values where it ended; None where it has
-    /// kept nothing.
+    /// Moves the results of [`super::adjust_by_groups`] out of an adjustment, at its final values; None if it did not store them.
     pub fn of(adjustment: &mut Adjustment, values: &[f64]) -> Option<Self> {
         let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
         let residuals = std::mem::take(&mut adjustment.residuals);
         Some(Self { values: values.to_vec(), held: adjustment.datum.clone(), residuals, cofactors, selected })
     }
 
-    /// Takes a problem as it is at given values, some unknowns held there.
+    /// Linearizes and inverts a problem at given values with some unknowns constrained.
     ///
     /// # Errors
-    /// Values that leave unknowns undetermined; an interruption, no memory.
+    /// Undetermined unknowns, an interruption, or lack of memory.
     pub fn at(
         problem: &AnyProblem<'_>,
         values: Vec<f64>,
@@ -76,22 +75,22 @@ impl Leverages {
         Ok(Self { values, held, residuals, cofactors, selected })
     }
 
-    /// Weighted sum of squares of what takes part.
+    /// Weighted sum of squares of the included observations.
     pub fn sum_of_squares(&self, problem: &AnyProblem<'_>) -> f64 {
         problem.objective(&self.values, &self.residuals, None)
     }
 
-    /// Observations that take part, those of unknowns themselves among them, minus unknowns.
+    /// Number of included observations and weighted unknowns, minus the number of unknowns.
     pub fn degrees_of_freedom(&self, problem: &AnyProblem<'_>) -> i64 {
         let out = problem.observation_sd.iter().filter(|sd| sd.is_infinite()).count();
         problem.counts(&self.held).degrees_of_freedom() - out as i64
     }
 
-    /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
-    /// `terms` gives these (see [`crate::normals::System::local_cofactors`]).
+    /// Returns the cofactors of all equations of some local blocks, for given standard deviations. `terms` returns the prior equations of
+    /// the weighted unknowns of a block (see [`crate::normals::System::local_cofactors`]).
     ///
     /// # Errors
-    /// A problem of another layout.
+    /// The problem has another layout.
     pub fn of_locals(
         &self,
         problem: &AnyProblem<'_>,
@@ -109,12 +108,13 @@ impl Leverages {
         Ok(found.into_iter().collect::<Result<_, _>>()?)
     }
 
-    /// The same with what groups of local blocks that are held have to do with each other, which no pattern of normal equations has.
+    /// Returns the cofactors as [`Self::of_locals`], including cofactors between groups of fixed local blocks, which are outside the
+    /// pattern of the normal equations.
     ///
-    /// * `limit`: of groups whose residuals cannot be correlated by as much with any others' this is NaN.
+    /// * `limit`: cofactors of groups with all possible correlations below this limit are NaN.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn of_locals_together(
         &self,
         problem: &AnyProblem<'_>,
@@ -128,7 +128,7 @@ impl Leverages {
         Ok(found)
     }
 
-    /// Puts what groups of local blocks that are held have to do with each other where it belongs, from the normal equations formed again.
+    /// Computes cofactors between groups of fixed local blocks from newly formed normal equations.
     fn put_together(
         &self,
         problem: &AnyProblem<'_>,
@@ -170,20 +170,19 @@ impl Leverages {
         Ok(())
     }
 
-    /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
-    /// inverse of their variances as the others predict them, but for what the local block takes up.
+    /// Returns the residual cofactor matrix P that all equations of excluded local blocks would have if they were included.
     ///
-    /// With C = I + b Q b^T these variances and a the equations of the local block, P = C^-1 - C^-1 a^T (a C^-1 a^T)^-1 a C^-1 leads from errors
-    /// to what all rows together show of them: P l are residuals of unit weight and P their cofactors, as R is of what takes part. It is
-    /// (I + a' Q a'^T - H)^-1 - H, H the share of the local block alone in its equations and Q that of the others.
+    /// With predicted cofactors C = I + b Q b^T and the coefficients a of the local block, P = C^-1 - C^-1 a^T (a C^-1 a^T)^-1 a C^-1. P l
+    /// are residuals of unit weight and P their cofactors, as R for included observations. It is computed as (I + a' Q a'^T - H)^-1 - H. H
+    /// is the leverage matrix of the local block alone, Q the cofactor matrix of the others.
     ///
-    /// * `observation_sd`, `sd`: as they would take part;
-    /// * `terms`: the equations of the weighted unknowns of each, of unit weight.
+    /// * `observation_sd`, `sd`: standard deviations if included;
+    /// * `terms`: prior equations of the weighted unknowns of each block, in unit weight.
     ///
-    /// Empty where the local block would not be determined.
+    /// Empty if the local block would be undetermined.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn of_gone(
         &self,
         problem: &AnyProblem<'_>,
@@ -217,10 +216,10 @@ impl Leverages {
         Ok(threads.install(|| parallel::map(found.len(), 1, |k| shown(&found[k]))))
     }
 
-    /// Cofactors of the equations of some ties, with the given standard deviations.
+    /// Returns the cofactors of the equations of some ties, for given standard deviations.
     ///
     /// # Errors
-    /// A problem of another layout.
+    /// The problem has another layout.
     pub fn of_ties(
         &self,
         problem: &AnyProblem<'_>,
@@ -278,7 +277,7 @@ impl Leverages {
         })
     }
 
-    /// The equations that take part, those that are asked for, and the weighted unknowns.
+    /// Returns the included equations, the requested equations and the priors.
     fn equations<'a>(
         &self,
         problem: &'a AnyProblem<'a>,
@@ -294,7 +293,7 @@ impl Leverages {
     }
 }
 
-/// The rows of the groups of a local block that is held whose residuals may be correlated by a limit with those of another of its groups.
+/// Returns the rows of groups of a fixed local block whose residuals may have correlations above a limit.
 fn correlated_rows(own: &LocalCofactors, layout: &Layout, local: usize, limit: f64) -> Vec<usize> {
     let (rows, all, groups) = (layout.rows(), own.rows(), layout.groups_of(local).len());
     let odds = |group: usize| {

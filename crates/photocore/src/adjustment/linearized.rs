@@ -1,5 +1,5 @@
-//! A problem linearized at given values, its normal equations factored once for any number of questions: steps, determinants, what is not
-//! determined, solutions for any right-hand sides, covariances of anything with anything, the inverse where it has elements.
+//! Linearized problem with factored normal equations, for steps, determinants, rank defects, solutions for any right-hand sides,
+//! covariances of linear functions, and the selected inverse.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ use crate::normals::{
     SelectedInverse, SolveOptions,
 };
 
-/// The normal equations of a problem at given values, factored, in the datum of the unknowns that are held or in any other.
+/// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
 #[derive(Debug)]
 pub struct Linearized {
     pub(super) values: Vec<f64>,
@@ -26,55 +26,55 @@ pub struct Linearized {
     pub(super) prior: Prior,
     pub(super) factor: Factor,
     pub(super) sum_of_squares: f64,
-    /// The datum that cofactors are to be taken to.
+    /// Datum for the cofactors.
     pub(super) basis: Option<Basis>,
-    /// What takes cofactors there.
+    /// Transformation of cofactors to this datum.
     pub(super) transformation: Option<Transformation>,
-    /// What all that was done so far has taken.
+    /// Computing time so far.
     pub(super) seconds: Seconds,
 }
 
-/// The inverse normal matrix of a problem at given values, where it has elements.
+/// Selected inverse of the normal matrix of a problem at given values.
 #[derive(Debug)]
 pub struct Inverted {
-    /// The values that it is of.
+    /// Linearization point.
     pub(super) values: Vec<f64>,
-    /// The unknowns that were held there.
+    /// Constrained unknowns.
     pub(super) held: Vec<usize>,
     pub(super) cofactors: Cofactors,
     /// Redundancy numbers of the unknowns as observations of themselves (zero unless weighted).
     pub(super) prior_redundancy: Vec<f64>,
     pub(super) selected: SelectedInverse,
-    /// About how large a part of a variance rounding may be, where cofactors were taken to another datum: large numbers cancel where the old
-    /// one is far from the new one, or short.
+    /// Approximate relative rounding error of variances that were transformed to another datum. Large numbers cancel if the two datums are
+    /// distant, or if a datum is weak.
     pub lost: Option<f64>,
-    /// What all of it has taken.
+    /// Computing time in total.
     pub(super) seconds: Seconds,
 }
 
-/// Why there are no cofactors of what was asked for.
+/// Error of the computation of cofactors.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum CofactorError {
-    /// They would take more memory than they may.
+    /// The cofactors need more memory than allowed.
     #[error("these cofactors take {} of memory, and {} are free: ask for fewer at a time", gib(*.needed), gib(*.available))]
     Memory {
-        /// Bytes that they would take.
+        /// Required bytes.
         needed: usize,
-        /// Bytes that they may take.
+        /// Allowed bytes.
         available: usize,
     },
-    /// What ends adjustments.
+    /// Error of the adjustment.
     #[error(transparent)]
     Adjust(#[from] AdjustError),
 }
 
 impl Linearized {
-    /// Forms and factors the normal equations at given values, some unknowns held there; weights are those that the loss has left.
+    /// Forms and factors the normal equations at given values with some unknowns constrained; weights are modified by the loss.
     ///
-    /// Whether everything is determined is for the caller to ask.
+    /// The caller must check whether all unknowns are determined.
     ///
     /// # Errors
-    /// Lengths that contradict the layout, an interruption, no memory.
+    /// Lengths that contradict the layout, an interruption, or lack of memory.
     pub fn form(
         problem: &AnyProblem<'_>,
         loss: Option<Loss>,
@@ -89,7 +89,7 @@ impl Linearized {
         Self::of(&equations, values, held, &FactorOptions::UNCACHED, threads, between)
     }
 
-    /// The same of equations that are there already.
+    /// Forms and factors given observation equations.
     pub(super) fn of(
         equations: &ObservationEquations<'_>,
         values: Vec<f64>,
@@ -118,42 +118,42 @@ impl Linearized {
         })
     }
 
-    /// The values that the equations are of.
+    /// Returns the linearization point.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The unknowns that were held there.
+    /// Returns the constrained unknowns.
     pub fn held(&self) -> &[usize] {
         &self.held
     }
 
-    /// Weighted sum of squares of the observations at these values, weighted unknowns among them; not finite where some cannot be computed.
+    /// Weighted sum of squares of observations and weighted unknowns at these values; not finite if an observation cannot be computed.
     pub fn sum_of_squares(&self) -> f64 {
         self.sum_of_squares
     }
 
-    /// By how much a full step lowers it, as the linearized equations predict.
+    /// Predicted decrease of the sum of squares by a full step.
     pub fn decrease(&self) -> f64 {
         self.factor.decrease
     }
 
-    /// No unknown changes by more than this multiple of its standard deviation in a full step.
+    /// Upper bound of the changes of all unknowns in a full step, in standard deviations.
     pub(super) fn change(&self) -> f64 {
         self.factor.decrease.sqrt()
     }
 
-    /// The fraction of the diagonal that was added to it.
+    /// Damping, as a fraction of the diagonal.
     pub(super) fn damping(&self) -> f64 {
         self.factor.damping
     }
 
-    /// Whether the second-order term of a loss is taken in.
+    /// Whether the second-order term of a loss is used.
     pub(super) fn is_curved(&self) -> bool {
         self.reweighting.is_some_and(|reweighting| reweighting.curved)
     }
 
-    /// Why the observations do not determine all unknowns.
+    /// Returns an error if the observations do not determine all unknowns.
     pub fn undetermined(&self) -> Option<AdjustError> {
         if !self.factor.deficient_locals.is_empty() {
             return Some(AdjustError::UndeterminedLocals(self.factor.deficient_locals.clone()));
@@ -161,63 +161,61 @@ impl Linearized {
         self.factor.deficiency().map(|found| AdjustError::Undetermined(found.blocks()))
     }
 
-    /// The same, of which all unknowns are determined.
+    /// Returns itself if all unknowns are determined.
     ///
     /// # Errors
-    /// Unknowns that are not.
+    /// Undetermined unknowns.
     pub fn determined(self) -> Result<Self, AdjustError> {
         self.undetermined().map_or(Ok(self), Err)
     }
 
-    /// Combinations of unknowns, none of them local, that the observations do not determine: for each the unknowns that take part in
-    /// it, ascending.
+    /// Returns undetermined combinations of retained unknowns: the unknowns in each, ascending.
     pub fn undetermined_unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
         self.factor.deficiency().map_or(vec![], |found| found.unknowns(layout))
     }
 
-    /// The same with all unknowns, how each combination moves them, and their diagonal elements of the normal equations.
+    /// Returns undetermined combinations of all unknowns, with components and diagonal elements of the normal equations.
     pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
         self.factor.deficiency().map_or(vec![], |found| found.combinations(layout))
     }
 
-    /// The unknowns, none of them local, that no observation and no weight touches, ascending.
+    /// Returns the retained unknowns without any observation or weight, ascending.
     pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
         self.factor.without_effect(layout)
     }
 
-    /// Natural logarithm of the determinant, the local unknowns reduced out; None where it is zero.
+    /// Natural logarithm of the determinant of the reduced normal equations; None if it is zero.
     pub fn log_determinant(&self) -> Option<f64> {
         self.factor.log_determinant()
     }
 
-    /// The corrections of the unknowns that are not local, in the order of the layout.
+    /// Returns the corrections of the retained unknowns, in the order of the layout.
     pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
         self.factor.reduced_corrections(layout)
     }
 
-    /// The cofactors of every two unknowns that are not local, in the order of the layout, row by row; zero for those that are fixed or
-    /// held.
+    /// Returns the cofactors of all pairs of retained unknowns, in the order of the layout, row by row; zero for fixed or constrained ones.
     pub fn reduced_cofactors(&self, problem: &AnyProblem<'_>) -> Vec<f64> {
         let layout = problem.layout();
         let (first, count) = (layout.all_locals().end, layout.unknowns() - layout.all_locals().end);
         let mut rights = vec![0.0; count * count];
         for k in 0..count {
-            // What is fixed or held stands in the normal equations by itself, with unit weight.
+            // Fixed and constrained unknowns have decoupled normal equations with unit weight.
             rights[k * (count + 1)] = f64::from(u8::from(self.is_free(problem, first + k)));
         }
         self.factor.solve_reduced(layout, &rights)
     }
 
-    /// Whether an unknown is neither fixed nor held.
+    /// Whether an unknown is neither fixed nor constrained.
     pub(super) fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
     }
 
-    /// The cofactors f^T Q g of linear functions of the unknowns (a priori unit weight): a matrix row by row, of every two of `rows`, or
-    /// of `rows` with `columns`. The same bits for any number of threads.
+    /// Computes the cofactors f^T Q g of linear functions of the unknowns (a priori unit weight), row by row: of all pairs in `rows`, or of
+    /// `rows` with `columns`. Bitwise identical for any number of threads.
     ///
     /// # Errors
-    /// More memory than there may be (None: any number of bytes); an interruption.
+    /// More memory than allowed (None: unlimited), or an interruption.
     pub fn cofactors(
         &self,
         problem: &AnyProblem<'_>,
@@ -250,7 +248,7 @@ impl Linearized {
         Ok(matrix)
     }
 
-    /// The cofactors of every two of some unknowns; None where they would take more memory than there may be.
+    /// Computes the cofactors of all pairs of some unknowns; None if they need more memory than allowed.
     pub(super) fn joint(
         &self,
         problem: &AnyProblem<'_>,
@@ -268,17 +266,17 @@ impl Linearized {
         }
     }
 
-    /// What a function takes of unknowns that are neither held nor fixed: the cofactors of others are zero in this datum.
+    /// Removes fixed and constrained unknowns from a function: their cofactors are zero in this datum.
     fn unmoved(&self, problem: &AnyProblem<'_>, function: &Function) -> Function {
         let stays = |unknown: usize| self.transformation.as_ref().is_some_and(|to| to.stays(unknown));
         let moves = |unknown: usize| self.is_free(problem, unknown) && !stays(unknown);
         function.iter().filter(|&&(unknown, _)| moves(unknown)).copied().collect()
     }
 
-    /// Solves for right-hand sides over all unknowns, one after the other; so are the solutions.
+    /// Solves for right-hand sides over all unknowns, one after the other; returns solutions in the same form.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn solve_for(
         &self,
         problem: &AnyProblem<'_>,
@@ -290,7 +288,7 @@ impl Linearized {
         self.solve(&self.equations(problem, threads), &options, threads, between)
     }
 
-    /// The step of all unknowns, or what else the options ask for.
+    /// Computes the step of all unknowns, or solves for the right-hand sides in the options.
     pub(super) fn solve(
         &self,
         equations: &ObservationEquations<'_>,
@@ -302,7 +300,7 @@ impl Linearized {
         Ok(equations.problem().system.solve(threads, factor, equations, prior, options, between)?)
     }
 
-    /// The selected inverse, in the datum that it was taken to.
+    /// Computes the selected inverse in the requested datum.
     pub(super) fn invert(
         self,
         equations: &ObservationEquations<'_>,
@@ -322,7 +320,7 @@ impl Linearized {
         Ok(Inverted { values, held, cofactors, prior_redundancy, selected, lost, seconds })
     }
 
-    /// Solves for the right-hand sides of its datum, where it has one: cofactors are then those in it.
+    /// Solves for the right-hand sides of the requested datum, if any, so that cofactors refer to it.
     pub(super) fn take_to_datum(
         &mut self,
         equations: &ObservationEquations<'_>,
@@ -339,7 +337,7 @@ impl Linearized {
         Ok(())
     }
 
-    /// The observation equations again, as a loss has weighted them: it takes a pass over unknowns, and they are not kept.
+    /// Returns the observation equations again, reweighted by the loss: one pass over the unknowns instead of storage.
     pub(super) fn equations<'a>(
         &self,
         problem: &'a AnyProblem<'a>,
@@ -348,7 +346,7 @@ impl Linearized {
         ObservationEquations::new(problem, self.reweighting, &self.values, &self.held, threads)
     }
 
-    /// Gives its memory back for the next ones; its values.
+    /// Releases its memory for the next linearization and returns its values.
     pub(super) fn recycle(self, problem: &AnyProblem<'_>) -> Vec<f64> {
         self.factor.recycle(&problem.system);
         self.values

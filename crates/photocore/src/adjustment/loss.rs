@@ -1,23 +1,23 @@
-//! Robust losses: how much an observation that fits badly counts.
+//! Robust losses: functions that reduce the weight of poorly fitting observations.
 
-/// A robust loss. It takes the place of s, the weighted sum of squares of one group of observations (the coordinates of an image
-/// point), in what is minimised; `scale` is the root of s at which it sets in, in standard deviations a priori.
+/// Robust loss, which replaces s, the weighted sum of squares of one group of observations (the coordinates of an image point). `scale` is
+/// the root of s, in a priori standard deviations, at which the loss deviates from s.
 ///
-/// The observations of a group are reweighted by the slope of the loss in every iteration (iteratively reweighted least
-/// squares), which gives the gradient of the loss exactly. Both losses are concave in s, so that the reweighted sum lies nowhere
-/// below the loss and a step that lowers the one lowers the other. That is safe, but converges linearly, and slowly where what fits
-/// badly holds a point. Close to the end the second-order term of Triggs and others (2000, section 4.3) is therefore taken in;
-/// from far starts it would lead to wrong places, because it takes nearly all weight from what fits badly.
+/// Observations are reweighted by the derivative of the loss in every iteration (iteratively reweighted least squares); the gradient is
+/// exact. Both losses are concave in s: the reweighted sum bounds the loss from above, and a step that lowers the former also lowers the
+/// latter. Convergence is safe but linear, and slow if poorly fitting observations determine a point. Near the solution the second-order
+/// term is added (Triggs and others 2000, section 4.3). Far from it, this term would remove nearly all weight of poorly fitting
+/// observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Loss {
-    /// Huber 1964: s, and beyond scale^2 a straight line in the root of s: 2 scale sqrt(s) - scale^2.
+    /// Huber 1964: s up to scale^2, and 2 scale sqrt(s) - scale^2 above it.
     Huber(f64),
-    /// scale^2 log(1 + s / scale^2): what fits badly hardly counts any more; there may be several minima.
+    /// scale^2 log(1 + s / scale^2): poorly fitting observations have little influence, and several minima are possible.
     Cauchy(f64),
 }
 
 impl Loss {
-    /// The loss of a group whose weighted sum of squares is `s`.
+    /// Loss of a group with the weighted sum of squares `s`.
     pub fn value(self, s: f64) -> f64 {
         match self {
             Loss::Huber(scale) if s > scale * scale => 2.0 * scale * s.sqrt() - scale * scale,
@@ -26,7 +26,7 @@ impl Loss {
         }
     }
 
-    /// Its slope: the factor by which the weights of the group's observations are multiplied, 0 to 1.
+    /// Derivative of the loss: the weight factor of the group's observations, 0 to 1.
     #[inline]
     pub fn weight(self, s: f64) -> f64 {
         match self {
@@ -36,8 +36,8 @@ impl Loss {
         }
     }
 
-    /// 1 + 2 s r'' / r' of the loss r, at least [`LEAST_CURVATURE`]: its second derivative along the residual of a group, in units
-    /// of its slope, which is that across.
+    /// 1 + 2 s r'' / r' of the loss r, at least [`LEAST_CURVATURE`]: ratio of its second derivatives along and across the residual of a
+    /// group.
     #[inline]
     pub(super) fn curvature(self, s: f64) -> f64 {
         let curvature = match self {
@@ -49,27 +49,27 @@ impl Loss {
     }
 }
 
-/// Keeps the normal matrix positive definite.
+/// Minimum curvature, for a positive definite normal matrix.
 const LEAST_CURVATURE: f64 = 1e-3;
 
-/// What a loss makes of the equations of a group.
+/// Reweighting of the equations of a group.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reweighting {
     pub loss: Loss,
-    /// Whether the second-order term is taken in.
+    /// Whether the second-order term is used.
     pub curved: bool,
 }
 
 impl Reweighting {
-    /// Without the second-order term.
+    /// Reweights without the second-order term.
     pub fn plain(loss: Loss) -> Self {
         Self { loss, curved: false }
     }
 
     /// Reweights the equations of a group, given with unit weight.
     ///
-    /// With v the residuals, s = |v|^2, w the slope and c the curvature of the loss, the rows A and l become
-    /// sqrt(w) (A - (1 - sqrt(c)) v (v^T A) / s) and sqrt(w / c) l: A^T l is the gradient either way.
+    /// Let v be the residuals, s = |v|^2, w the slope and c the curvature of the loss. The rows become sqrt(w) (A - (1 - sqrt(c)) v (v^T A)
+    /// / s) and sqrt(w / c) l. A^T l is the exact gradient for any c.
     #[inline]
     pub fn apply(self, constant: &mut [f64], parts: &mut [&mut [f64]]) {
         let square: f64 = constant.iter().map(|v| v * v).sum();

@@ -1,11 +1,11 @@
-//! Least squares: weighted unknowns and observations, iteration, convergence, statistics. Knows no photograph.
+//! Least-squares adjustment: weighted unknowns and observations, iteration, convergence, statistics. Independent of photogrammetry.
 //!
-//! A [`Model`] says how observations follow from unknowns; a [`Problem`] adds what is known beforehand: the standard
-//! deviation of every observation and of every unknown, from free (infinite) to fixed (zero). [`Problem::adjust`] iterates to the
-//! least-squares solution and computes the cofactors of all unknowns and the redundancy numbers of all observations.
+//! A [`Model`] computes observations from unknowns. A [`Problem`] adds the priors and the standard deviation of every observation and every
+//! unknown, from free (infinite) to fixed (zero). [`Problem::adjust`] iterates to the least-squares solution. It computes the cofactors of
+//! all unknowns and the redundancy numbers of all observations.
 //!
-//! A levelling net: heights of points (local blocks of one unknown) above those of two instruments (retained blocks of one); the first
-//! point is a fixed bench mark.
+//! Example: a levelling network with heights of points (local blocks of one unknown) and instruments (retained blocks of one unknown). The
+//! first point is a fixed benchmark.
 //!
 //! ```
 //! use photocore::adjustment::{Evaluated, Model, Options, Problem, Status};

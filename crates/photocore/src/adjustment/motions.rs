@@ -1,10 +1,10 @@
-//! What observations and weights leave open of a network as a whole, and what to hold where nothing else gives a datum.
+//! Datum transformations that observations and weights leave free, and the unknowns to constrain for a datum.
 //!
-//! A motion of the whole (a shift, a rotation, a change of scale) moves the unknowns along a vector g. Observations leave it open when no row
-//! of their partials changes: A g = 0. Of several candidates, the columns of G, all combinations z are found with A G z = 0, from the
-//! normal matrix of the candidates, (A G)^T (A G), which takes one pass over the observations and no factorisation.
+//! A motion of the whole network (translation, rotation, change of scale) moves the unknowns along a vector g. Observations leave it free
+//! if A g = 0. From candidate columns G, all combinations z with A G z = 0 are found. They are null vectors of (A G)^T (A G), which needs a
+//! single pass over the observations and no factorisation.
 //!
-//! What keeps a network from moving as a whole, kind by kind.
+//! Datum information of each type of observation.
 
 use faer::{Mat, Side};
 
@@ -14,48 +14,48 @@ use super::walk::Buffers;
 use crate::normals::{Equations, TieRows};
 use crate::{Threads, parallel};
 
-/// The combinations of motions that are open at some values of the unknowns.
+/// Free combinations of motions at some values of the unknowns.
 pub(super) struct Open {
-    /// Motions (rows) in each combination (columns).
+    /// Matrix of motions (rows) in combinations (columns).
     pub combinations: Mat<f64>,
-    /// As many unknowns as combinations, where there are so many that tell these apart.
+    /// One unknown per combination to constrain, if there are enough independent ones.
     pub hold: Vec<usize>,
 }
 
-/// What a combination may change of the observations, as the square of a share of what its parts change, and be rounding: the eigenvalues
-/// of a matrix of ones are good to 1e-15. Positions of photos that are observed to a hundred metres change a hundred times as much; the
-/// verticals of an ellipsoid, which attitudes to a thousandth tell apart over kilometres only, 2e-14, which a factor cannot tell from nothing.
+/// Maximum eigenvalue of a free combination: squared change of the observations relative to the changes by its parts. Rounding errors are
+/// about 1e-15. Photo positions with a standard deviation of 100 m give a hundred times this limit. Ellipsoid normals, which attitudes
+/// separate only over kilometres, give 2e-14, which a factor cannot distinguish from zero.
 const NULL: f64 = 1e-12;
-/// An unknown holds a combination when that moves it by more than this share of what its parts do: the first that do so well, or at all. Up at a
-/// plumb line moves latitudes, too, over metres by a millionth, and a network that is held by these is so weakly.
+/// Minimum relative change of an unknown by a combination that it may constrain: preferred, or at all. Example of a weak constraint: the
+/// height at a plumb line changes the latitude by 1e-6 over some metres.
 const HOLDS: [f64; 2] = [1e-2, 1e-6];
-/// Local blocks that are added up one after the other.
+/// Number of local blocks that are summed serially.
 const AT_ONCE: usize = 256;
 
-/// Local blocks that are looked at at the least where all are known to leave all motions open.
+/// Minimum number of sampled local blocks, if all are known to leave all motions free.
 const SAMPLE: usize = 1024;
 
-/// Candidates are taken so many at once, in the registers of one instruction: there are seven, and one that moves nothing.
+/// Number of candidates per vector instruction: seven, and a zero one.
 const LANES: usize = 8;
 
-/// Sums over rows a, for candidates k and m. The second and third take the unknowns apart that the first lets act together.
+/// Sums over rows a, for candidates k and m.
 pub(super) struct Sums {
-    /// (a . g_k) (a . g_m), and the same of every unknown that is weighted or fixed.
+    /// (a . g_k) (a . g_m), and separate terms of weighted or fixed unknowns.
     together: Vec<f64>,
-    /// The sum of (a_i g_ik)^2 over the unknowns i.
+    /// Sum of (a_i g_ik)^2 over the unknowns i.
     apart: Vec<[f64; LANES]>,
-    /// Room for the a . g_k of a row.
+    /// Scratch memory for the a . g_k of a row.
     along: Vec<[f64; LANES]>,
 }
 
 impl Sums {
-    /// For candidates that fill so many times the lanes.
+    /// Creates zero sums for `parts` vectors of candidates.
     fn zero(parts: usize) -> Self {
         let none = vec![[0.0; LANES]; parts];
         Self { together: vec![0.0; (parts * LANES).pow(2)], apart: none.clone(), along: none }
     }
 
-    /// The greatest share of what one of so many candidates changes that remains when the unknowns act together.
+    /// Returns the maximum over `count` candidates of the joint change relative to the separate changes by single unknowns.
     pub fn share(&self, count: usize) -> f64 {
         let stride = self.apart.len() * LANES;
         let share = |k: usize| {
@@ -77,7 +77,7 @@ impl Sums {
     }
 }
 
-/// The candidates, unknown by unknown, and which of the unknowns are fixed.
+/// Candidates by unknown, with flags of fixed unknowns.
 pub(super) struct Candidates<'a> {
     parts: usize,
     by_unknown: &'a [[f64; LANES]],
@@ -89,7 +89,7 @@ impl<'a> Candidates<'a> {
         Self { parts: motions.vectors.len().div_ceil(LANES), by_unknown, fixed }
     }
 
-    /// How motions move each of so many unknowns.
+    /// Returns the change of each unknown by the motions.
     pub fn by_unknown(motions: &Motions, unknowns: usize) -> Vec<[f64; LANES]> {
         let parts = motions.vectors.len().div_ceil(LANES);
         let moved = |at: usize| {
@@ -99,29 +99,29 @@ impl<'a> Candidates<'a> {
         (0..unknowns * parts).map(moved).collect()
     }
 
-    /// No sums yet.
+    /// Creates zero sums.
     pub fn sums(&self) -> Sums {
         Sums::zero(self.parts)
     }
 
-    /// Whether any of them moves a fixed unknown.
+    /// Whether a candidate moves a fixed unknown.
     fn move_fixed(&self) -> bool {
         let moved = |unknown: usize| self.of(unknown).as_flattened().iter().any(|&change| change != 0.0);
         self.fixed.iter().enumerate().any(|(unknown, &fixed)| fixed && moved(unknown))
     }
 
-    /// How they move an unknown.
+    /// Returns the changes of an unknown.
     fn of(&self, unknown: usize) -> &[[f64; LANES]] {
         &self.by_unknown[unknown * self.parts..][..self.parts]
     }
 
-    /// Adds one row of partials. A fixed unknown is an observation of the weight that this row gives it.
+    /// Adds one row of partials. Fixed unknowns count as observations with the weight in this row.
     pub fn add_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         sums.along.fill([0.0; LANES]);
         self.add_to_row(sums, row);
     }
 
-    /// Adds the rows of a tie, without what the motions make of the displacement that it misses by (see [`Evaluated::carried`]).
+    /// Adds the rows of a tie, with corrections for the transformation of its misclosure (see [`Evaluated::carried`]).
     pub fn add_tie(
         &self,
         sums: &mut Sums,
@@ -147,7 +147,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Adds a row to what the candidates make of it already.
+    /// Adds a row to the current changes in `sums.along`.
     fn add_to_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         for (unknown, coefficient) in row {
             let moved = self.of(unknown);
@@ -176,7 +176,7 @@ fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
 }
 
 impl AnyProblem<'_> {
-    /// Which of some motions observations and weights leave open at given values, so many at the least; None where it is none.
+    /// Returns the free combinations of motions at given values, at least `least`; None if there are none.
     pub(super) fn open(
         &self,
         values: &[f64],
@@ -187,8 +187,8 @@ impl AnyProblem<'_> {
         self.open_without(values, motions, (&[], least), threads)
     }
 
-    /// How many motions would be open at given values if what is known of some unknowns themselves (ascending) were not: with as many
-    /// of these, and a network that is determined, they give a datum and nothing more.
+    /// Returns the number of free motions without the priors of some unknowns (ascending). If the number of these unknowns is equal and the
+    /// network is determined, their priors only define the datum.
     pub fn open_if_free(&self, values: &[f64], released: &[usize], threads: &Threads) -> usize {
         let motions = threads.install(|| self.model.all_motions(values));
         let open = motions.and_then(|motions| self.open_without(values, &motions, (released, 0), threads));
@@ -210,7 +210,7 @@ impl AnyProblem<'_> {
             .map(|&sum| if sum > 0.0 { sum.sqrt().recip() } else { 0.0 })
             .collect();
         let scaled = Mat::from_fn(count, count, |k, m| {
-            // What moves nothing that is observed is no motion of this network.
+            // A motion without effect on observations is not a motion of this network.
             if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * stride + m] * scale[k] * scale[m] }
         });
         let eigen = threads.install(|| scaled.self_adjoint_eigen(Side::Lower)).ok()?;
@@ -226,7 +226,7 @@ impl AnyProblem<'_> {
         (!open.is_empty()).then_some(Open { combinations, hold })
     }
 
-    /// The unknowns to hold at given values; none where there is a datum.
+    /// Returns the unknowns to constrain at given values; empty if a datum is defined.
     pub(crate) fn to_hold(&self, values: &[f64], threads: &Threads) -> Vec<usize> {
         let motions = threads.install(|| self.model.motions(values));
         let open = motions.and_then(|motions| self.open(values, &motions, 0, threads));
@@ -241,7 +241,7 @@ impl AnyProblem<'_> {
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
         let equations = ObservationEquations::of_all(self, values, threads);
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
-        // One of so many local blocks is taken for them all.
+        // A sample represents all local blocks.
         let stride = if known { (layout.locals() / SAMPLE).max(1) } else { 1 };
         let sample = layout.locals().div_ceil(stride);
         let chunk = |chunk: usize| {
@@ -272,12 +272,12 @@ impl AnyProblem<'_> {
     }
 }
 
-/// How a combination of motions moves an unknown.
+/// Returns the change of an unknown by a combination of motions.
 fn along(motions: &Motions, combinations: &Mat<f64>, unknown: usize, column: usize) -> f64 {
     motions.vectors.iter().enumerate().map(|(k, vector)| vector[unknown] * combinations[(k, column)]).sum()
 }
 
-/// The first of some unknowns, with the lengths of what moves them, that tell the null vectors apart (Gram and Schmidt).
+/// Returns the first unknowns, with lengths of their motion vectors, that separate the null vectors (Gram-Schmidt).
 fn to_hold(
     motions: &Motions,
     combinations: &Mat<f64>,
@@ -305,20 +305,20 @@ fn to_hold(
     held
 }
 
-/// Kinds of observations, by their numbers: groups are of the first.
+/// Observation types by index; groups have type 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Classes<'a> {
-    /// How many kinds there are.
+    /// Number of types.
     pub count: usize,
-    /// Of each tie.
+    /// Type of each tie.
     pub of_ties: &'a [usize],
-    /// Of each unknown, as an observation of itself.
+    /// Type of each unknown, as an observation of itself.
     pub of_unknowns: &'a [usize],
 }
 
 impl AnyProblem<'_> {
-    /// For each kind of observation the share of what a motion changes in it that remains when all unknowns move together, the greatest
-    /// of all motions: one for what is fixed, and rounding where the kind leaves all of them open.
+    /// Returns for each observation type the joint change by a motion relative to the changes by single unknowns, maximum over the motions.
+    /// The value is 1 for fixed unknowns, and a rounding error if the type leaves all motions free.
     pub fn resistance(&self, values: &[f64], classes: &Classes<'_>, threads: &Threads) -> Vec<f64> {
         let none = vec![0.0; classes.count];
         let Some(motions) = threads.install(|| self.model.all_motions(values)) else { return none };

@@ -1,14 +1,14 @@
-//! Tails of test statistics where the hypothesis is wrong: how surely an error of a given size is found.
+//! Noncentral distributions: power of tests for an error of a given size.
 //!
-//! A statistic of `m` degrees of freedom that an error moves by the noncentrality `lambda` is a mixture of central ones: of `m + 2 j`
-//! degrees of freedom with the probability of `j` in a Poisson distribution of mean `lambda / 2`.
+//! A statistic with `m` degrees of freedom and noncentrality `lambda` is a mixture of central distributions with `m + 2 j` degrees of
+//! freedom. Their weights are the probabilities of `j` in a Poisson distribution of mean `lambda / 2`.
 
 use super::distributions::{Tail, chi_square, chi_square_quantile, fisher_limit, quantile};
 use statrs::function::beta::checked_beta_reg;
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
 
-/// Beyond it the noncentral variable hardly varies: relative to itself by less than 0.002.
+/// Noncentrality above which the relative variation of the variable is below 0.002.
 const LARGE: f64 = 1e6;
 
 /// Probability that a noncentral chi-square variable exceeds `x`.
@@ -27,7 +27,7 @@ pub fn noncentral_chi_square(x: f64, dof: f64, noncentrality: f64) -> f64 {
     mixture(noncentrality / 2.0, |j| chi_square(x, dof + 2.0 * j, Tail::Upper))
 }
 
-/// Probability that a noncentral F variable exceeds `x`; with `second` infinite that of the chi-square variable over `first`.
+/// Probability that a noncentral F variable exceeds `x`; for infinite `second`, chi-square divided by `first`.
 pub fn noncentral_fisher(x: f64, first: f64, second: f64, noncentrality: f64) -> f64 {
     if second == f64::INFINITY {
         return noncentral_chi_square(first * x, first, noncentrality);
@@ -42,9 +42,9 @@ pub fn noncentral_fisher(x: f64, first: f64, second: f64, noncentrality: f64) ->
     mixture(noncentrality / 2.0, |j| checked_beta_reg(second / 2.0, first / 2.0 + j, y).unwrap_or(f64::NAN))
 }
 
-/// The noncentrality at which the test of the level is significant with the probability `power` (Baarda's lambda0).
+/// Noncentrality at which a test of significance `level` has the given `power` (Baarda's lambda0).
 ///
-/// The test is that of chi-square with `first` degrees of freedom, or that of F with `first` and `second`, where these are finite.
+/// The test is chi-square with `first` degrees of freedom if `second` is infinite, otherwise F with `first` and `second`.
 pub fn detectable_noncentrality(level: f64, power: f64, first: f64, second: f64) -> f64 {
     if !(level > 0.0 && level < power && power < 1.0 && first > 0.0 && first.is_finite() && second > 0.0) {
         return f64::NAN;
@@ -57,8 +57,8 @@ pub fn detectable_noncentrality(level: f64, power: f64, first: f64, second: f64)
     quantile(power, Tail::Lower, |noncentrality| noncentral_fisher(limit, first, second, noncentrality))
 }
 
-/// The level at which the chi-square test of `dof` degrees of freedom finds the noncentrality with the probability `power`, and its
-/// critical value (Baarda's B-method: tests of all dimensions find the same error equally well).
+/// Returns the significance level at which a chi-square test with `dof` degrees of freedom has the given power for a noncentrality, and its
+/// critical value. (Baarda's B-method: tests of all dimensions detect the same error with equal power.)
 pub fn level_of_equal_power(noncentrality: f64, power: f64, dof: f64) -> (f64, f64) {
     if !(noncentrality >= 0.0 && noncentrality.is_finite() && dof > 0.0 && dof.is_finite()) {
         return (f64::NAN, f64::NAN);
@@ -67,13 +67,13 @@ pub fn level_of_equal_power(noncentrality: f64, power: f64, dof: f64) -> (f64, f
     (chi_square(limit, dof, Tail::Upper), limit)
 }
 
-/// Mean of `of(j)`, which is between 0 and 1 and grows with `j`, over a Poisson distribution.
+/// Mean of `of(j)`, which is between 0 and 1 and increases with `j`, over a Poisson distribution.
 fn mixture(mean: f64, of: impl Fn(f64) -> f64) -> f64 {
     let mode = mean.floor();
     let weight = |j: f64| if mean == 0.0 { 1.0 } else { (j * mean.ln() - mean - ln_gamma(j + 1.0)).exp() };
     let mut sum = 0.0;
     let (mut j, mut part) = (mode, weight(mode));
-    // From the most probable number up, until what is left, a geometric series at most, is nothing.
+    // Sum upwards from the mode until the rest, bounded by a geometric series, is negligible.
     loop {
         sum += part * of(j);
         let next = mean / (j + 1.0);
@@ -104,7 +104,7 @@ mod tests {
         (value / expected - 1.0).abs() < tolerance
     }
 
-    /// Printed in Baarda (1968) and every text since: 17.075 for 0.001 and 0.80.
+    /// Value of Baarda (1968): 17.075 for 0.001 and 0.80.
     #[test]
     fn baardas_table() {
         for (level, power, dimension, expected) in [
@@ -125,7 +125,7 @@ mod tests {
         assert!(close(level, 0.001, 1e-6) && close(limit, 10.827_566_17, 1e-7));
     }
 
-    /// One degree of freedom has a closed form by the normal distribution; the large ones go over without a step.
+    /// Closed form for one degree of freedom by the normal distribution; continuous transition to large noncentralities.
     #[test]
     fn from_small_to_large() {
         for (shift, x) in [(0.5_f64, 4.0_f64), (4.13, 10.8), (100.0, 9_900.0), (900.0, 811_000.0)] {
@@ -141,7 +141,7 @@ mod tests {
             let step = noncentral_fisher(x, 1.0, 2.0, above) - noncentral_fisher(x, 1.0, 2.0, below);
             assert!(step.abs() < 2e-5, "{step}");
         }
-        // One degree of freedom in the denominator: only huge errors are found.
+        // With one degree of freedom in the denominator only huge errors are detectable.
         assert!(detectable_noncentrality(1e-6, 0.8, 1.0, 1.0) > 1e11);
     }
 

@@ -1,11 +1,11 @@
-//! The equations of all observations as sparse rows of unit weight: what is asked of them one by one, by way of solutions.
+//! Sparse rows of unit weight for all observation equations.
 
 use super::equations::ObservationEquations;
 use super::problem::AnyProblem;
 use crate::{Threads, parallel};
 
-/// Equations a x = l of unit weight: first those of observations, in the order of groups and rows, then of ties and rows; then one for each
-/// unknown, that of it as an observation of itself, empty where it is none.
+/// Equations a x = l of unit weight: groups and rows first, then ties and rows, then one equation per unknown as an observation of itself,
+/// empty unless weighted.
 #[derive(Debug)]
 pub struct ObservationRows {
     starts: Vec<usize>,
@@ -15,7 +15,7 @@ pub struct ObservationRows {
 }
 
 impl ObservationRows {
-    /// At the given values, without the columns of unknowns that are fixed or held.
+    /// Creates the rows at given values, without columns of fixed or constrained unknowns.
     pub fn new(problem: &AnyProblem<'_>, values: &[f64], held: &[usize], threads: &Threads) -> Self {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
         let of_locals = problem.for_locals(threads, |buffers, local| {
@@ -35,7 +35,7 @@ impl ObservationRows {
         all
     }
 
-    /// A x of every row for several x without keeping the rows: for each row, in their order, a number for each x.
+    /// Computes A x for several x without storing the rows; the result has one number per x for each row, in order.
     pub fn products(
         problem: &AnyProblem<'_>,
         values: &[f64],
@@ -80,12 +80,12 @@ impl ObservationRows {
         self.constants.extend(part.constants);
     }
 
-    /// Observed minus computed of every row.
+    /// Returns the misclosures (observed minus computed) of all rows.
     pub fn constants(&self) -> &[f64] {
         &self.constants
     }
 
-    /// The unknowns of a row, with their coefficients.
+    /// Returns the unknowns of a row, with their coefficients.
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> {
         let range = self.starts[row]..self.starts[row + 1];
         self.unknowns[range.clone()]
@@ -94,13 +94,13 @@ impl ObservationRows {
             .map(|(&i, &value)| (i as usize, value))
     }
 
-    /// A x for some rows.
+    /// Computes A x for some rows.
     pub fn times(&self, rows: &[usize], x: &[f64], threads: &Threads) -> Vec<f64> {
         let product = |&row: &usize| self.row(row).map(|(unknown, value)| value * x[unknown]).sum::<f64>();
         threads.install(|| parallel::map(rows.len(), 1024, |k| product(&rows[k])))
     }
 
-    /// A^T e of one row: a right-hand side over all unknowns.
+    /// Returns one row as a right-hand side A^T e over all unknowns.
     pub fn right(&self, row: usize, unknowns: usize) -> Vec<f64> {
         let mut right = vec![0.0; unknowns];
         self.row(row).for_each(|(unknown, value)| right[unknown] += value);
@@ -108,7 +108,7 @@ impl ObservationRows {
     }
 }
 
-/// Puts a row times each x behind what is there.
+/// Appends the products of a row with each x.
 fn multiply(row: impl Iterator<Item = (usize, f64)>, xs: &[Vec<f64>], found: &mut Vec<f64>) {
     let start = found.len();
     found.resize(start + xs.len(), 0.0);

@@ -1,9 +1,9 @@
-//! A part of a problem that is adjusted in parts: a node of its elimination tree (Helmert 1880; Wolf 1978).
+//! Part of a partitioned problem: a node of its elimination tree (Helmert 1880; Wolf 1978).
 //!
-//! A part has observations of its own, unknowns that nothing outside of it and the parts below touches, and outer ones, which parts above
-//! eliminate. With what the parts below leave it forms its normal equations, eliminates its own unknowns and leaves the rest for the
-//! part above ([`Contribution`]); from the step of the outer unknowns follow those of its own, and from the cofactors of the outer
-//! unknowns its own. The part of a problem without outer unknowns is the last one.
+//! A part has inner unknowns, which only it and its child parts involve, and outer unknowns, which parent parts eliminate. It forms its
+//! normal equations from its observations and the contributions of its children. It eliminates the inner unknowns and passes a
+//! [`Contribution`] to its parent. From the step and cofactors of the outer unknowns it then computes those for the inner ones. The root
+//! part has zero outer unknowns.
 
 use thiserror::Error;
 
@@ -20,37 +20,37 @@ use crate::normals::{
     Contribution, Equations, FactorOptions, InvertOptions, ReducedRights, SolveOptions, packed,
 };
 
-/// Why a part is not formed, solved or inverted.
+/// Error of the formation, solution or inversion of a part.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum PartError {
-    /// What it was given is not over its outer unknowns, or those of the parts below; or its own equations are damped.
+    /// Contributions, steps or cofactors of other unknowns than required, or damped equations.
     #[error("what a part was given by others is over other unknowns, or its equations are damped")]
     Foreign,
-    /// What ends adjustments.
+    /// Error of the adjustment.
     #[error(transparent)]
     Adjust(#[from] AdjustError),
 }
 
-/// How a part is formed.
+/// Options of the formation of a part.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PartOptions {
-    /// Unknowns held for the datum of the whole, outer ones among them.
+    /// Unknowns constrained for the datum of the whole problem, including outer ones.
     pub held: Vec<usize>,
-    /// A fraction of the diagonal of the normal equations that is added to it.
+    /// Fraction of the diagonal of the normal equations that is added to it.
     pub damping: f64,
-    /// What weights the observations.
+    /// Robust loss of the observations.
     pub loss: Option<Loss>,
-    /// Whether its second-order term is taken in, as close to the end it may be; cofactors are had without.
+    /// Whether to use its second-order term, as for short steps; cofactors are computed without it.
     pub curved: bool,
 }
 
 impl Linearized {
-    /// Forms the normal equations of a part at given values and eliminates what is at home here.
+    /// Forms the normal equations of a part at given values and eliminates its inner unknowns.
     ///
-    /// * `contributions`: what the parts below leave, in the order of the layout: they are added in this order.
+    /// * `contributions`: contributions of the child parts, in the order of the layout, which is also the order of summation.
     ///
     /// # Errors
-    /// Contributions of other unknowns, lengths that contradict the layout, an interruption, no memory.
+    /// Contributions of other unknowns, lengths that contradict the layout, an interruption, lack of memory.
     pub fn of_part(
         problem: &AnyProblem<'_>,
         values: Vec<f64>,
@@ -79,20 +79,20 @@ impl Linearized {
             let residuals = problem.residuals_at(threads, equations.at());
             formed.sum_of_squares = problem.objective(&formed.values, &residuals, loss);
         }
-        // The factor waits for the way down, perhaps with those of many others.
+        // The factor is stored until back-substitution, possibly with many others.
         problem.system.release();
         Ok(formed)
     }
 
-    /// What a part leaves for its outer unknowns; empty the second time.
+    /// Returns the contribution to the outer unknowns; empty at the second call.
     pub fn take_contribution(&mut self) -> Contribution<'static> {
         self.factor.take_contribution()
     }
 
-    /// The step of all unknowns of a part, those of the outer ones being given.
+    /// Computes the step of all unknowns of a part from the step of the outer ones.
     ///
     /// # Errors
-    /// An interruption, no memory; another number of outer unknowns.
+    /// Interruption, lack of memory, or a wrong number of outer unknowns.
     pub fn solve_part(
         &self,
         problem: &AnyProblem<'_>,
@@ -108,10 +108,10 @@ impl Linearized {
         Ok(self.solve(&self.equations(problem, threads), &options, threads, &mut between)?)
     }
 
-    /// Reduces right-hand sides over the unknowns of a part, one after the other: those at home here, with what the parts below have left.
+    /// Reduces right-hand sides over the unknowns of a part, one after the other, including contributions of child parts.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn reduce_rights(
         &self,
         problem: &AnyProblem<'_>,
@@ -127,11 +127,11 @@ impl Linearized {
         Ok(found.map_err(AdjustError::from)?)
     }
 
-    /// Reduces the right-hand side that the equations of a part have at other values, `left` of the parts below in it: a chord, over all parts.
-    /// None where the factor has not cached what that takes.
+    /// Reduces the right-hand side of a part for a chord: its equations at other values, plus the contributions `left` of child parts. None
+    /// if the factor lacks the cache.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn reduce_chord(
         &self,
         problem: &AnyProblem<'_>,
@@ -153,7 +153,7 @@ impl Linearized {
         Ok(Some(found.map_err(AdjustError::from)?))
     }
 
-    /// Right-hand sides, zero where unknowns are held or fixed: these stand in the normal equations by themselves.
+    /// Zeroes right-hand sides of constrained or fixed unknowns, whose normal equations are decoupled.
     fn of_free(&self, problem: &AnyProblem<'_>, mut rights: Vec<f64>) -> Vec<f64> {
         let unknowns = problem.layout().unknowns();
         let fixed: Vec<usize> = (0..unknowns).filter(|&unknown| !self.is_free(problem, unknown)).collect();
@@ -163,10 +163,10 @@ impl Linearized {
         rights
     }
 
-    /// Solves where right-hand sides were reduced, the solutions for the outer unknowns being given.
+    /// Solves for all unknowns, from reduced right-hand sides and the solutions of the outer unknowns.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn solve_reduced_rights<const C: usize>(
         &self,
         problem: &AnyProblem<'_>,
@@ -183,14 +183,14 @@ impl Linearized {
         Ok(found.map_err(AdjustError::from)?)
     }
 
-    /// The adjustment of what is at home in a part, and the cofactors of the unknowns of each part below: lower triangles, column by column.
+    /// Computes the adjustment of the inner unknowns and the cofactors for each child part: lower triangles, column by column.
     ///
-    /// * `outer`: the same of the outer unknowns;
-    /// * `reached`: the values after the last step; cofactors are those of the values before it;
-    /// * `datum`: what takes them to a datum of the whole. Those of the parts below are not taken there.
+    /// * `outer`: cofactors of the outer unknowns, in the same form;
+    /// * `reached`: values after the last step; cofactors refer to the values before it;
+    /// * `datum`: transformation to a datum of the whole. Cofactors for child parts are not transformed.
     ///
     /// # Errors
-    /// Unknowns that are not determined, an interruption, no memory; another number of outer unknowns.
+    /// Undetermined unknowns, an interruption, lack of memory, or a wrong number of outer unknowns.
     pub fn invert_part(
         self,
         problem: &AnyProblem<'_>,

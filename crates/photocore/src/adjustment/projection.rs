@@ -1,4 +1,4 @@
-//! What the residuals make of errors: products with R = I - A Q A^T, A being the equations in unit weight.
+//! Effect of observation errors on residuals: products with R = I - A Q A^T, with equations A in unit weight.
 
 use std::ops::Range;
 
@@ -10,26 +10,25 @@ use super::walk::Buffers;
 use crate::normals::{Between, SolveOptions};
 use crate::{Threads, parallel};
 
-/// Parts that the walk over the local blocks is made of, whatever the number of threads: so sums have the same bits.
+/// Number of parts of the loop over local blocks, for sums that are independent of the number of threads.
 const PARTS: usize = 16;
 
-/// What an equation takes of the unknowns.
+/// Unknowns of an equation with their coefficients.
 type Taken = Vec<(usize, f64)>;
 
 impl<M: ?Sized> Problem<M> {
-    /// How many equations there are: those of the groups and of the ties, row by row, then one for each unknown as an observation of
-    /// itself, which is empty unless it is weighted.
+    /// Number of equations: rows of groups and of ties, then one per unknown as an observation of itself, which is empty unless weighted.
     pub fn equations(&self) -> usize {
         self.observation_sd.len() + self.sd.len()
     }
 }
 
 impl Linearized {
-    /// R z for columns z over the equations of [`Problem::equations`], one after the other; so are the products: what errors z, in
-    /// standard deviations, leave as residuals. The same bits for any number of threads; a datum does not matter.
+    /// Computes R z for columns z over the equations of [`Problem::equations`], one after the other: the residuals caused by errors z, in
+    /// standard deviations. Bitwise identical for any number of threads; independent of the datum.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn project(
         &self,
         problem: &AnyProblem<'_>,
@@ -46,7 +45,7 @@ impl Linearized {
         Ok(columns)
     }
 
-    /// Whether each equation of [`Problem::equations`] is one: those of unknowns are where these are weighted, and not held.
+    /// Returns a flag per equation of [`Problem::equations`]: for unknowns, whether they are weighted and not constrained.
     pub fn is_equation(&self, problem: &AnyProblem<'_>) -> Vec<bool> {
         let mut found = vec![true; problem.observation_sd.len()];
         found.extend((0..problem.sd.len()).map(|i| problem.is_weighted(i) && !self.held.contains(&i)));
@@ -54,12 +53,12 @@ impl Linearized {
     }
 }
 
-/// The equations at adjusted values, in unit weight.
+/// Equations at adjusted values, in unit weight.
 struct Rows<'a> {
     problem: &'a AnyProblem<'a>,
     equations: ObservationEquations<'a>,
     values: &'a [f64],
-    /// Which unknowns are fixed or held.
+    /// Flags of fixed or constrained unknowns.
     fixed: Vec<bool>,
 }
 
@@ -70,13 +69,13 @@ impl<'a> Rows<'a> {
         Self { problem, equations, values, fixed: problem.fixed(held) }
     }
 
-    /// The local blocks of a part.
+    /// Returns the local blocks of a part.
     fn locals(&self, part: usize) -> Range<usize> {
         let locals = self.problem.layout().locals();
         part * locals / PARTS..(part + 1) * locals / PARTS
     }
 
-    /// A^T z for every column, over all unknowns.
+    /// Returns A^T z for every column, over all unknowns.
     fn transposed(&self, columns: &[f64]) -> Vec<f64> {
         let (layout, height) = (self.problem.layout(), self.problem.equations());
         let (unknowns, others) = (layout.unknowns(), layout.all_locals().end);
@@ -115,7 +114,7 @@ impl<'a> Rows<'a> {
         rights
     }
 
-    /// z - A x for every column.
+    /// Computes z - A x for every column.
     fn subtract(&self, solutions: &[f64], columns: &mut [f64]) {
         let (unknowns, height) = (self.problem.layout().unknowns().max(1), self.problem.equations());
         let along =
@@ -142,7 +141,7 @@ impl<'a> Rows<'a> {
         });
     }
 
-    /// Hands out the rows of some local blocks: their number, and what they take.
+    /// Calls `take` with the index and the unknowns of each row of some local blocks.
     fn each_row_of(&self, locals: Range<usize>, mut take: impl FnMut(usize, &Taken)) {
         let (mut buffers, mut taken) = (Buffers::default(), Taken::new());
         for local in locals {
@@ -154,7 +153,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The same of ties and of terms.
+    /// Calls `take` with the rows of ties and priors.
     fn each_other_row(&self, mut take: impl FnMut(usize, &Taken)) {
         self.equations.each_row_of_ties(|_, row| take(row.number, &row.taken().collect()));
         let (problem, first) = (self.problem, self.problem.observation_sd.len());

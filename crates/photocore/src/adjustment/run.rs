@@ -1,4 +1,4 @@
-//! What all iterations share: forming, factoring, solving, and the end with its cofactors.
+//! Operations common to all iterations: formation, factorisation, solution and final cofactors.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -15,20 +15,19 @@ use super::secants::Secants;
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Stopped, Threads};
 
-/// Called with what is going on, on the calling thread; breaking stops the work.
+/// Progress callback, called on the calling thread with events; `Break` stops the work.
 pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
 
-/// Nobody watches.
+/// Progress callback that never stops the work.
 pub(crate) fn go_on(_: Event) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
 impl<M: Model> Problem<M> {
-    /// Adjusts by least squares, on threads of its own; [`adjust`] takes those of its caller and tells what is going on.
+    /// Adjusts by least squares on its own threads; [`adjust`] uses the caller's threads and reports progress.
     ///
     /// # Errors
-    /// Lengths that contradict the layout, unknowns that are not determined, or observations that cannot be computed; threads that cannot
-    /// be started.
+    /// Lengths that contradict the layout, undetermined unknowns, observations that cannot be computed, or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
         adjust(self.any(), options, &Threads::new(options.threads)?, &mut go_on)
     }
@@ -36,10 +35,10 @@ impl<M: Model> Problem<M> {
 
 /// Adjusts a problem by least squares.
 ///
-/// `watch` is called on the calling thread with what is going on; when it breaks, the adjustment stops.
+/// `watch` is called on the calling thread with progress events; `Break` stops the adjustment.
 ///
 /// # Errors
-/// Lengths that contradict the layout, unknowns that are not determined, observations that cannot be computed, or an interruption.
+/// Lengths that contradict the layout, undetermined unknowns, observations that cannot be computed, or an interruption.
 pub fn adjust(
     problem: &AnyProblem<'_>,
     options: &Options,
@@ -49,13 +48,13 @@ pub fn adjust(
     adjusted(problem, options, None, threads, watch, None)
 }
 
-/// Adjusts a network that is free, to end in a datum: it is moved there before the last formation, so that this one serves the cofactors
-/// in that datum. [`Adjustment::lost`] says whether it has; otherwise there are no cofactors, and [`Adjustment::take_to`] is still to do.
+/// Adjusts a free network in a given datum: it is transformed before the last formation, which then also provides the cofactors. If this
+/// succeeds, [`Adjustment::lost`] is set. Otherwise cofactors are missing, and the caller must call [`Adjustment::take_to`].
 ///
-/// * `reference`: the values from which the carriers move least, usually the initial ones.
+/// * `reference`: the values from which the carriers move least, usually the initial values.
 ///
 /// # Errors
-/// Those of [`adjust`].
+/// As for [`adjust`].
 pub fn adjust_in_datum(
     problem: &AnyProblem<'_>,
     options: &Options,
@@ -67,13 +66,13 @@ pub fn adjust_in_datum(
     adjusted(problem, options, Some(Target { datum, reference }), threads, watch, None)
 }
 
-/// Adjusts, and keeps what tests of groups of observations need: [`Leverages::of`] takes it over.
+/// Adjusts, and stores the data for tests of groups of observations, which [`Leverages::of`] uses.
 ///
-/// * `joint`: unknowns whose cofactors with each other are kept too ([`Adjustment::joint`]), from the last factor;
-/// * `memory`: where they take no more bytes than these (None: any number).
+/// * `joint`: unknowns with mutual cofactors ([`Adjustment::joint`]), computed from the last factor;
+/// * `memory`: maximum size of these cofactors in bytes, above which they are omitted (None for unlimited).
 ///
 /// # Errors
-/// Those of [`adjust`].
+/// As for [`adjust`].
 ///
 /// [`Leverages::of`]: super::Leverages::of
 pub fn adjust_by_groups(
@@ -136,15 +135,14 @@ fn adjusted(
     run.finish(end, initial_sum_of_squares)
 }
 
-/// A step that changes the unknowns by less than this multiple of their standard deviations leads to where the second-order term of
-/// a loss does no harm.
+/// Maximum change, in standard deviations, for the second-order term of a loss, which is harmful farther from the solution.
 pub(super) const NEAR: f64 = 1.0;
 
-/// Where the iterations are.
+/// Current linearization of the iterations.
 pub(super) struct State<'a> {
     pub equations: ObservationEquations<'a>,
     pub linearized: Linearized,
-    /// The values before the network was moved to its datum, where it was.
+    /// Values before the transformation to the datum, if any.
     before: Option<Vec<f64>>,
 }
 
@@ -153,47 +151,47 @@ impl State<'_> {
         &self.linearized.values
     }
 
-    /// The unknowns as the last step has left them.
+    /// Returns the unknowns after the last step, before a transformation to the datum.
     pub fn reached(&self) -> &[f64] {
         self.before.as_deref().unwrap_or(self.values())
     }
 
-    /// Gives its memory back for the next one; its values.
+    /// Releases its memory for the next linearization and returns its values.
     pub fn recycle(self) -> Vec<f64> {
         self.linearized.recycle(self.equations.problem())
     }
 
-    /// The unknowns that a step moves most.
+    /// Returns the unknowns that a step moves most.
     pub fn moved(&self, step: &[f64]) -> Vec<usize> {
         self.linearized.factor.moved(&self.equations.problem().system, step)
     }
 }
 
-/// Where the iterations ended. There are no cofactors where the last values leave unknowns undetermined.
+/// Final state of the iterations, without cofactors if the final values leave unknowns undetermined.
 pub(super) struct End<'a> {
     pub status: Status,
     pub unknowns: Vec<f64>,
-    /// What cofactors are computed from.
+    /// Linearization for the cofactors.
     pub state: Option<State<'a>>,
-    /// Why there is none.
+    /// Reason for a missing linearization.
     pub undetermined: Option<AdjustError>,
-    /// The last iteration and its step, still to be applied: the cofactors hold before it.
+    /// Last iteration and its step, not applied yet; cofactors refer to the values before it.
     pub last: Option<(Iteration, Vec<f64>)>,
 }
 
 impl<'a> End<'a> {
-    /// At given values, without cofactors.
+    /// Ends at given values, without cofactors.
     pub fn at(status: Status, unknowns: Vec<f64>) -> Self {
         Self { status, unknowns, state: None, undetermined: None, last: None }
     }
 
-    /// At values with all that their cofactors are computed from.
+    /// Ends at the values of a linearization, with cofactors.
     pub fn with(status: Status, state: State<'a>) -> Self {
         let unknowns = state.values().to_vec();
         Self { state: Some(state), ..Self::at(status, unknowns) }
     }
 
-    /// After one more step, with the cofactors of the equations that have given it.
+    /// Ends after one more step, with cofactors from the equations before it.
     pub fn after(status: Status, state: State<'a>, step: Vec<f64>, iteration: Iteration) -> Self {
         Self { last: Some((iteration, step)), ..Self::with(status, state) }
     }
@@ -202,13 +200,13 @@ impl<'a> End<'a> {
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
-    /// Where what tests of groups need is kept: unknowns whose cofactors with each other are kept too, and the bytes that these may take.
+    /// Options for tests of groups: unknowns with mutual cofactors, and the maximum size of these in bytes.
     by_groups: Option<(&'a [usize], Option<usize>)>,
-    /// The datum to end in.
+    /// Requested datum.
     target: Option<Target<'a>>,
-    /// Whether the next formation will be the last one, there being a datum to end in.
+    /// Whether the next formation is expected to be the last, if a datum is requested.
     is_near: bool,
-    /// Whether the network was moved on its way.
+    /// Whether the network was transformed during the iterations.
     has_moved: bool,
     pub threads: &'a Threads,
     pub(super) watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
@@ -217,23 +215,23 @@ pub(super) struct Run<'a, 'w> {
     pub iterations: Vec<Iteration>,
     history: Vec<Vec<f64>>,
     last_local_corrections: Vec<f64>,
-    /// Unknowns held for a datum; in a trust region empty until the iterations are over.
+    /// Unknowns constrained for a datum; in a trust region empty until the iterations have ended.
     pub datum: Vec<usize>,
-    /// The length of the chord that followed the last step, where one did.
+    /// Length of the chord after the last step, if any.
     pub chord: Option<f64>,
-    /// What full steps have shown where they fall slowly.
+    /// History of full steps for their acceleration in case of slow convergence.
     pub secants: Secants,
-    /// Whether to take in the second-order term of the loss from now on: once the steps are short.
+    /// Whether to use the second-order term of the loss: as soon as steps are short.
     pub curved: bool,
-    /// Unknowns that a combination moves which full steps cannot follow (see [`Adjustment::weak`]).
+    /// Unknowns in a combination that full steps cannot follow (see [`Adjustment::weak`]).
     pub weak: Vec<usize>,
-    /// Local blocks that harm all others, or leave them (see [`Adjustment::collapsed`]).
+    /// Ill-conditioned or diverging local blocks (see [`Adjustment::collapsed`]).
     pub collapsed: Vec<usize>,
 }
 
 impl<'a> Run<'a, '_> {
-    /// Ends at the values reached, without a further step. Cofactors are those of the reweighted equations, whose weights can be
-    /// reported, without second-order term.
+    /// Ends at the current values without another step. Cofactors belong to the reweighted equations without second-order term, because
+    /// their weights can be reported.
     pub(super) fn stay(&mut self, state: State<'a>, status: Status) -> Result<End<'a>, AdjustError> {
         let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
         self.curved = false;
@@ -243,8 +241,8 @@ impl<'a> Run<'a, '_> {
         Ok(End { undetermined: Some(error), ..End::at(status, state.recycle()) })
     }
 
-    /// The step; None where an earlier one has led to values that leave unknowns undetermined. That the initial values do is an
-    /// error: then the observations do.
+    /// Computes the step; None if an earlier step led to values that leave unknowns undetermined. An error if the initial values already
+    /// do.
     pub(super) fn step(&mut self, state: &State<'a>) -> Result<Option<Vec<f64>>, AdjustError> {
         match state.linearized.undetermined() {
             Some(_) if !self.iterations.is_empty() => return Ok(None),
@@ -269,12 +267,12 @@ impl<'a> Run<'a, '_> {
         Ok(found)
     }
 
-    /// The weighted sum of squares, of losses where the options ask for a loss, at the given values.
+    /// Returns the weighted sum of squares at given values; with a loss, the sum of losses.
     pub(super) fn objective(&self, unknowns: &[f64]) -> f64 {
         self.objective_at(unknowns, &*self.threads.install(|| self.problem.model.at(unknowns)))
     }
 
-    /// The same of a model that is evaluated already.
+    /// Returns the objective at an evaluated model.
     pub(super) fn objective_at(&self, unknowns: &[f64], at: &dyn Evaluated) -> f64 {
         self.problem.objective(unknowns, &self.problem.residuals_at(self.threads, at), self.options.loss)
     }
@@ -291,7 +289,7 @@ impl<'a> Run<'a, '_> {
         Ok(State { before, ..state })
     }
 
-    /// Says that the next formation is that after a step, which will be the last one where full steps that converge quadratically say so.
+    /// Predicts from quadratic convergence of full steps whether the next linearization is the last.
     pub(super) fn look_ahead(&mut self, last: &Iteration) {
         let full = |iteration: &Iteration| iteration.damping == 0.0;
         let before = self.iterations.last().filter(|before| full(before) && full(last));
@@ -300,7 +298,7 @@ impl<'a> Run<'a, '_> {
         self.is_near = self.target.is_some() && next.is_some_and(|next| leaves_cofactors(next, unknowns));
     }
 
-    /// Moves the network to the datum that it is to end in; it stays where it cannot be moved there. Also where it was.
+    /// Transforms the values to the requested datum if possible. Also returns the values before the transformation.
     fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
         let Some(Target { datum, reference }) = self.target else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
@@ -313,7 +311,7 @@ impl<'a> Run<'a, '_> {
         }
     }
 
-    /// The same at a model that is evaluated already.
+    /// Forms the normal equations at an evaluated model.
     pub(super) fn formed(
         &mut self,
         unknowns: Vec<f64>,
@@ -341,7 +339,7 @@ impl<'a> Run<'a, '_> {
         let mut unknowns = end.unknowns.clone();
         let is_at_target = end.state.as_ref().is_some_and(|state| state.linearized.basis.is_some());
         if let Some(state) = end.state.as_mut().filter(|_| !is_at_target) {
-            // Nothing is solved for any more: what elimination has left makes room for the results.
+            // Cached local eliminations are no longer needed; their memory is released for the results.
             state.linearized.factor.forget();
         }
         let basis = end.state.as_ref().and_then(|state| state.linearized.basis.as_ref());
@@ -389,19 +387,19 @@ impl<'a> Run<'a, '_> {
         })
     }
 
-    /// Whether a step has led local blocks to where they harm all others; keeps them.
+    /// Whether a step made local blocks ill-conditioned; stores them.
     pub(super) fn has_collapsed(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
         self.collapsed = self.threads.install(|| after.collapsed(before));
         !self.collapsed.is_empty()
     }
 
-    /// Whether a step has led local blocks out of the whole; keeps them.
+    /// Whether a step made local blocks diverge; stores them.
     pub(super) fn has_run_off(&mut self, before: &[f64], after: &dyn Evaluated) -> bool {
         self.collapsed = self.threads.install(|| after.run_off(before));
         !self.collapsed.is_empty()
     }
 
-    /// Keeps an iteration that stands, with its corrections, and tells of it.
+    /// Stores and reports an accepted iteration with its corrections.
     pub(super) fn accept(
         &mut self,
         iteration: Iteration,
@@ -414,7 +412,7 @@ impl<'a> Run<'a, '_> {
         self.last_local_corrections = corrections.collect();
         self.curved = self.options.loss.is_some() && iteration.largest_change <= NEAR;
         let corrected = match (self.has_moved, self.history.last()) {
-            // A move is no correction.
+            // A datum transformation is not a correction.
             (true, Some(last)) => {
                 let steps = before[locals.end..].iter().zip(&after[locals.end..]);
                 last.iter().zip(steps).map(|(value, (from, to))| value + (to - from)).collect()
@@ -434,7 +432,7 @@ fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
     }
 }
 
-/// Tells of local blocks done.
+/// Reports finished local blocks.
 pub(super) fn between(
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     phase: Phase,

@@ -1,11 +1,9 @@
-//! Steps corrected by what those before them have shown (Anderson 1965; Walker and Ni 2011, "Anderson acceleration for fixed-point
-//! iterations").
+//! Anderson acceleration of steps (Anderson 1965; Walker and Ni 2011, "Anderson acceleration for fixed-point iterations").
 //!
-//! Gauss-Newton steps p = -N^-1 (N + S) e, from an error e, leave out S, the second derivatives of the observations times their residuals.
-//! Where S is as large as N along a combination of unknowns, steps do not fall but swing across the solution (a lens of many knots whose
-//! distortion can be turned into attitudes: what little holds it is an observation as all others). Two steps one after the other, the first
-//! of which has been taken as s, show what they leave out: their difference is d = -N^-1 (N + S) s. With the c that make
-//! p - sum c d shortest in the metric of N, p - sum c (s + d) is a step that has learnt it.
+//! Gauss-Newton steps p = -N^-1 (N + S) e for an error e neglect S, the second derivatives of the observations times their residuals. If S
+//! is as large as N along a combination of unknowns, steps oscillate across the solution. An example is a spline lens whose distortion is
+//! nearly equivalent to attitudes. Two successive steps, the first applied as s, have the difference d = -N^-1 (N + S) s. With coefficients
+//! c that minimise p - sum c d in the metric of N, the accelerated step is p - sum c (s + d).
 
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
@@ -14,36 +12,36 @@ use super::equations::ObservationEquations;
 use crate::Threads;
 use crate::normals::Prior;
 
-/// Differences that are alike but for this part are one.
+/// Relative singular value below which differences are linearly dependent.
 const ALIKE: f64 = 1e-6;
 
-/// What full steps have shown.
+/// History of full steps for Anderson acceleration.
 #[derive(Debug, Default)]
 pub(super) struct Secants {
-    /// The last step as the equations gave it, and the values before it.
+    /// Last step from the equations, and the values before it.
     pub last: Option<(Vec<f64>, Vec<f64>)>,
-    /// Steps that have been taken, and by how much the step was another after each; none at all while steps fall.
+    /// Applied steps, each with the resulting change of the step; empty during fast convergence.
     pub pairs: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
 impl Secants {
-    /// Remembers a full step that has been taken from some values.
+    /// Stores a full step and the values before it.
     pub fn remember(&mut self, step: Vec<f64>, before: Vec<f64>) {
         self.last = Some((step, before));
     }
 
-    /// Whether steps are corrected.
+    /// Whether steps are accelerated.
     pub fn correct(&self) -> bool {
         !self.pairs.is_empty()
     }
 
-    /// Keeps a step that has been taken, and by how much the step was another after it; the oldest but so many are forgotten.
+    /// Stores an applied step and the resulting change of the step; at most `most` pairs are stored.
     pub fn keep(&mut self, taken: Vec<f64>, difference: Vec<f64>, most: usize) {
         self.pairs.drain(..(self.pairs.len() + 1).saturating_sub(most));
         self.pairs.push((taken, difference));
     }
 
-    /// The step that has learnt from those before, by its shares in [`Secants::all`].
+    /// Returns the accelerated step: a linear combination of [`Secants::all`].
     pub fn corrected(&self, step: &[f64], shares: &DVector<f64>) -> Vec<f64> {
         let mut own = vec![0.0; step.len()];
         for (each, share) in self.all(step).into_iter().zip(shares) {
@@ -52,14 +50,14 @@ impl Secants {
         own
     }
 
-    /// A step, the differences, and the steps that have been taken.
+    /// Returns the step, the differences and the applied steps.
     pub fn all<'s>(&'s self, step: &'s [f64]) -> Vec<&'s [f64]> {
         let differences = self.pairs.iter().map(|(_, difference)| &difference[..]);
         let taken = self.pairs.iter().map(|(taken, _)| &taken[..]);
         std::iter::once(step).chain(differences).chain(taken).collect()
     }
 
-    /// What the step that has learnt from those before takes of [`Secants::all`], by their products.
+    /// Returns the coefficients of the accelerated step in [`Secants::all`], from the products of these vectors.
     pub fn shares(&self, products: &DMatrix<f64>) -> Option<DVector<f64>> {
         let count = self.pairs.len();
         let scale = DVector::from_fn(count, |i, _| products[(i + 1, i + 1)].sqrt().recip());
@@ -73,7 +71,7 @@ impl Secants {
 }
 
 impl ObservationEquations<'_> {
-    /// The products u^T N v of every two steps, N with the priors.
+    /// Returns the products u^T N v of all pairs of steps, with priors in N.
     pub fn products(&self, threads: &Threads, prior: &Prior, steps: &[&[f64]]) -> DMatrix<f64> {
         let zeros = || DMatrix::<f64>::zeros(steps.len(), steps.len());
         let add = |sum: &mut DMatrix<f64>, weight: f64, u: &[f64], v: &[f64]| {
@@ -81,7 +79,7 @@ impl ObservationEquations<'_> {
                 sum.column_mut(j).iter_mut().zip(u).for_each(|(sum, u)| *sum += weight * u * v);
             }
         };
-        // Unknown by unknown.
+        // Stored by unknown.
         let unknowns = 0..steps.first().map_or(0, |step| step.len());
         let turned: Vec<f64> = unknowns.flat_map(|k| steps.iter().map(move |step| step[k])).collect();
         let of_unknown = |unknown: usize| &turned[unknown * steps.len()..][..steps.len()];

@@ -9,61 +9,61 @@ use super::terms::weighted_among;
 use crate::Threads;
 use crate::normals::{Cofactors, dot};
 
-/// What an adjustment counts.
+/// Numbers of observations and unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
-    /// Observations proper.
+    /// Observations, without weighted unknowns.
     pub observations: usize,
-    /// Unknowns that are observed themselves (a finite standard deviation, not zero).
+    /// Weighted unknowns (finite, nonzero standard deviation).
     pub weighted: usize,
-    /// Unknowns that are not fixed, nor held for a datum.
+    /// Unknowns that are neither fixed nor constrained for a datum.
     pub unknowns: usize,
 }
 
 impl Counts {
-    /// Observations, those of unknowns themselves among them, minus unknowns.
+    /// Number of observations and weighted unknowns, minus the number of unknowns.
     pub fn degrees_of_freedom(&self) -> i64 {
         (self.observations + self.weighted) as i64 - self.unknowns as i64
     }
 }
 
-/// A group of observations after the adjustment.
+/// Group of observations after the adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct Observed<const ROWS: usize> {
     /// Observed minus computed, in the units of the observations.
     pub residual: [f64; ROWS],
-    /// Redundancy numbers; NaN when not asked for.
+    /// Redundancy numbers; NaN if not requested.
     pub redundancy: [f64; ROWS],
-    /// See [`standardized`]; NaN when not asked for, and where the redundancy is zero.
+    /// Standardized residuals (see [`standardized`]); NaN if not requested or if the redundancy is zero.
     pub standardized: [f64; ROWS],
-    /// The factor by which a loss has changed their weights; 1 without a loss.
+    /// Weight factor from the loss; 1 without a loss.
     pub weight: f64,
 }
 
-/// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN without redundancy.
+/// Standardized residual: residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w). NaN without
+/// redundancy.
 pub fn standardized(residual: f64, sd: f64, redundancy: f64) -> f64 {
-    // What rounding leaves of a redundancy of zero would make a test value of noise.
+    // A redundancy number of pure rounding error would give a meaningless test value.
     if redundancy > 1e-10 { residual / (sd * redundancy.sqrt()) } else { f64::NAN }
 }
 
-/// Residual / standard deviation; zero of an excluded observation (infinite standard deviation), whose residual may not be finite.
+/// Residual / standard deviation; zero for an excluded observation (infinite standard deviation), whose residual may not be finite.
 pub(crate) fn weighted(residual: f64, sd: f64) -> f64 {
     if sd.is_infinite() { 0.0 } else { residual / sd }
 }
 
-/// The square of it.
+/// Square of [`weighted`].
 pub(super) fn square((&residual, &sd): (&f64, &f64)) -> f64 {
     weighted(residual, sd).powi(2)
 }
 
-/// The matrix at the start of a run of cofactors; NaN where there are none.
+/// Returns the leading N x N matrix of a slice of cofactors; NaN without cofactors.
 pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| cofactors.map_or(f64::NAN, |values| values[N * i + j])))
 }
 
 impl<M: ?Sized> Problem<M> {
-    /// Counts observations and unknowns; a datum of `held` unknowns takes as many degrees of freedom. Outer unknowns, held or not, do not
-    /// count: they are free or fixed here.
+    /// Counts observations and unknowns; each of the `held` unknowns reduces the number of unknowns by one. Outer unknowns are not counted.
     pub fn counts(&self, held: &[usize]) -> Counts {
         let layout = self.layout();
         let outer = layout.unknowns_of(layout.outer()).filter(|&unknown| self.sd[unknown] != 0.0);
@@ -77,7 +77,7 @@ impl<M: ?Sized> Problem<M> {
 }
 
 impl AnyProblem<'_> {
-    /// What is minimised, at values with the given residuals: the weighted sum of squares, those of groups and ties in the form of a loss.
+    /// Returns the objective at values with the given residuals: the weighted sum of squares, with a loss for groups and ties.
     pub fn objective(&self, values: &[f64], residuals: &[f64], loss: Option<Loss>) -> f64 {
         let observed: f64 = match loss {
             None => self.sum_of_squares(residuals),
@@ -86,9 +86,9 @@ impl AnyProblem<'_> {
         observed + self.terms(values).sum_of_squares(0..values.len())
     }
 
-    /// Redundancy number of each unknown as an observation of itself, 1 - a Q a^T of its equation a; zero unless it is weighted. The cofactors of
-    /// fixed and held unknowns, which stand in the normal equations with unit weight, are set to zero on the way; `values` are those at
-    /// which these were formed.
+    /// Returns the redundancy number of each unknown as an observation of itself, 1 - a Q a^T for its equation a; zero unless weighted.
+    /// Cofactors of fixed and constrained unknowns, which have unit weight in the normal equations, are set to zero. `values` are the
+    /// linearization point.
     pub(super) fn finish_cofactors(
         &self,
         cofactors: &mut Cofactors,
@@ -127,12 +127,12 @@ impl AnyProblem<'_> {
         redundancy
     }
 
-    /// Observed minus computed of every observation at the given values of the unknowns.
+    /// Returns the residuals (observed minus computed) of all observations at given values.
     pub(super) fn residuals(&self, threads: &Threads, values: &[f64]) -> Vec<f64> {
         self.residuals_at(threads, &*threads.install(|| self.model.at(values)))
     }
 
-    /// The same of a model that is evaluated already.
+    /// Returns the residuals of an evaluated model.
     pub(super) fn residuals_at(&self, threads: &Threads, at: &dyn Evaluated) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
@@ -167,7 +167,7 @@ impl<M: ?Sized> Problem<M> {
         residuals.iter().zip(&self.observation_sd).map(square).sum()
     }
 
-    /// Weighted sum of squares of each group, then of each tie, of the given residuals.
+    /// Returns the weighted sum of squares for each group, then for each tie.
     pub(super) fn group_squares(&self, residuals: &[f64]) -> impl Iterator<Item = f64> {
         let layout = self.layout();
         let (rows, first) = (layout.rows(), layout.groups() * layout.rows());

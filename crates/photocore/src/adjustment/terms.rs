@@ -1,4 +1,4 @@
-//! Terms: what was known beforehand of the unknowns of one block, as equations of unit weight beside those of observations.
+//! Priors of a problem as equations of unit weight, in addition to the observation equations.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use super::problem::{AnyProblem, Model};
 use super::term::{Term, is_weighted};
 use crate::normals::Prior;
 
-/// All terms of a problem at given values of its unknowns: those of its model ([`Model::terms`]), and one of each other weighted unknown.
+/// All prior terms at given values: terms of the model ([`Model::terms`]), and one term per other weighted unknown.
 #[derive(Debug)]
 pub struct Terms<'a> {
     values: &'a [f64],
@@ -17,12 +17,12 @@ pub struct Terms<'a> {
 }
 
 impl<'a> Terms<'a> {
-    /// At the given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
+    /// Creates the terms at given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
     pub fn new(model: &dyn Model, values: &'a [f64], prior: &'a [f64], sd: &'a [f64]) -> Self {
         Self { values, prior, sd, of_model: model.terms(values, prior, sd) }
     }
 
-    /// Those that begin among some unknowns, ascending.
+    /// Returns the terms whose first unknown is in a range, ascending.
     pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = Cow<'_, Term>> {
         let mut of_model = &self.of_model[self.of_model.partition_point(|term| term.first < of.start)..];
         let end = of.end;
@@ -41,12 +41,12 @@ impl<'a> Terms<'a> {
         })
     }
 
-    /// The rows of weighted unknowns, one of each, ascending: the unknown, its equation's coefficients of unknowns, observed minus computed.
+    /// Calls `take` for each weighted unknown, ascending, with its row: (unknown, coefficients of unknowns, observed minus computed).
     pub fn each_row(&self, take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64)) {
         self.rows_within(0..self.sd.len(), take);
     }
 
-    /// The same of terms that begin among some unknowns.
+    /// Calls `take` for the rows of terms whose first unknown is in a range.
     pub fn rows_within(
         &self,
         of: Range<usize>,
@@ -59,7 +59,7 @@ impl<'a> Terms<'a> {
         }
     }
 
-    /// The row of an unknown; empty where it is not weighted.
+    /// Returns the row of an unknown; empty if it is not weighted.
     pub fn row(&self, unknown: usize) -> (Vec<(usize, f64)>, f64) {
         if !is_weighted(self.sd[unknown]) {
             return (vec![], 0.0);
@@ -74,7 +74,7 @@ impl<'a> Terms<'a> {
         (term.unknowns().zip(row.iter().copied()).collect(), term.constant[k])
     }
 
-    /// Sum of squares of those that begin among some unknowns.
+    /// Sum of squares of the terms whose first unknown is in a range.
     pub fn sum_of_squares(&self, of: Range<usize>) -> f64 {
         self.within(of).map(|term| term.constant.iter().map(|value| value * value).sum::<f64>()).sum()
     }
@@ -84,7 +84,7 @@ impl<'a> Terms<'a> {
     }
 }
 
-/// The weighted ones of some unknowns. Nearly all are free: these are passed over a stretch at a time.
+/// Returns the weighted unknowns of a range. Most unknowns are free and are skipped in blocks of 64.
 pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item = usize> {
     const STRETCH: usize = 64;
     let stretches = of.clone().step_by(STRETCH).map(move |first| first..of.end.min(first + STRETCH));
@@ -96,13 +96,13 @@ pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item
 }
 
 impl AnyProblem<'_> {
-    /// What was known beforehand of the unknowns, at given values.
+    /// Returns the prior terms at given values.
     pub fn terms<'a>(&'a self, values: &'a [f64]) -> Terms<'a> {
         Terms::new(&self.model, values, &self.prior, &self.sd)
     }
 
-    /// The normal equations of terms. A fixed or held unknown has an equation of its own, x = 0 with unit weight,
-    /// and no other (see [`super::equations`]); an outer one has none here.
+    /// Forms the normal equations of all terms. A fixed or constrained unknown has the equation x = 0 with unit weight instead of others
+    /// (see [`super::equations`]). Outer unknowns have zero weight here.
     pub(super) fn prior_equations(&self, terms: &Terms<'_>, held: &[usize]) -> Prior {
         let fixed = self.fixed(held);
         let weight = fixed.iter().map(|&fixed| f64::from(u8::from(fixed))).collect();
@@ -114,7 +114,7 @@ impl AnyProblem<'_> {
     }
 }
 
-/// Adds A^T A and A^T l of a term; none is of a fixed unknown.
+/// Adds A^T A and A^T l of a term, except for fixed unknowns.
 fn add_term(prior: &mut Prior, term: &Term, fixed: &[bool]) {
     for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !fixed[unknown]) {
         let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();

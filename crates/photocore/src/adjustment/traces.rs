@@ -1,4 +1,4 @@
-//! Sums of squares of the elements of R = I - A Q A^T over groups of equations: what tests of sums and variance components need of it.
+//! Sums of squares of elements of R = I - A Q A^T over groups of equations, for variance components and tests of sums.
 
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
@@ -6,14 +6,14 @@ use super::result::AdjustError;
 use crate::normals::Between;
 use crate::{Threads, parallel};
 
-/// How sums over R are found.
+/// Options of the sums over R.
 #[derive(Debug, Clone, Copy)]
 pub struct Probing {
-    /// Groups of so many equations at the most are taken column by column, which is exact.
+    /// Maximum number of equations in a group that is summed exactly, column by column.
     pub exact: usize,
-    /// Vectors of random signs for larger ones (Hutchinson 1990): the relative standard deviation of a sum falls with the root of it.
+    /// Number of random sign vectors for larger groups (Hutchinson 1990): the relative standard deviation of a sum decreases with its root.
     pub vectors: usize,
-    /// Where the signs come from.
+    /// Seed of the random signs.
     pub seed: u64,
 }
 
@@ -26,29 +26,29 @@ impl Default for Probing {
 /// Groups of the equations of a problem (see [`AnyProblem::equations`]).
 #[derive(Debug, Clone)]
 pub struct EquationGroups {
-    /// How many there are.
+    /// Number of groups.
     pub count: usize,
-    /// The group of each equation; that many or more for none.
+    /// Group of each equation; `count` or more for an equation without group.
     pub of: Vec<usize>,
 }
 
 /// Sums over groups.
 #[derive(Debug, Clone)]
 pub struct GroupSquares {
-    /// Equations of each group, then of none.
+    /// Number of equations in each group, and without group.
     pub equations: Vec<usize>,
-    /// Row by row for each group g and then for what is in none, the sums of `R_ij^2`, i being in g and j in each group h.
+    /// Sums of `R_ij^2` with i in group g (rows; last, without group) and j in group h (columns), row by row.
     pub squares: Vec<f64>,
-    /// Which columns are exact.
+    /// Flags of exact columns.
     pub exact: Vec<bool>,
 }
 
-/// Numbers that go through the factor together.
+/// Maximum number of values in one multiple solution,
 const TOGETHER: usize = 1 << 23;
-/// Columns that do at the most.
+/// and maximum number of its columns.
 const COLUMNS: usize = 64;
 
-/// A column z: unit vectors or random signs on the groups of a class, which are those whose number leaves this rest.
+/// Column z: unit vectors or random signs on the groups of a class, which have equal remainders of their index.
 #[derive(Clone, Copy)]
 struct Column {
     class: usize,
@@ -58,12 +58,12 @@ struct Column {
 
 #[derive(Clone, Copy)]
 enum Kind {
-    /// One on the equation of this number in each group.
+    /// One at the equation with this index in each group.
     Unit(usize),
     Signs(u64),
 }
 
-/// Equations by groups, with their numbers in these.
+/// Equations with their indices in the groups.
 struct Numbered<'a> {
     groups: &'a EquationGroups,
     number: Vec<usize>,
@@ -85,7 +85,7 @@ impl<'a> Numbered<'a> {
         Self { groups, number, equations }
     }
 
-    /// The columns for so many classes of groups.
+    /// Returns the columns for a number of classes of groups.
     fn columns(&self, classes: usize, probing: &Probing) -> (Vec<Column>, Vec<bool>) {
         let (mut columns, mut exact) = (vec![], vec![]);
         for class in 0..classes {
@@ -104,7 +104,6 @@ impl<'a> Numbered<'a> {
         (columns, exact)
     }
 
-    /// Writes a column.
     fn write(&self, column: Column, classes: usize, z: &mut [f64]) {
         for (row, z) in z.iter_mut().enumerate() {
             let (group, number) = (self.groups.of[row], self.number[row]);
@@ -117,7 +116,7 @@ impl<'a> Numbered<'a> {
         }
     }
 
-    /// The sums of squares of a projected column, group by group.
+    /// Returns the sum of squares of a projected column for each group.
     fn sums(&self, u: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.groups.count + 1];
         for ((u, &group), &number) in u.iter().zip(&self.groups.of).zip(&self.number) {
@@ -129,7 +128,7 @@ impl<'a> Numbered<'a> {
     }
 }
 
-/// The mixing function of splitmix64 (Steele, Lea and Flood 2014).
+/// Mixing function of splitmix64 (Steele, Lea and Flood 2014).
 fn mixed(seed: u64) -> u64 {
     let z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -138,10 +137,10 @@ fn mixed(seed: u64) -> u64 {
 }
 
 impl Linearized {
-    /// Sums of `R_ij^2` over every two groups: the Helmert matrix of variance components. The same bits for any number of threads.
+    /// Computes sums of `R_ij^2` over all pairs of groups: the Helmert matrix of variance components, identical for any number of threads.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn group_squares(
         &self,
         problem: &AnyProblem<'_>,
@@ -161,11 +160,11 @@ impl Linearized {
         Ok(GroupSquares { equations: numbered.equations, squares, exact })
     }
 
-    /// The sum of `R_ij^2` within each group, where there are many: the groups whose numbers leave the same rest by `classes` share
-    /// their columns. What is between such groups is added, which is little where they are far apart.
+    /// Computes the sum of `R_ij^2` within each of many groups: groups with equal index modulo `classes` share their columns. Terms between
+    /// such groups are included, which are small for distant groups.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn own_squares(
         &self,
         problem: &AnyProblem<'_>,
@@ -187,7 +186,7 @@ impl Linearized {
         Ok(squares)
     }
 
-    /// Projects columns, and tells of the sums of each.
+    /// Projects columns, and passes the sums of each to `tell`.
     fn probe(
         &self,
         problem: &AnyProblem<'_>,

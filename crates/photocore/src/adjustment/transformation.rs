@@ -1,4 +1,4 @@
-//! The S-transformation of cofactors, Q_S = S Q S^T with S = I - G (B^T G)^-1 B^T (see [`super::datum`]).
+//! S-transformation of cofactors, Q_S = S Q S^T with S = I - G (B^T G)^-1 B^T (see [`super::datum`]).
 
 use std::ops::Range;
 
@@ -8,45 +8,45 @@ use smallvec::{SmallVec, smallvec};
 use crate::normals::{Cofactors, Function, Layout};
 use crate::parallel;
 
-/// Unknowns whose cofactors are taken over one after the other.
+/// Number of unknowns per task.
 const AT_ONCE: usize = 256;
 
-/// Numbers of one unknown, or of one function, for the conditions of a datum: seven, but for networks in several parts.
+/// Values of one unknown or function for the conditions of a datum: seven, except for unconnected networks.
 type Along = SmallVec<[f64; 8]>;
 
-/// T = G (B^T G)^-1, W = Q B and B^T W: with them any block of Q goes over to the other datum,
-/// Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W) T_j^T.
+/// T = G (B^T G)^-1, W = Q B and B^T W, which transform any block of Q to the other datum: Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W)
+/// T_j^T.
 #[derive(Debug, Clone)]
 pub(super) struct Transformation {
-    /// A row for each unknown, one after the other; so has W.
+    /// T and W: one row per unknown, one after the other.
     pub t: Vec<f64>,
     pub w: Vec<f64>,
     pub common: Mat<f64>,
-    /// Of B^T G, scaled.
+    /// Condition of B^T G with scaled columns.
     pub condition: f64,
-    /// The carriers, ascending, where there are no more than conditions: they do not move in the new datum.
+    /// Carriers, ascending, if their number equals the number of conditions: they are fixed by the new datum.
     pub staying: Vec<usize>,
 }
 
-/// What takes the cofactors of a part to a datum of the whole (see `datum.rs`): columns over the unknowns of the part, outer ones
-/// too, one after the other.
+/// Matrices for the transformation of a part's cofactors to a datum of the whole (see `datum.rs`). They have columns over the unknowns of
+/// the part, including outer ones, one after the other.
 #[derive(Debug, Clone, Copy)]
 pub struct DatumOfPart<'a> {
-    /// T, as of [`super::DatumColumns`].
+    /// T, as in [`super::DatumColumns`].
     pub t: &'a [f64],
     /// W = Q B.
     pub w: &'a [f64],
     /// B^T W of the whole, row by row.
     pub common: &'a [f64],
-    /// The last step, which was taken before the whole was moved to the datum.
+    /// Last step, before the transformation to the datum.
     pub last: &'a [f64],
-    /// Of B^T G of the whole.
+    /// Condition of B^T G of the whole.
     pub condition: f64,
-    /// Unknowns that do not move in the new datum, ascending.
+    /// Unknowns that are fixed by the new datum, ascending.
     pub staying: &'a [usize],
 }
 
-/// Cofactors of one block, and of which unknowns they are.
+/// Cofactors of one block, with its unknowns.
 struct Block<'a> {
     rows: Range<usize>,
     columns: Range<usize>,
@@ -54,7 +54,7 @@ struct Block<'a> {
 }
 
 impl Transformation {
-    /// Of a part, from what the whole has (see [`DatumOfPart`]).
+    /// Creates the transformation of a part from matrices of the whole (see [`DatumOfPart`]).
     pub fn of_part(datum: &DatumOfPart<'_>, unknowns: usize) -> Self {
         let d = datum.t.len() / unknowns.max(1);
         let by_rows = |columns: &[f64]| {
@@ -69,13 +69,13 @@ impl Transformation {
         }
     }
 
-    /// Whether an unknown does not move in the new datum.
+    /// Whether an unknown is fixed by the new datum.
     pub fn stays(&self, unknown: usize) -> bool {
         self.staying.binary_search(&unknown).is_ok()
     }
 
-    /// Takes cofactors over. Returns an estimate of the relative error that rounding leaves in the variances: where the old datum is far
-    /// from the new one, or short, large numbers cancel.
+    /// Transforms cofactors. Returns the approximate relative rounding error of the variances: large numbers cancel if the old datum is
+    /// distant from the new one, or weak.
     pub fn apply(&self, layout: &Layout, cofactors: &mut Cofactors) -> f64 {
         let l = layout.local_dim();
         let of_locals = |(chunk, values): (usize, &mut [f64])| {
@@ -114,7 +114,7 @@ impl Transformation {
         f64::EPSILON * self.condition * cancelled.max(largest(of_others))
     }
 
-    /// Transforms blocks of Q, row by row. Returns how many times larger than a variance what has made it is, at the most.
+    /// Transforms blocks of Q, row by row. Returns the maximum ratio of cancelled terms to the resulting variance.
     fn blocks<'a>(&self, blocks: impl Iterator<Item = Block<'a>>) -> f64 {
         let mut cancelled = 1.0;
         for Block { rows, columns, values } in blocks {
@@ -137,7 +137,7 @@ impl Transformation {
         cancelled
     }
 
-    /// Takes over cofactors of functions, those of every two of `rows` or of `rows` with `columns`.
+    /// Transforms cofactors of functions: of all pairs in `rows`, or of `rows` with `columns`.
     pub fn apply_to_functions(&self, rows: &[Function], columns: Option<&[Function]>, matrix: &mut [f64]) {
         let along = |functions: &[Function]| -> Vec<[Along; 2]> {
             let of = |function: &Function| {
@@ -156,13 +156,13 @@ impl Transformation {
         }
     }
 
-    /// The numbers of an unknown in a matrix over all unknowns.
+    /// Returns the row of an unknown in a matrix over all unknowns.
     fn row<'a>(&self, matrix: &'a [f64], unknown: usize) -> &'a [f64] {
         let d = self.common.nrows();
         &matrix[unknown * d..][..d]
     }
 
-    /// The products of a function with the columns of such a matrix.
+    /// Returns the products of a function with the columns of such a matrix.
     fn of(&self, matrix: &[f64], function: &[(usize, f64)]) -> Along {
         let mut along: Along = smallvec![0.0; self.common.nrows()];
         for &(unknown, value) in function {
@@ -180,7 +180,7 @@ impl Transformation {
     }
 }
 
-/// What is added to Q_ij, of i.
+/// Factors of the change of Q_ij that depend on i.
 struct Left {
     by_t: Along,
     t: Along,

@@ -1,12 +1,12 @@
-//! Levenberg-Marquardt: steps damped by how well the linearized equations predict what they do (Nielsen 1999; Madsen, Nielsen and
-//! Tingleff 2004, section 3.2).
+//! Levenberg-Marquardt method with damping by the gain ratio of actual to predicted decrease (Nielsen 1999; Madsen, Nielsen and Tingleff
+//! 2004, section 3.2).
 //!
-//! Geodesic acceleration: the second-order term of a step (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm
-//! for nonlinear least-squares minimization").
+//! Geodesic acceleration: second-order term of a step (Transtrum and Sethna 2012, "Improvements to the Levenberg-Marquardt algorithm for
+//! nonlinear least-squares minimization").
 //!
-//! Where observations determine a combination of unknowns weakly, the sum of squares has a valley that bends, and straight steps along it
-//! are short. With r the residuals, v the step and r_vv their second derivative along it, (N + damping) a = A^T r_vv, and v + a/2 follows
-//! the valley by one order more. It takes no derivatives besides: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
+//! If a combination of unknowns is determined weakly, the sum of squares has a curved valley, and straight steps along it are short. Let r
+//! be the residuals, v the step and r_vv their second derivative along it. With (N + damping) a = A^T r_vv, v + a/2 is accurate to second
+//! order. Finite differences suffice: r_vv = 2/h ((r(x + h v) - r(x)) / h + A v).
 
 use super::equations::GroupStep;
 use super::equations::ObservationEquations;
@@ -19,75 +19,75 @@ use super::walk::Buffers;
 use crate::normals::Equations;
 use crate::{Threads, parallel};
 
-/// Less would leave the seven pivots of a network without datum among rounding errors.
+/// Minimum damping; with less, the seven null pivots of a network without datum would be rounding errors.
 const LEAST_DAMPING: f64 = 1e-10;
-/// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
+/// Maximum damping: the step is parallel to the gradient and must lower the sum of squares if any step does.
 const MOST_DAMPING: f64 = 1e16;
-/// A step is accepted when it lowers the sum of squares by this fraction of what the linearized equations predict.
+/// Minimum ratio of actual to predicted decrease for an accepted step.
 const LEAST_GAIN: f64 = 1e-3;
-/// A predicted decrease below this fraction of the sum of squares is rounding error,
+/// Relative predicted decrease of the sum of squares that counts as rounding error.
 const ROUNDING: f64 = 1e-14;
-/// and so may be one by which no unknown changes by more than this multiple of its standard deviation.
+/// Change, in standard deviations, that may also be a rounding error.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// So many steps in a row that lower the sum of squares together by less than one of them must, to go on, and of which the last lowers it by
-/// no less than this part of what the first did, follow what hardly anything determines, and would go on so, however much they are damped.
+/// Number of steps for the test of stagnation, and minimum ratio of the last decrease to the first. Stagnation: their total decrease is
+/// less than required of one step. Such steps follow an undetermined combination at any damping.
 const CREEPING: usize = 50;
 const FALLING: f64 = 0.1;
-/// In a network fewer do, and it is little what is less than this multiple of the variance of unit weight, a fifth of a standard deviation
-/// of what they follow.
+/// Number of steps for networks, and the insignificant total decrease as a multiple of the variance of unit weight: about a fifth of a
+/// standard deviation.
 const CREEPING_IN_NETWORKS: usize = 12;
 const LITTLE: f64 = 0.05;
-/// An unknown takes part in it when it moves, in units of what its equations alone determine, by so many times what all observations show.
+/// Minimum change of an unknown in a weak combination: multiple of the overall change, scaled by the unknown's own equations.
 const WEAK: f64 = 10.0;
-/// A step is short when no unknown changes by more than this multiple of its standard deviation.
+/// Maximum change of a short step, in standard deviations.
 const SHORT: f64 = 1.0;
 
-/// Steps are accelerated once one has lowered the sum of squares by less than this fraction of what was predicted,
+/// Gain ratio below which steps are accelerated,
 const BENDS: f64 = 0.75;
-/// until the second-order term, in the metric of the normal equations, is smaller than this part of a step.
+/// and size of the second-order term, relative to the step in the metric of the normal equations, below which they are not.
 const STRAIGHT: f64 = 0.1;
-/// Local blocks of a network, at the least, whose steps are accelerated, and soon end where the sum of squares creeps: the valley of a few
-/// numbers may lead far away (Eckerle4 of NIST's problems, from its first start), that of a network ends near where it began.
+/// Minimum number of local blocks of a network, whose steps may be accelerated and stopped at stagnation. Valleys of small problems may be
+/// long (Eckerle4 of NIST's problems, from its first start), but those in networks are short.
 const NETWORK: usize = 16;
 
-/// The damping, and by how much the next failure raises it.
+/// Damping, and its factor at the next failure.
 struct Damping {
     value: f64,
     rise: f64,
-    /// Whether the valley that steps follow bends.
+    /// Whether steps follow a curved valley.
     bends: bool,
 }
 
-/// A step that may fail.
+/// Candidate step.
 struct Trial<'a> {
     unknowns: Vec<f64>,
     at: Box<dyn Evaluated + 'a>,
     sum_of_squares: f64,
-    /// By how much the linearized equations let it lower the sum of squares.
+    /// Predicted decrease of the sum of squares.
     predicted: f64,
-    /// No unknown changes by more than this multiple of its standard deviation.
+    /// Upper bound of the changes of all unknowns, in standard deviations.
     change: f64,
-    /// The second-order term as a part of the step, where it was asked for.
+    /// Ratio of the second-order term to the step, if computed.
     bend: Option<f64>,
 }
 
 impl Trial<'_> {
-    /// By how much it lowers a sum of squares, as a fraction of what was predicted.
+    /// Gain ratio: actual to predicted decrease of the sum of squares.
     fn gain(&self, lowest: f64) -> f64 {
         (lowest - self.sum_of_squares) / self.predicted
     }
 }
 
 impl Damping {
-    /// After a step of the given gain ratio: from a third where the prediction was good to twice where it was poor.
+    /// Reduces the damping after a step: factor from 1/3 (good prediction) to 2 (poor prediction).
     fn fall(&mut self, gain: f64) {
         let factor = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
         self.value = (self.value * factor).max(LEAST_DAMPING);
         self.rise = 2.0;
     }
 
-    /// After a step that failed.
+    /// Raises the damping after a failed step.
     fn rise(&mut self) {
         self.value *= self.rise;
         self.rise *= 2.0;
@@ -95,10 +95,10 @@ impl Damping {
 }
 
 impl<'a> Run<'a, '_> {
-    /// Steps damped by how well they are predicted.
+    /// Iterates with trust-region steps.
     ///
-    /// A step counts for the rule that stops when it is not much shortened, the damping being no larger than at first; where the
-    /// predicted decrease drowns in rounding errors, any does.
+    /// The stopping rule is applied to steps with at most the initial damping, which are not much shortened. It is applied to any step if
+    /// the predicted decrease is a rounding error.
     pub(super) fn in_trust_region(&mut self, start: State<'a>, stop: Stop) -> Result<End<'a>, AdjustError> {
         let mut state = start;
         let mut lowest = state.linearized.sum_of_squares;
@@ -146,9 +146,9 @@ impl<'a> Run<'a, '_> {
         self.rest_in_valley(state.recycle(), Status::NotConverged)
     }
 
-    /// Where a step leads, and by how much it was predicted to lower the sum of squares; the values before it.
+    /// Evaluates a step; returns the values before it, and the trial with its predicted decrease.
     ///
-    /// Where the valley bends, the step is accelerated; the plain one is taken for comparison where that is not good.
+    /// In a curved valley the step is accelerated, and compared with the plain step if it gains little.
     fn trial(
         &mut self,
         state: State<'a>,
@@ -181,7 +181,7 @@ impl<'a> Run<'a, '_> {
         Ok((before, found))
     }
 
-    /// The second-order term a of a step, and a^T (N + damping) a.
+    /// Returns the second-order term a of a step, and a^T (N + damping) a.
     fn second_order(&mut self, state: &State<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
@@ -195,7 +195,7 @@ impl<'a> Run<'a, '_> {
         self.problem.layout().locals() >= NETWORK
     }
 
-    /// Whether the sum of squares, or of losses, creeps: by less and less and never to an end.
+    /// Whether the objective stagnates: small decreases that do not converge.
     fn creeps(&self, falls: &[f64], lowest: f64, stop: Stop) -> bool {
         let least = stop.least_decrease(lowest).unwrap_or(0.0);
         let freedom = self.problem.counts(&[]).degrees_of_freedom().max(1) as f64;
@@ -208,7 +208,7 @@ impl<'a> Run<'a, '_> {
         last.iter().sum::<f64>() <= little && last[steps - 1] >= FALLING * last[0]
     }
 
-    /// Keeps a step; the end where it has led local blocks to where they harm all others.
+    /// Stores a step; returns the end if it made local blocks ill-conditioned or divergent.
     fn keep(
         &mut self,
         before: &[f64],
@@ -224,8 +224,8 @@ impl<'a> Run<'a, '_> {
         Ok(ends.then(|| End::at(Status::NotConverged, trial.unknowns.clone())))
     }
 
-    /// Ends at the values reached, which steps go on to change, and finds what: a full step, in a datum, moves it by much more than
-    /// observations show. It is none of the unknowns that are not local where local ones alone move so.
+    /// Ends at the current values although steps still change them. Stores the retained unknowns that a full step with a datum moves much
+    /// more than the observations justify; empty if only local ones move so.
     fn rest_in_valley(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a>, AdjustError> {
         if self.iterations.last().is_none_or(|last| last.largest_change > SHORT) {
             return self.rest(unknowns, status);
@@ -246,14 +246,14 @@ impl<'a> Run<'a, '_> {
         })
     }
 
-    /// Holds a datum, unless one has been held from the beginning.
+    /// Constrains a datum, unless there is one already.
     fn hold(&mut self, unknowns: &[f64]) {
         if self.datum.is_empty() {
             self.datum = self.problem.to_hold(unknowns, self.threads);
         }
     }
 
-    /// Ends at the values reached, with a datum there.
+    /// Ends at the current values, with a datum.
     fn rest(&mut self, unknowns: Vec<f64>, status: Status) -> Result<End<'a>, AdjustError> {
         self.hold(&unknowns);
         if !self.options.covariance {
@@ -266,15 +266,15 @@ impl<'a> Run<'a, '_> {
     }
 }
 
-/// The part h of the step at which residuals are compared with those that the linearized equations predict.
+/// Fraction h of the step at which residuals are compared with their linearization.
 pub(super) const PART: f64 = 0.1;
-/// Parts of the local blocks that are summed by themselves, at the most: the same for any number of threads.
+/// Maximum number of separately summed parts, for identical results with any number of threads.
 const PARTS: usize = 64;
-/// Local blocks of one at the least.
+/// Minimum number of local blocks in a part.
 const AT_LEAST: usize = 64;
 
 impl ObservationEquations<'_> {
-    /// A^T r_vv over all unknowns; ties, which are few, are taken as straight.
+    /// Returns A^T r_vv over all unknowns; the few ties are regarded as linear.
     ///
     /// * `ahead`: r(x + h v), in the units of the observations.
     pub fn bending(&self, threads: &Threads, ahead: &[f64], step: &[f64]) -> Vec<f64> {
@@ -322,7 +322,7 @@ impl ObservationEquations<'_> {
     }
 }
 
-/// target += factor times a row of `width` coefficients.
+/// Adds `factor` times a row of `width` coefficients to the target.
 fn add_row(target: &mut [f64], rows: &[f64], row: usize, width: usize, factor: f64) {
     let row = &rows[row * width..][..width];
     target.iter_mut().zip(row).for_each(|(sum, a)| *sum += a * factor);

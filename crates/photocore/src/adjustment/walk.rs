@@ -1,4 +1,4 @@
-//! The walk over the observations of all local blocks, on several threads.
+//! Parallel loop over the observations of all local blocks.
 
 use std::ops::Range;
 
@@ -6,19 +6,19 @@ use super::problem::AnyProblem;
 use crate::normals::{GroupRows, Layout, TieRows};
 use crate::{Threads, parallel};
 
-/// Room for the rows of one group.
+/// Buffers for the rows of one group.
 #[derive(Default)]
 pub(super) struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
     retained: Vec<f64>,
     shared: Vec<f64>,
-    /// Room for the unknowns of these rows.
+    /// Buffer for the unknowns of these rows.
     pub columns: Vec<usize>,
 }
 
 impl Buffers {
-    /// The rows of a group, to be written.
+    /// Returns the rows of a group, with undefined contents.
     pub fn rows(&mut self, layout: &Layout, group: usize) -> GroupRows<'_> {
         let rows = layout.rows();
         self.constant.resize(rows, 0.0);
@@ -34,12 +34,12 @@ impl Buffers {
     }
 }
 
-/// Local blocks that a thread takes at least, fewer where they have more groups than this in the mean.
+/// Minimum number of local blocks per thread, and the mean number of groups per block above which it is reduced.
 const AT_LEAST: usize = 64;
 const GROUPS: usize = 32;
 
 impl AnyProblem<'_> {
-    /// What `each` makes of every local block, in their order.
+    /// Maps every local block, in order.
     pub(super) fn for_locals<T: Send>(
         &self,
         threads: &Threads,
@@ -48,7 +48,7 @@ impl AnyProblem<'_> {
         by_parts(threads, self.layout().locals(), self.at_least(), each)
     }
 
-    /// What `each` makes of stretches of local blocks, in their order.
+    /// Maps ranges of local blocks, in order.
     pub(super) fn for_stretches<T: Send>(
         &self,
         threads: &Threads,
@@ -60,13 +60,13 @@ impl AnyProblem<'_> {
         by_parts(threads, count.div_ceil(length), 1, each)
     }
 
-    /// Local blocks that a thread takes at least.
+    /// Returns the minimum number of local blocks per thread.
     fn at_least(&self) -> usize {
         let (locals, groups) = (self.layout().locals(), self.layout().groups());
         (AT_LEAST * GROUPS * locals / groups.max(1)).clamp(1, AT_LEAST)
     }
 
-    /// What `each` makes of every tie, in their order: there are few.
+    /// Maps every tie, in order, on one thread.
     pub(super) fn for_ties<T>(&self, mut each: impl FnMut(usize, &mut TieRows<'_>) -> T) -> Vec<T> {
         let layout = self.layout();
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());

@@ -1,12 +1,12 @@
-//! Rotations as one vector: its direction is the axis, its length the angle in radians.
+//! Rotation vectors: the direction is the axis, the length is the angle in radians.
 
 use super::axes::{Matrix3, Vector3};
 
-/// Square of the angle below which the closed forms of (a - sin a) / a^3 and of 1/a^2 - cot(a/2) / (2a) lose digits, and their
-/// series do not. Those of sin a / a and (1 - cos a) / a^2 take less time than a sine.
+/// Square of the angle below which series replace closed forms. (a - sin a) / a^3 and 1/a^2 - cot(a/2) / (2a) lose digits there; for sin a
+/// / a and (1 - cos a) / a^2 the series are faster than a sine.
 const SMALL: f64 = 0.1;
 
-/// 1/n!, -1/(n+2)!, 1/(n+4)! ...: as many as count below [`SMALL`].
+/// Returns the coefficients 1/n!, -1/(n+2)!, 1/(n+4)! ..., sufficient below [`SMALL`].
 const fn inverse_factorials(n: u32) -> [f64; 8] {
     let (mut all, mut term, mut m) = ([0.0; 8], 1.0, 1);
     while m <= n {
@@ -23,13 +23,13 @@ const fn inverse_factorials(n: u32) -> [f64; 8] {
     all
 }
 
-/// The series of powers of the square of an angle.
+/// Evaluates a power series in the square of an angle.
 #[inline(always)]
 fn series(coefficients: &[f64; 8], square: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, term| sum * square + term)
 }
 
-/// sin a / a, (1 - cos a) / a^2 and (a - sin a) / a^3.
+/// Returns sin a / a, (1 - cos a) / a^2 and (a - sin a) / a^3.
 #[inline]
 fn ratios(square: f64) -> (f64, f64, f64) {
     const SINE: [f64; 8] = inverse_factorials(1);
@@ -49,33 +49,33 @@ fn combined(w: &Vector3, a: f64, b: f64, c: f64) -> Matrix3 {
     Matrix3::from_diagonal_element(a) + b * w.cross_matrix() + c * w * w.transpose()
 }
 
-/// The rotation by an angle-axis vector (Rodrigues): Exp.
+/// Returns the rotation matrix of a rotation vector (Rodrigues): Exp.
 pub fn angle_axis_rotation(w: &Vector3) -> Matrix3 {
     let (sine, versine, _) = ratios(w.norm_squared());
     combined(w, 1.0 - versine * w.norm_squared(), sine, versine)
 }
 
-/// The rotation R and its left Jacobian J: a small change dw turns further by J dw, d(R v) = (J dw) x R v.
+/// Returns the rotation R and its left Jacobian J. A small change dw rotates further by J dw: d(R v) = (J dw) x R v.
 ///
-/// J is singular at full turns.
+/// J is singular at full rotations (multiples of 2 pi).
 pub fn angle_axis_with_jacobian(w: &Vector3) -> (Matrix3, Matrix3) {
     let (sine, versine, rest) = ratios(w.norm_squared());
     let rotation = combined(w, 1.0 - versine * w.norm_squared(), sine, versine);
     (rotation, combined(w, sine, versine, rest))
 }
 
-/// The angle-axis vector of a rotation, no longer than pi: Log.
+/// Returns the rotation vector of a rotation matrix, at most pi long: Log.
 ///
-/// By way of the quaternion, largest component first, so that no digits are lost near half a turn.
+/// The quaternion is an intermediate result, largest component first, which preserves all digits near 180 degrees.
 pub fn rotation_angle_axis(r: &Matrix3) -> Vector3 {
     let [w, x, y, z] = quaternion(r);
     let axis = Vector3::new(x, y, z);
     let sine = axis.norm();
-    // sin(a/2) / a tends to one half.
+    // sin(a/2) / a tends to 1/2.
     if sine > 0.0 { axis * (2.0 * sine.atan2(w) / sine) } else { 2.0 * axis }
 }
 
-/// The unit quaternion w, x, y, z of a rotation, w not negative (Shepperd 1978).
+/// Returns the unit quaternion w, x, y, z of a rotation matrix, w >= 0 (Shepperd 1978).
 pub fn quaternion(r: &Matrix3) -> [f64; 4] {
     let trace = r.trace();
     let squares = [trace, 2.0 * r[(0, 0)] - trace, 2.0 * r[(1, 1)] - trace, 2.0 * r[(2, 2)] - trace];
@@ -93,7 +93,7 @@ pub fn quaternion(r: &Matrix3) -> [f64; 4] {
     four.map(|value| scale * value)
 }
 
-/// The rotation of a unit quaternion w, x, y, z.
+/// Returns the rotation matrix of a unit quaternion w, x, y, z.
 pub fn quaternion_rotation([w, x, y, z]: [f64; 4]) -> Matrix3 {
     Matrix3::new(
         w * w + x * x - y * y - z * z,
@@ -108,14 +108,14 @@ pub fn quaternion_rotation([w, x, y, z]: [f64; 4]) -> Matrix3 {
     )
 }
 
-/// Jr^-1, the inverse of the right Jacobian: Log(Exp(r) Exp(rho)) = r + Jr^-1(r) rho to first order. Singular at a full turn.
+/// Returns Jr^-1, the inverse right Jacobian: Log(Exp(r) Exp(rho)) = r + Jr^-1(r) rho to first order. Singular at a full rotation.
 pub fn right_jacobian_inverse(r: &Vector3) -> Matrix3 {
     let square = r.norm_squared();
     let second = if square > SMALL {
         let half = 0.5 * square.sqrt();
         (1.0 - half / half.tan()) / square
     } else {
-        // sum of |B_2k| a^(2k-2) / (2k)!, B the numbers of Bernoulli.
+        // Sum of |B_2k| a^(2k-2) / (2k)! with the Bernoulli numbers B.
         let terms = [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30_240.0, 1.0 / 1_209_600.0, 1.0 / 47_900_160.0];
         let last = 691.0 / 1_307_674_368_000.0;
         terms.iter().rev().fold(last, |sum, term| term + square * sum)
@@ -124,7 +124,7 @@ pub fn right_jacobian_inverse(r: &Vector3) -> Matrix3 {
     Matrix3::identity() + 0.5 * skew + second * skew * skew
 }
 
-/// How Jr, the right Jacobian, Exp(r + dr) = Exp(r) Exp(Jr dr) to first order, changes where r changes by r' in a second.
+/// Returns dJr/dt for dr/dt = `rate`. Jr is the right Jacobian: Exp(r + dr) = Exp(r) Exp(Jr dr) to first order.
 pub fn right_jacobian_rate(r: &Vector3, rate: &Vector3) -> Matrix3 {
     let square = r.norm_squared();
     let (_, versine, rest) = ratios(square);
@@ -135,7 +135,7 @@ pub fn right_jacobian_rate(r: &Vector3, rate: &Vector3) -> Matrix3 {
         let fourth = square * square;
         ((angle * sine - 2.0 * chord) / fourth, (angle * chord - 3.0 * (angle - sine)) / (fourth * angle))
     } else {
-        // sum of (-1)^k 2k a^(2k-2) / (2k + n)!
+        // Sum of (-1)^k 2k a^(2k-2) / (2k + n)!.
         let series = |n: usize| {
             let factorial = |m: usize| (1..=m).map(|i| i as f64).product::<f64>();
             (1..8).rev().fold(0.0, |sum, k| {

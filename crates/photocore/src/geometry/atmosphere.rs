@@ -10,10 +10,10 @@ const MOLAR_MASS: f64 = 28.9644;
 const HYDROSTATIC: f64 = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
 /// Temperature at sea level, K.
 const SEA_LEVEL_TEMPERATURE: f64 = 288.15;
-/// R T0 / (M g): height of an atmosphere of the density at sea level, in metres.
+/// R T0 / (M g), the scale height, in metres: height of an atmosphere with the sea-level density throughout.
 pub const SCALE_HEIGHT: f64 = SEA_LEVEL_TEMPERATURE / HYDROSTATIC;
 
-/// Base height (m) and gradient of temperature (K/m) of each layer; above the last base there is nothing.
+/// Base height (m) and temperature gradient (K/m) of each layer; the air ends at the last base.
 const LAYERS: [(f64, f64); 8] = [
     (0.0, -0.0065),
     (11_000.0, 0.0),
@@ -25,7 +25,7 @@ const LAYERS: [(f64, f64); 8] = [
     (84_852.0, 0.0),
 ];
 
-/// The air at a height, relative to that at sea level.
+/// State of the air at a height, relative to sea level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
     /// p / p0
@@ -37,13 +37,13 @@ pub struct Air {
 }
 
 impl Air {
-    /// No air.
+    /// Vacuum.
     pub const NONE: Self = Self { pressure: 0.0, density: 0.0, gradient: 0.0 };
 
-    /// The air at a height in metres; the lowest layer continues below sea level.
+    /// Returns the state of the air at a height in metres; the lowest layer continues below sea level.
     ///
-    /// From dp/dz = -rho g and rho = p M / (R T): p falls with T to the power g M / (R L) in a layer of gradient L, and
-    /// exponentially where L = 0. Heights count as geopotential ones.
+    /// From dp/dz = -rho g and rho = p M / (R T): in a layer of gradient L, p is proportional to T^(-g M / (R L)), or exponential if L = 0.
+    /// Heights are treated as geopotential heights.
     pub fn at(height: f64) -> Self {
         let (mut temperature, mut pressure) = (SEA_LEVEL_TEMPERATURE, 1.0);
         for pair in LAYERS.windows(2) {

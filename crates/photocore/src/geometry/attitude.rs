@@ -1,9 +1,8 @@
-//! Attitudes as numbers: what files and users mean by them, and how the numbers move with a rotation step.
+//! Attitude parametrizations of files and users, and their derivatives with respect to a rotation step.
 //!
-//! A is the matrix photo to object of a [`super::Pose`], which steps by A <- A Exp(rho). With Mx, My, Mz the matrices that turn
-//! the axes about x (y towards z), y (z towards x) and z (x towards y), each representation has A from its numbers, its numbers from A,
-//! and K with rho = K d(numbers), so that cofactors go over by K^-1 Q K^-T. The middle angle comes from `atan2`: an arcsine would lose
-//! half of its digits near 90 degrees.
+//! A is the matrix photo to object of a [`super::Pose`], stepped by A <- A Exp(rho). Mx, My, Mz rotate the axes about x (y towards z), y (z
+//! towards x) and z (x towards y). Each parametrization provides A from its numbers, its numbers from A, and K with rho = K d(numbers).
+//! Cofactors are K^-1 Q K^-T. Middle angles use `atan2`: an arcsine loses half of its digits near 90 degrees.
 
 use std::f64::consts::PI;
 
@@ -11,7 +10,7 @@ use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_an
 use super::axes::{Matrix3, Vector3};
 use super::rotation::{nearest_turns, rotation, rotation_angles};
 
-/// The sense of omega, phi, kappa.
+/// Direction of the rotation matrix M of omega, phi, kappa.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RotationSense {
     /// u = M d
@@ -21,10 +20,10 @@ pub enum RotationSense {
 }
 
 impl RotationSense {
-    /// omega, phi, kappa of A Exp(rho), A being the attitude of the given ones.
+    /// Returns omega, phi, kappa of A Exp(rho), if A has the given angles.
     ///
-    /// Of all angles that give the matrix (whole turns; 180 degrees - phi with omega and kappa half a turn on) those nearest to the
-    /// given: a photo does not change its angles because phi passes 90 degrees. They give the matrix to rounding there, too.
+    /// Equivalent angles (full rotations; 180 degrees - phi with omega and kappa + 180 degrees) are chosen nearest to the given ones. The
+    /// angles are therefore continuous if phi passes 90 degrees; they reproduce the matrix to rounding there.
     ///
     /// ```
     /// use photocore::geometry::{RotationSense, Vector3};
@@ -43,33 +42,33 @@ impl RotationSense {
     }
 }
 
-/// Vision axes (x right, y down, z forward) from photo axes, and back.
+/// Returns the rotation between photo axes and vision axes (x right, y down, z forward); its own inverse.
 pub fn vision_axes() -> Matrix3 {
     Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
 }
 
-/// What three numbers of an attitude mean; all angles in radians.
+/// Parametrization of an attitude by three numbers; all angles in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AttitudeNumbers {
     /// omega, phi, kappa: A = (Mz My Mx)^T ground to photo, A = Mz My Mx photo to ground.
     OmegaPhiKappa(RotationSense),
     /// phi, omega, kappa (phi primary): A = (Mz(kappa) Mx(omega) My(phi))^T.
     PhiOmegaKappa,
-    /// Azimuth of the direction of view, clockwise from +Y; tilt from the nadir; swing, clockwise from the photo's +y to the nadir
-    /// point: A = (Mz(swing + pi) Mx(tilt) Mz(-azimuth))^T.
+    /// Azimuth of the viewing direction, clockwise from +Y; tilt from the nadir; swing, clockwise from the photo's +y to the nadir point. A
+    /// = (Mz(swing + pi) Mx(tilt) Mz(-azimuth))^T.
     AzimuthTiltSwing,
-    /// Yaw clockwise from north, pitch nose up, roll right wing down; object axes east, north, up. The matrix is the boresight B,
-    /// photo from body axes (forward, right, down): A = E R(yaw, pitch, roll) B^T.
+    /// Yaw clockwise from north, pitch nose up, roll right wing down; object axes east, north, up; A = E R(yaw, pitch, roll) B^T with the
+    /// boresight B.
     YawPitchRoll(Matrix3),
     /// A = Exp(r).
     RotationVector,
-    /// A^T = Exp(r): BAL, Bundler.
+    /// A^T = Exp(r), used by BAL and Bundler.
     RotationVectorToPhoto,
-    /// R = F A^T = Exp(r), F being [`vision_axes`]: OpenCV.
+    /// R = F A^T = Exp(r) with F = [`vision_axes`], used by OpenCV.
     RotationVectorToVision,
 }
 
-/// Mx, My or Mz (axis 0, 1, 2).
+/// Returns Mx, My or Mz (axis 0, 1, 2).
 fn turn(axis: usize, angle: f64) -> Matrix3 {
     let (sin, cos) = angle.sin_cos();
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -79,25 +78,25 @@ fn turn(axis: usize, angle: f64) -> Matrix3 {
     m
 }
 
-/// East, north, up from north, east, down; its own inverse.
+/// Returns the rotation between east, north, up and north, east, down; its own inverse.
 fn level_axes() -> Matrix3 {
     Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0)
 }
 
-/// K of omega, phi, kappa where M = Mz My Mx = A^T.
+/// Returns K of omega, phi, kappa if M = Mz My Mx = A^T.
 fn omega_phi_kappa([_, phi, kappa]: [f64; 3]) -> Matrix3 {
     let ((sp, cp), (sk, ck)) = (phi.sin_cos(), kappa.sin_cos());
     Matrix3::new(cp * ck, sk, 0.0, -cp * sk, ck, 0.0, sp, 0.0, 1.0)
 }
 
 impl AttitudeNumbers {
-    /// The boresight, photo from body, of a camera that looks at the nadir with the top of the picture forward, turned `quarters`
-    /// times to the right (1: top of the picture to the right wing).
+    /// Returns the boresight, photo from body, of a nadir camera whose image top points forward, rotated `quarters` times 90 degrees to the
+    /// right (1: image top towards the right wing).
     pub fn nadir_boresight(quarters: u8) -> Matrix3 {
         (level_axes() * turn(2, 0.5 * PI * f64::from(quarters))).transpose()
     }
 
-    /// A from the numbers.
+    /// Returns A of the numbers.
     pub fn attitude(&self, numbers: [f64; 3]) -> Matrix3 {
         let [p, q, r] = numbers;
         match self {
@@ -115,8 +114,8 @@ impl AttitudeNumbers {
         }
     }
 
-    /// The numbers of A. At a singular attitude (see [`AttitudeNumbers::is_singular`]) the last angle is zero and the first takes
-    /// the sum; of a vertical photo it is the azimuth that is zero.
+    /// Returns the numbers of A. At a singular attitude (see [`AttitudeNumbers::is_singular`]) the last angle is zero; of a vertical photo
+    /// the azimuth is zero.
     pub fn numbers(&self, attitude: &Matrix3) -> [f64; 3] {
         let found = self.regular_numbers(attitude);
         if !self.is_singular(found) {
@@ -142,7 +141,7 @@ impl AttitudeNumbers {
     }
 
     fn regular_numbers(&self, a: &Matrix3) -> [f64; 3] {
-        // M = A^T: m_ij = a_ji
+        // M = A^T: m_ij = a_ji.
         let m = |i: usize, j: usize| a[(j - 1, i - 1)];
         match self {
             Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => rotation_angles(&a.transpose()),
@@ -166,7 +165,7 @@ impl AttitudeNumbers {
         }
     }
 
-    /// K, with rho = K d(numbers).
+    /// Returns K with rho = K d(numbers).
     pub fn rates(&self, numbers: [f64; 3]) -> Matrix3 {
         let [_, q, r] = numbers;
         let inverse = |rates: Matrix3| rates.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
@@ -203,7 +202,7 @@ impl AttitudeNumbers {
         }
     }
 
-    /// Whether the numbers are undetermined to eight digits: the middle angle within 1e-8 of where the other two turn about one axis.
+    /// Returns whether two of the angles are not separable: the middle angle is within 1e-8 of the gimbal lock.
     pub fn is_singular(&self, numbers: [f64; 3]) -> bool {
         const NEAR: f64 = 1e-8;
         match self {
@@ -215,29 +214,29 @@ impl AttitudeNumbers {
         }
     }
 
-    /// K^-1, with d(numbers) = K^-1 rho; None at a singular attitude.
+    /// Returns K^-1 with d(numbers) = K^-1 rho; None at a singular attitude.
     pub fn by_step(&self, numbers: [f64; 3]) -> Option<Matrix3> {
         self.rates(numbers).try_inverse().filter(|_| !self.is_singular(numbers))
     }
 
-    /// Cofactors of the numbers from those of the rotation step, K^-1 Q K^-T; None at a singular attitude.
+    /// Returns the cofactors K^-1 Q K^-T of the numbers from the cofactors Q of the rotation step; None at a singular attitude.
     pub fn cofactors(&self, numbers: [f64; 3], of_step: &Matrix3) -> Option<Matrix3> {
         let inverse = self.by_step(numbers)?;
         Some(inverse * of_step * inverse.transpose())
     }
 }
 
-/// An angle within half a turn of zero.
+/// Reduces an angle to [-pi, pi].
 fn wrapped(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
 
-/// The partials of the unit quaternion w, x, y, z of A with respect to rho: dq = 1/2 q (0, rho), as the rows of w, x, y, z.
+/// Returns the partials of the unit quaternion w, x, y, z of A with respect to rho, one row per component: dq = 1/2 q (0, rho).
 pub fn quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
     [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]].map(|row| 0.5 * Vector3::from(row))
 }
 
-/// The same of R = F A^T, vision from object (COLMAP's): dq = 1/2 (0, -F rho) q, F being [`vision_axes`].
+/// Returns the same partials for R = F A^T, vision from object (COLMAP): dq = 1/2 (0, -F rho) q with F = [`vision_axes`].
 pub fn vision_quaternion_by_step([w, x, y, z]: [f64; 4]) -> [Vector3; 4] {
     [[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]].map(|[a, b, c]| 0.5 * Vector3::new(-a, b, c))
 }

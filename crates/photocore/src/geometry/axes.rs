@@ -2,15 +2,15 @@
 
 use crate::sorting::order;
 
-/// Three components in cartesian axes.
+/// Vector of three cartesian components.
 pub type Vector3 = nalgebra::Vector3<f64>;
-/// A matrix in cartesian axes.
+/// Matrix of 3 x 3 cartesian components.
 pub type Matrix3 = nalgebra::Matrix3<f64>;
 
-/// Sweeps of an eigenvalue decomposition at the most.
+/// Maximum number of sweeps of an eigenvalue decomposition.
 const SWEEPS: usize = 1000;
 
-/// Eigenvalues of a symmetric matrix, the largest first, and its unit eigenvectors as columns; None where it is not finite.
+/// Returns the eigenvalues of a symmetric matrix in descending order and its unit eigenvectors as columns; None if it is not finite.
 pub(crate) fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
     if !matrix.iter().all(|element| element.is_finite()) {
         return None;

@@ -1,8 +1,8 @@
-//! The collinearity equations x = c u1/u3, y = c u2/u3 with u = A^T (P - C), linearized in all nine unknowns: a central
-//! perspective on an orientation given by position and angles.
+//! Collinearity equations x = c u1/u3, y = c u2/u3 with u = A^T (P - C), linearized in all nine unknowns. The camera is a central
+//! perspective, the orientation is given by position and angles.
 //!
-//! C is the projection centre, P the point, both cartesian: the object coordinates themselves in rectangular space, geocentric
-//! coordinates in geographic space, where omega, phi, kappa refer to the local vertical frame at the station.
+//! C is the projection centre and P the point, both cartesian. They are object coordinates in rectangular space and geocentric coordinates
+//! in geographic space. There, omega, phi, kappa refer to the local vertical frame at the station.
 
 use super::attitude::RotationSense;
 use super::camera::Perspective;
@@ -11,8 +11,8 @@ use super::projection::{Projection, View};
 use super::space::{ObjectSpace, Point};
 
 impl View {
-    /// The photo at `position` (coordinates of the object space) with `attitude` omega, phi, kappa and the
-    /// signed principal distance.
+    /// Returns the photo at `position` (coordinates of the object space) with `attitude` omega, phi, kappa and the signed principal
+    /// distance.
     pub fn new(
         space: ObjectSpace,
         sense: RotationSense,
@@ -24,9 +24,8 @@ impl View {
         Self { orientation, camera: Perspective { principal_distance } }
     }
 
-    /// The image position of a point and, in place of its partials, those of program W5344 (USGS Computer Contribution 2, 1969,
-    /// equations 4 and 5): with the measured image position where the computed one stands in the partials. Both are the same
-    /// where the residuals are zero.
+    /// Returns the image position of a point and the partials of program W5344 (USGS Computer Contribution 2, 1969, equations 4 and 5).
+    /// They contain the measured image position instead of the computed one; both agree if the residuals are zero.
     pub fn linearize_at_measured(&self, point: &Point, measured: [f64; 2]) -> Projection {
         let u = self.orientation.sight(point);
         self.orientation.projection(&u, &self.camera.linearize_at(&u, |_| measured), point)

@@ -1,4 +1,4 @@
-//! The ellipsoid of revolution: geographic and geocentric coordinates, and the local vertical frame.
+//! Ellipsoid of revolution: geographic and geocentric coordinates, and the local vertical frame.
 //!
 //! Geographic positions are (longitude east positive, latitude, height): radians, radians, the linear unit of
 //! the semi-axes.
@@ -6,7 +6,7 @@
 use super::axes::{Matrix3, Vector3};
 use super::error::GeometryError;
 
-/// An ellipsoid of revolution, never prolate.
+/// Ellipsoid of revolution, oblate or a sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipsoid {
     a: f64,
@@ -17,7 +17,7 @@ impl Ellipsoid {
     /// Clarke 1866 in metres, the default of GIANT.
     pub const CLARKE_1866: Self = Self { a: 6_378_206.4, b: 6_356_583.8 };
 
-    /// The ellipsoid with semi-major axis `a` and semi-minor axis `b`, finite with 0 < b <= a.
+    /// Returns the ellipsoid with semi-major axis `a` and semi-minor axis `b`, finite with 0 < b <= a.
     pub fn new(a: f64, b: f64) -> Result<Self, GeometryError> {
         if a.is_finite() && 0.0 < b && b <= a {
             Ok(Self { a, b })
@@ -26,22 +26,22 @@ impl Ellipsoid {
         }
     }
 
-    /// The semi-major axis.
+    /// Returns the semi-major axis.
     pub fn a(&self) -> f64 {
         self.a
     }
 
-    /// The semi-minor axis.
+    /// Returns the semi-minor axis.
     pub fn b(&self) -> f64 {
         self.b
     }
 
-    /// a^2 - b^2, free of cancellation.
+    /// Returns a^2 - b^2 without cancellation.
     fn focal_square(&self) -> f64 {
         (self.a - self.b) * (self.a + self.b)
     }
 
-    /// Geocentric X, Y, Z of a geographic position.
+    /// Returns geocentric X, Y, Z of a geographic position.
     pub fn geocentric(&self, position: [f64; 3]) -> Vector3 {
         let [longitude, latitude, height] = position;
         let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
@@ -51,8 +51,7 @@ impl Ellipsoid {
         Vector3::new((normal + height) * cp * cl, (normal + height) * cp * sl, (polar + height) * sp)
     }
 
-    /// Geocentric X, Y, Z and the matrix whose columns are its partial derivatives with respect to longitude,
-    /// latitude, height.
+    /// Returns geocentric X, Y, Z and the matrix whose columns are the partial derivatives with respect to longitude, latitude, height.
     ///
     /// The columns are east, north and up, the first two multiplied by the radii (N + h) cos lat and (M + h).
     pub fn geocentric_with_partials(&self, position: [f64; 3]) -> (Vector3, Matrix3) {
@@ -66,12 +65,11 @@ impl Ellipsoid {
         (self.geocentric(position), vertical.transpose() * Matrix3::from_diagonal(&scale))
     }
 
-    /// Longitude, latitude and height of a geocentric position.
+    /// Returns longitude, latitude and height of a geocentric position.
     ///
-    /// Bowring's formula for the reduced latitude beta (Survey Review 1976), which is Newton's method for it,
-    /// repeated until nothing changes: to the rounding of the coordinates at any height above the evolute, at
-    /// the poles too (longitude 0 there). The centre of the ellipsoid, where the latitude is arbitrary, has
-    /// the latitude 0.
+    /// Bowring's formula for the reduced latitude beta (Survey Review 1976), a Newton iteration, is repeated until convergence. The result
+    /// is exact to the rounding of the coordinates at any height above the evolute. The longitude is 0 at the poles; the latitude is 0 at
+    /// the centre of the ellipsoid.
     pub fn geographic(&self, xyz: Vector3) -> [f64; 3] {
         const MOST_STEPS: usize = 20;
         let [x, y, z] = xyz.into();
@@ -96,19 +94,19 @@ impl Ellipsoid {
         [y.atan2(x), latitude, height]
     }
 
-    /// W = sqrt(1 - e^2 sin^2 lat); the radius of curvature in the prime vertical is N = a / W.
+    /// Returns W = sqrt(1 - e^2 sin^2 lat); the radius of curvature in the prime vertical is N = a / W.
     fn w(&self, sin_latitude: f64) -> f64 {
         (1.0 - self.focal_square() / (self.a * self.a) * sin_latitude * sin_latitude).sqrt()
     }
 }
 
-/// R, the rotation from geocentric axes to the local vertical frame: its rows are east, north and up.
+/// Returns R, the rotation from geocentric axes to the local vertical frame: its rows are east, north and up.
 pub fn local_vertical(longitude: f64, latitude: f64) -> Matrix3 {
     let ((sl, cl), (sp, cp)) = (longitude.sin_cos(), latitude.sin_cos());
     Matrix3::new(-sl, cl, 0.0, -sp * cl, -sp * sl, cp, cp * cl, cp * sl, sp)
 }
 
-/// The vectors w about which R turns with longitude and latitude, `dR/dq = [w]x R`, in the local vertical frame.
+/// Returns the rotation vectors w of R per longitude and latitude in the local vertical frame: `dR/dq = [w]x R`.
 pub fn local_vertical_turns(latitude: f64) -> [Vector3; 2] {
     let (sp, cp) = latitude.sin_cos();
     [Vector3::new(0.0, -cp, -sp), Vector3::x()]

@@ -1,24 +1,24 @@
-//! What geometry refuses.
+//! Errors of the geometry module.
 
-/// What geometry refuses.
+/// Invalid argument of a geometric object.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GeometryError {
-    /// Semi-axes that are not finite, or not 0 < b <= a.
+    /// Semi-axes that do not satisfy 0 < b <= a, or are not finite.
     #[error("a spheroid needs finite semi-axes with 0 < b <= a, not a = {a}, b = {b}")]
     Semiaxes {
-        /// The semi-major axis as given.
+        /// Semi-major axis passed.
         a: f64,
-        /// The semi-minor axis as given.
+        /// Semi-minor axis passed.
         b: f64,
     },
-    /// A water level or refractive index that cannot be.
+    /// Invalid water level or refractive index.
     #[error(
         "water needs a finite level and a finite refractive index of at least 1, not {level} and {index}"
     )]
     Water {
-        /// The level as given.
+        /// Level passed.
         level: f64,
-        /// The index as given.
+        /// Index passed.
         index: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! Lens distortion about its own centre: radial and decentering, forward and inverse (NOAA TR NOS 55, equations 25 to 34).
+//! Lens distortion about the centre of distortion: radial and decentering, forward and inverse (NOAA TR NOS 55, equations 25 to 34).
 
 /// Radial and decentering distortion. With (x, y) the offset of an undistorted image from the centre of distortion and
 /// d its length, the image is displaced by
@@ -20,10 +20,10 @@ pub struct Distortion {
     pub direction: [f64; 2],
 }
 
-/// A displacement and its partials; the first index is x or y.
+/// Displacement and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Displacement {
-    /// What distortion adds to x and y.
+    /// Displacement of x and y.
     pub shift: [f64; 2],
     /// With respect to the offset.
     pub offset: [[f64; 2]; 2],
@@ -35,31 +35,31 @@ pub struct Displacement {
     pub direction: [[f64; 2]; 2],
 }
 
-/// An offset freed from distortion.
+/// Offset corrected for distortion.
 #[derive(Debug, Clone, Copy)]
 pub struct Undistorted {
-    /// The offset of the undistorted image from the centre of distortion.
+    /// Offset of the undistorted image from the centre of distortion.
     pub offset: [f64; 2],
-    /// Changes of radial and decentering distortion in the last pass.
+    /// Changes of radial and decentering distortion in the last iteration.
     pub changes: [f64; 2],
-    /// Whether both fell below the tolerance.
+    /// Whether both changes are at most the tolerance.
     pub converged: bool,
 }
 
 impl Distortion {
-    /// Radial distortion divided by distance, K1 d^2 + K2 d^4 + K3 d^6 (equation 25).
+    /// Returns the radial distortion divided by the distance, K1 d^2 + K2 d^4 + K3 d^6 (equation 25).
     #[inline]
     pub fn radial_ratio(&self, square: f64) -> f64 {
         square * (self.radial[0] + square * (self.radial[1] + square * self.radial[2]))
     }
 
-    /// Profile of the decentering distortion, K4 d^2 + K5 d^4 (equation 31).
+    /// Returns the profile of the decentering distortion, K4 d^2 + K5 d^4 (equation 31).
     #[inline]
     pub fn decentering_profile(&self, square: f64) -> f64 {
         square * (self.profile[0] + square * self.profile[1])
     }
 
-    /// What distortion adds to an image at an offset from its centre (equation 32).
+    /// Returns the displacement of an image point by distortion (equation 32), given its offset from the centre of distortion.
     #[inline]
     pub fn displacement(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let square = x * x + y * y;
@@ -69,7 +69,7 @@ impl Distortion {
         [x * ratio + t * (c * xx + s * xy), y * ratio + t * (c * xy + s * yy)]
     }
 
-    /// The displacement with its partials.
+    /// Returns the displacement with its partials.
     pub fn linearize(&self, [x, y]: [f64; 2]) -> Displacement {
         let square = x * x + y * y;
         let [k1, k2, k3] = self.radial;
@@ -99,8 +99,8 @@ impl Distortion {
         }
     }
 
-    /// The offset whose distorted image lies at `distorted`, by substitution (section 3.3 of the report's inverse): until radial
-    /// and decentering distortion change by no more than `tolerance`, or `passes` are over.
+    /// Returns the offset whose distorted position is `distorted`, by substitution (section 3.3 of the report's inverse). The iteration
+    /// ends if radial and decentering distortion change by at most `tolerance`, or after `passes` iterations.
     pub fn undistort(&self, distorted: [f64; 2], tolerance: f64, passes: usize) -> Undistorted {
         let mut offset = distorted;
         let mut before = [0.0; 2];

@@ -1,23 +1,23 @@
 //! Pure functions of photogrammetric geometry with their partial derivatives.
 //!
-//! * [`mod@pose`]: where a photo stands and how it is turned; [`attitude`]: what numbers say how;
-//! * [`camera`]: from a direction to an image, one file for each kind of camera;
-//! * [`orientation`]: a pose as its six unknowns give it; [`projection`]: camera after pose after point;
-//! * [`collinearity`]: the photo of the programs;
-//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotations as one vector;
+//! * [`mod@pose`]: position and attitude of a photo; [`attitude`]: parametrizations of attitudes;
+//! * [`camera`]: camera models, one file per model;
+//! * [`orientation`]: a pose with its six unknowns; [`projection`]: the chain point, pose, camera;
+//! * [`collinearity`]: the central perspective of the historic programs;
+//! * [`mod@rotation`]: omega, phi, kappa and the rotation matrix; [`angle_axis`]: rotation vectors;
 //! * [`space`]: coordinates of the object space; [`ellipsoid`]: longitude, latitude, height, and the local vertical frame;
-//! * [`mod@film`]: from the frame of a camera to the reading of a scanned film; [`mod@correction`]: readings of comparators and scanners;
+//! * [`mod@film`]: deformation and scanning of film; [`mod@correction`]: readings of comparators and scanners;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
 //! * [`plate_lens`]: the lens of a star plate;
-//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates, the attitude of a camera under the sky;
-//! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air;
-//! * [`mod@nearest`]: the nearest of many points in a plane;
+//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates, attitudes of stellar cameras;
+//! * [`refraction`]: displacement of points by air and water; [`atmosphere`]: the standard atmosphere;
+//! * [`mod@nearest`]: nearest neighbours in a plane;
 //! * [`mod@trajectory`]: poses as functions of time;
-//! * [`cramer`]: three linear equations.
+//! * [`cramer`]: solution of three linear equations.
 //!
-//! Vectors and matrices in cartesian axes are those of `nalgebra`; three numbers whose units or meanings differ (coordinates of
-//! the object space, angles, standard deviations) are arrays. Angles are radians, lengths the linear unit of the object space, image
-//! coordinates the unit of the camera.
+//! Vectors and matrices in cartesian axes are `nalgebra` types. Three numbers of different units or meanings (coordinates of the object
+//! space, angles, standard deviations) are arrays. Angles are in radians, lengths in the unit of the object space, image coordinates in the
+//! unit of the camera.
 //!
 //! ```
 //! use photocore::geometry::{ObjectSpace, View, Point, RotationSense};

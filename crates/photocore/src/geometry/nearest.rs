@@ -1,14 +1,13 @@
-//! The nearest of many points in a plane.
+//! Nearest neighbours in a plane.
 
-/// The nearest of the others to each point within a limit; none where there is none.
+/// Returns the nearest of the others to each point within a limit; None if the limit contains none of them.
 ///
-/// `but` names for each point one of the others that does not count. Of two that are equally near the latter in order of cells
-/// and numbers is taken. The others are sorted into cells as wide as the limit, so that only nine cells are searched; of points
-/// that are not finite none is near.
+/// `but` names one excluded neighbour per point. Equal distances are resolved by the order of cells and indices. The others are sorted into
+/// cells as wide as the limit, so that only nine cells are searched. Points that are not finite yield None.
 ///
 /// # Panics
 ///
-/// Where `but` has another length than the points.
+/// If `but` and the points differ in length.
 pub fn nearest(
     points: &[[f64; 2]],
     others: &[[f64; 2]],
@@ -17,7 +16,7 @@ pub fn nearest(
 ) -> Vec<Option<usize>> {
     let least = |k: usize| others.iter().map(|other| other[k]).fold(f64::INFINITY, f64::min);
     let corner = [least(0), least(1)];
-    // A number that is too large for a cell is that of the last one.
+    // Indices outside of the integer range are clamped.
     let cell = |at: &[f64; 2]| -> [i64; 2] {
         std::array::from_fn(|k| (((at[k] - corner[k]) / limit).floor() as i64).clamp(-2, i64::MAX - 2))
     };
@@ -45,7 +44,7 @@ pub fn nearest(
 mod tests {
     use super::*;
 
-    /// Fractions of the golden ratio: points that lie without order.
+    /// Points at fractions of multiples of the golden ratio: pseudo-random positions.
     fn scattered(count: usize, start: f64) -> Vec<[f64; 2]> {
         let at = |k: usize| 0.618_033_988_749_895 * (k as f64 + start);
         (0..count).map(|k| [100.0 * at(k).fract(), 100.0 * (97.3 * at(k)).fract()]).collect()

@@ -1,4 +1,4 @@
-//! A photo's pose with what each of its six unknowns does to it: position and rotation step, or the numbers of a file.
+//! Pose of a photo with its six unknowns: position and rotation step, or the numbers of a file.
 
 use nalgebra::Matrix6;
 
@@ -11,45 +11,45 @@ use super::pose::Pose;
 use super::pose::{POSE, column};
 use super::space::{Lift, ObjectSpace, Point};
 
-/// What the six unknowns of a photo's pose are.
+/// Parametrization of the six unknowns of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PoseNumbers {
-    /// Position in the coordinates of the object space, then omega, phi, kappa; in geographic space the angles refer to the local
-    /// vertical frame of the photo.
+    /// Position in the coordinates of the object space, then omega, phi, kappa. In geographic space the angles refer to the local vertical
+    /// frame of the photo.
     Angles(RotationSense),
-    /// The rotation vector of A^T, then t of u = A^T P + t, so that C = -A t: BAL, Bundler.
+    /// Rotation vector of A^T, then t of u = A^T P + t, so that C = -A t: used by BAL and Bundler.
     Vectors,
 }
 
-/// A pose with what its unknowns do to it.
+/// Pose with the derivatives with respect to its unknowns.
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation {
     pose: Pose,
     unknowns: Unknowns,
 }
 
-/// What the six unknowns are. A turn w of the photo's axes brings about du = w x (u - s), s being the pivot.
+/// Unknowns of a pose. A rotation w of the photo's axes gives du = w x (u - s) with the pivot s.
 #[derive(Debug, Clone, Copy)]
 enum Unknowns {
-    /// The coordinates of the position, then three of the attitude.
+    /// Coordinates of the position, then three numbers of the attitude.
     Position {
-        /// By what a point seems to move in cartesian axes when the coordinates change, as columns; None in rectangular space: -I.
+        /// Apparent motion of a point, in cartesian axes, per unit of each coordinate, as columns; None in rectangular space: -I.
         shifts: Option<Matrix3>,
-        /// w of longitude and latitude, which turn the local vertical frame; None in rectangular space.
+        /// Rotation w of the local vertical frame per longitude and latitude; None in rectangular space.
         turns: Option<[Vector3; 2]>,
-        /// K of the angles; None where they are a rotation step.
+        /// K of the angles; None for a rotation step.
         rates: Option<Matrix3>,
     },
-    /// The rotation vector of A^T, then t, which is the pivot: the rotation turns P, not P - C.
+    /// Rotation vector of A^T, then t, which is the pivot: the rotation acts on P, not on P - C.
     Vectors {
-        /// w of the rotation vector, as columns.
+        /// w per component of the rotation vector, as columns.
         turns: Matrix3,
         translation: Vector3,
     },
 }
 
 impl Orientation {
-    /// The orientation of the given six unknowns. Of vectors the object space may only be cartesian.
+    /// Returns the orientation of the given six unknowns. Vectors require a cartesian object space.
     pub fn new(numbers: PoseNumbers, space: ObjectSpace, values: &[f64; POSE]) -> Self {
         let [a, b, c, d, e, f] = *values;
         match numbers {
@@ -58,8 +58,8 @@ impl Orientation {
         }
     }
 
-    /// The orientation at `position` (coordinates of the object space) with `attitude` omega, phi, kappa, in these numbers: their K is
-    /// singular where phi is 90 degrees.
+    /// Returns the orientation at `position` (coordinates of the object space) with `attitude` omega, phi, kappa, with these angles as
+    /// unknowns. Their K is singular if phi is 90 degrees.
     pub fn from_angles(
         space: ObjectSpace,
         sense: RotationSense,
@@ -74,11 +74,11 @@ impl Orientation {
         orientation
     }
 
-    /// The orientation at `position` (coordinates of the object space) with the attitude A, in geographic space that in the local
-    /// vertical frame; its last three unknowns are the rotation vector rho of a step A <- A Exp(rho), about the photo's own axes: no
-    /// attitude is singular.
+    /// Returns the orientation at `position` (coordinates of the object space) with the attitude A, in the local vertical frame if the
+    /// space is geographic. The last three unknowns are the rotation vector rho of a step A <- A Exp(rho) about the photo's own axes. Every
+    /// attitude is regular.
     ///
-    /// du = u x rho, so that the partials of an image coordinate with respect to rho are g x u.
+    /// du = u x rho: the partials of an image coordinate with respect to rho are g x u.
     pub fn stepping(space: ObjectSpace, position: [f64; 3], local: &Matrix3) -> Self {
         let (centre, centre_partials) = space.cartesian_with_partials(position);
         let (attitude, shifts, turns) = match space {
@@ -93,13 +93,13 @@ impl Orientation {
         Self { pose: Pose { position: centre, attitude }, unknowns }
     }
 
-    /// The orientation of a pose that is known: its unknowns are its coordinates and a rotation step.
+    /// Returns the orientation of a pose; its unknowns are its coordinates and a rotation step.
     pub fn of_pose(space: ObjectSpace, pose: &Pose) -> Self {
         let (coordinates, local) = local(space, pose);
         Self::stepping(space, coordinates, &local)
     }
 
-    /// The orientation with the rotation vector of A^T and the translation t.
+    /// Returns the orientation with the rotation vector of A^T and the translation t.
     pub fn from_vectors(rotation: Vector3, translation: Vector3) -> Self {
         let (to_photo, turns) = angle_axis_with_jacobian(&rotation);
         Self {
@@ -108,27 +108,27 @@ impl Orientation {
         }
     }
 
-    /// The pose.
+    /// Returns the pose.
     #[inline]
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// The pose, where its unknowns are those of a step of it ([`Pose::step`]) with cartesian coordinates.
+    /// Returns the pose if the unknowns are a cartesian step ([`Pose::step`]), else None.
     #[inline(always)]
     pub fn stepping_pose(&self) -> Option<&Pose> {
         let plain = matches!(self.unknowns, Unknowns::Position { shifts: None, turns: None, rates: None });
         plain.then_some(&self.pose)
     }
 
-    /// The cartesian position of the projection centre.
+    /// Returns the cartesian position of the projection centre.
     #[inline]
     pub fn centre(&self) -> Vector3 {
         self.pose.position
     }
 
-    /// Partials of the projection centre with respect to the three coordinates of the position, as columns; the identity where these are
-    /// cartesian.
+    /// Returns the partials of the projection centre with respect to the three coordinates of the position, as columns: the identity for
+    /// cartesian coordinates.
     pub fn centre_partials(&self) -> Matrix3 {
         match self.unknowns {
             Unknowns::Position { shifts: Some(shifts), .. } => -shifts,
@@ -136,7 +136,7 @@ impl Orientation {
         }
     }
 
-    /// The step of the pose, dC and rho (see [`Pose::step`]), that a unit of each unknown takes to first order.
+    /// Returns the step of the pose (dC and rho, see [`Pose::step`]) per unit of each unknown, to first order.
     pub fn steps(&self) -> [(Vector3, Vector3); POSE] {
         let none = Vector3::zeros();
         match &self.unknowns {
@@ -148,7 +148,7 @@ impl Orientation {
                 let by_attitude = |k: usize| (none, rates.column(k).into());
                 std::array::from_fn(|k| if k < 3 { by_position(k) } else { by_attitude(k - 3) })
             }
-            // du = -A^T dC + u x rho = w x (u - t) holds for every u, so that rho = -w, and at u = 0 dC = A (w x t).
+            // du = -A^T dC + u x rho = w x (u - t) for every u: rho = -w, and at u = 0 dC = A (w x t).
             Unknowns::Vectors { turns, translation } => std::array::from_fn(|k| {
                 if k < 3 {
                     let turn: Vector3 = turns.column(k).into();
@@ -160,8 +160,8 @@ impl Orientation {
         }
     }
 
-    /// By how much each of the three unknowns that shift would have to change, about, to move the photo to a place: the index of the
-    /// unknown among the six, and the change in units of length.
+    /// Returns the approximate changes of the three translation unknowns that move the photo to a position: the index among the six
+    /// unknowns, and the change as a length.
     pub fn shifts_along(&self, place: &Vector3) -> [(usize, f64); 3] {
         match self.unknowns {
             Unknowns::Position { .. } => {
@@ -175,18 +175,18 @@ impl Orientation {
         }
     }
 
-    /// The steps of [`Orientation::steps`] as columns, dC, then rho.
+    /// Returns [`Orientation::steps`] as columns of dC and rho.
     pub fn step_matrix(&self) -> Matrix6<f64> {
         Matrix6::from_columns(&self.steps().map(|(shift, rho)| column(&shift, &rho)))
     }
 
-    /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
-    /// singular.
+    /// Returns the partials of the six unknowns with respect to a step of the pose (dC, then rho): the inverse of [`Orientation::steps`].
+    /// None if the angles are singular.
     pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
         self.step_matrix().try_inverse()
     }
 
-    /// The six numbers of the pose (see [`PoseNumbers`]).
+    /// Returns the six numbers of the pose (see [`PoseNumbers`]).
     pub fn numbers(&self, numbers: PoseNumbers, space: ObjectSpace) -> [f64; POSE] {
         let Pose { position, attitude } = self.pose;
         match numbers {
@@ -204,13 +204,13 @@ impl Orientation {
         }
     }
 
-    /// u, the point in the photo's axes.
+    /// Returns u, the point in the photo's axes.
     #[inline(always)]
     pub fn sight(&self, point: &Point) -> Vector3 {
         self.pose.sight(&point.position())
     }
 
-    /// The same orientation for a lifted point: what the photo's position does to the lift is added to its shifts. Of positions.
+    /// Returns the orientation for a lifted point: the partials of the lift by the photo's position are added. Only for positions.
     pub fn under(&self, lift: &Lift) -> Self {
         let mut lifted = *self;
         if let Unknowns::Position { shifts, .. } = &mut lifted.unknowns {
@@ -219,8 +219,8 @@ impl Orientation {
         lifted
     }
 
-    /// Partials of one image coordinate with respect to the six unknowns and to the coordinates of the point, given its gradient g
-    /// with respect to u: `g . (w x u) = (u x g) . w`, and du/dP = A^T.
+    /// Returns the partials of one image coordinate with respect to the six unknowns and to the coordinates of the point. g is its gradient
+    /// with respect to u: `g . (w x u) = (u x g) . w` and du/dP = A^T.
     #[inline(always)]
     pub fn chain(&self, u: &Vector3, g: &Vector3, point: &Point) -> ([f64; POSE], [f64; 3]) {
         let by_place = self.pose.attitude * g;
@@ -235,7 +235,7 @@ impl Orientation {
                     shift.x += moment.dot(longitude);
                     shift.y += moment.dot(latitude);
                 }
-                // A step turns the photo, and what it sees the other way.
+                // A step rotates the photo, and the image in the opposite direction.
                 let turn = match rates {
                     None => -moment,
                     Some(rates) => -rates.tr_mul(&moment),
@@ -251,8 +251,8 @@ impl Orientation {
     }
 }
 
-/// The coordinates of a pose, and its attitude in the axes that its angles refer to: those of the space or, where it is geographic, east,
-/// north and up there.
+/// Returns the coordinates of a pose and its attitude in the reference axes of its angles: the axes of the space, or east, north and up in
+/// geographic space.
 fn local(space: ObjectSpace, pose: &Pose) -> ([f64; 3], Matrix3) {
     let coordinates = space.coordinates(pose.position);
     let local = match space {

@@ -1,11 +1,11 @@
-//! The lens of a star plate: from the tangents of a direction to the plate, with partials (NOAA TR NOS 55, equations 38 to 41).
+//! Lens of a star plate: from the tangents of a direction to the plate, with partials (NOAA TR NOS 55, equations 38 to 41).
 
 use super::lens::{Displacement, Distortion};
 
 /// Number of interior parameters.
 pub const INTERIOR: usize = 13;
 
-/// In which order scale and distortion act on the image.
+/// Order of scale and distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
     /// The image of the central perspective with the principal distances cx, cy is distorted (equation 38, as programmed).
@@ -14,16 +14,16 @@ pub enum Form {
     DistortionFirst(f64),
 }
 
-/// How decentering distortion is parametrized.
+/// Parametrization of the decentering distortion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decentering {
     /// K4, K5 and the direction phi_T.
     Polar,
-    /// Brown's P1 = K4 cos phi_T, P2 = K4 sin phi_T, P3 = K5 / K4: determined without distortion, too.
+    /// Brown's P1 = K4 cos phi_T, P2 = K4 sin phi_T, P3 = K5 / K4: also regular for zero distortion.
     Cartesian,
 }
 
-/// The kind of a camera: what is not estimated.
+/// Type of a plate camera: the model without its values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kind {
     /// Order of scale and distortion.
@@ -34,7 +34,7 @@ pub struct Kind {
     pub common_scale: bool,
 }
 
-/// The lens of a plate at given values of its interior parameters.
+/// Lens of a plate at given values of its interior parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlateLens {
     kind: Kind,
@@ -43,7 +43,7 @@ pub struct PlateLens {
     distortion: Distortion,
 }
 
-/// A place on the plate and its partials; the first index is x or y.
+/// Position on the plate and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Plated {
     /// x, y on the plate.
@@ -55,7 +55,7 @@ pub struct Plated {
 }
 
 impl PlateLens {
-    /// The lens with the given interior parameters.
+    /// Returns the lens with the given interior parameters.
     pub fn new(kind: Kind, mut interior: [f64; INTERIOR]) -> Self {
         if kind.common_scale {
             interior[4] = interior[3];
@@ -69,22 +69,22 @@ impl PlateLens {
         Self { kind, interior, distortion: Distortion { radial, profile, direction } }
     }
 
-    /// Its kind.
+    /// Returns the type of the camera.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// epsilon, xp, yp, cx, cy, dx, dy, and the rest.
+    /// Returns epsilon, xp, yp, cx, cy, dx, dy, and the distortion parameters.
     pub fn interior(&self) -> &[f64; INTERIOR] {
         &self.interior
     }
 
-    /// Its distortion.
+    /// Returns the distortion.
     pub fn distortion(&self) -> &Distortion {
         &self.distortion
     }
 
-    /// Principal distances of the image that is distorted, and the scales that act afterwards.
+    /// Returns the principal distances before distortion and the scales after it.
     pub fn scales(&self) -> ([f64; 2], [f64; 2]) {
         let c = [self.interior[3], self.interior[4]];
         match self.kind.form {
@@ -93,7 +93,7 @@ impl PlateLens {
         }
     }
 
-    /// The place of the tangents m/q, n/q, with all partials.
+    /// Returns the plate position of the tangents m/q, n/q with all partials.
     pub fn place(&self, w: [f64; 2]) -> Plated {
         let (c, scale) = self.scales();
         let base = [c[0] * w[0], c[1] * w[1]];
@@ -115,7 +115,7 @@ impl PlateLens {
         plate
     }
 
-    /// Partials with respect to the interior parameters, before the axes are made oblique.
+    /// Returns the partials with respect to the interior parameters before the obliqueness is applied.
     fn by_interior(
         &self,
         lens: &Displacement,
@@ -154,7 +154,7 @@ impl PlateLens {
         rows
     }
 
-    /// x loses epsilon times y.
+    /// Subtracts epsilon times y from x.
     fn shear(&self, plate: &mut Plated) {
         let epsilon = self.interior[0];
         let [x, y] = &mut plate.tangents;
@@ -164,15 +164,15 @@ impl PlateLens {
         x[0] = -plate.xy[1];
     }
 
-    /// The image without distortion and obliqueness: the offset of the distorted image from the centre of distortion.
+    /// Removes the obliqueness: returns the offset of the distorted image from the centre of distortion.
     pub fn upright(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (_, scale) = self.scales();
         let [epsilon, xp, yp, _, _, dx, dy, ..] = self.interior;
         [(x + epsilon * y - xp) / scale[0] - dx, (y - yp) / scale[1] - dy]
     }
 
-    /// Frees a measured image from distortion (report's section on the inverse): the undistorted image, the changes of the last
-    /// pass, and whether they fell below `tolerance`.
+    /// Corrects a measured image for distortion (report's section on the inverse). Returns the undistorted image, the changes of the last
+    /// iteration and the convergence flag for `tolerance`.
     pub fn undistorted(&self, xy: [f64; 2], tolerance: f64, passes: usize) -> ([f64; 2], [f64; 2], bool) {
         let found = self.distortion.undistort(self.upright(xy), tolerance, passes);
         let (_, scale) = self.scales();

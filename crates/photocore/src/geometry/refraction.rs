@@ -1,8 +1,8 @@
-//! Refraction in air and water as a lift of the ground point before it is projected.
+//! Refraction in air and water, modelled as a lift of the ground point before projection.
 //!
-//! In the report's form (GIANT guide, Appendices F and G) a point at D from the camera is lifted along the up of the local
-//! frame at the camera by dZ = (K_a + K_w) D.D / dZ0, dZ0 = -up . D, which turns its ray by (K_a + K_w) tan alpha away from
-//! the nadir. The rigorous ray through water lifts it along the up at the point. `docs/refraction.md` derives both.
+//! In the report's form (GIANT guide, Appendices F and G) a point at D from the camera is lifted along the local vertical of the camera.
+//! The lift is dZ = (K_a + K_w) D.D / dZ0 with dZ0 = -up . D; it rotates the ray by (K_a + K_w) tan alpha away from the nadir. The rigorous
+//! ray through water lifts the point along its own vertical. `docs/refraction.md` derives both.
 
 use super::atmosphere::{Air, SCALE_HEIGHT};
 use super::axes::{Matrix3, Vector3};
@@ -13,14 +13,13 @@ use super::space::{Lift, ObjectSpace, Point};
 
 /// Refractivity n - 1 of air at sea level (Saastamoinen 1974).
 const REFRACTIVITY: f64 = 277.0e-6;
-/// Points less than this below the camera, in metres, or above it, are not corrected for air: K_a tan alpha is no model of
-/// horizontal rays.
+/// Minimum height of the camera above a point for a correction by air, in metres: K_a tan alpha is invalid for horizontal rays.
 const LEAST_DROP: f64 = 1.0;
-/// How far from the water level, as part of the height of the camera above it, the depth is rounded off: by a quarter of
-/// this at most, of which refraction leaves some 30 %: up to 45 degrees less than half a micrometre in a photograph.
+/// Half-width of the depth smoothing at the water level, as a fraction of the camera height above it. The smoothed depth differs by at most
+/// a quarter of this. Refraction leaves 30 % of that: below half a micrometre in a photograph up to 45 degrees.
 const SHORE: f64 = 3e-5;
 
-/// How rays are bent by air.
+/// Model of refraction in air.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AirModel {
     /// K_a = 13 (H - h) [1 - 0.02 (2 H + h)] microradians, km (GIANT guide, Appendix F), to 9 km.
@@ -29,16 +28,16 @@ pub enum AirModel {
     Standard,
 }
 
-/// How rays are bent by water.
+/// Model of refraction in water.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WaterModel {
     /// K_w = [(Hc + d) / (Hc + d') - 1] / (1 + tan^2 alpha) (GIANT guide, Appendix G).
     Giant,
-    /// The ray itself, by Snell's law at a plane perpendicular to the up at the point.
+    /// Rigorous ray by Snell's law at a plane perpendicular to the vertical at the point.
     Snell,
 }
 
-/// Water below a level; points above it are not concerned.
+/// Water below a level; it affects only points below the level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Water {
     model: WaterModel,
@@ -47,10 +46,10 @@ pub struct Water {
 }
 
 impl Water {
-    /// Water with its surface at the height `level` (linear unit) and a refractive index relative to air.
+    /// Returns water with its surface at the height `level` (linear unit) and a refractive index relative to air.
     ///
     /// # Errors
-    /// A level that is not finite, or an index that is not finite and at least 1.
+    /// The level must be finite, the index finite and at least 1.
     pub fn new(model: WaterModel, level: f64, index: f64) -> Result<Self, GeometryError> {
         if level.is_finite() && index.is_finite() && index >= 1.0 {
             Ok(Self { model, level, index })
@@ -63,30 +62,30 @@ impl Water {
 /// Air and water between points and cameras. The third coordinate of the object space is the height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refraction {
-    /// The air; None for no refraction in it.
+    /// Model of the air; None for no refraction in air.
     pub air: Option<AirModel>,
-    /// The water; None where there is none.
+    /// Water; None for no water.
     pub water: Option<Water>,
-    /// Metres in the linear unit.
+    /// Metres per linear unit.
     pub metres_per_unit: f64,
     /// Height of the zero of the third coordinate, in the linear unit.
     pub datum: f64,
 }
 
-/// The vertical at one end of a ray.
+/// Vertical at one end of a ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Vertical {
-    /// Cartesian unit vector.
+    /// Unit vector in cartesian axes.
     up: Vector3,
-    /// Its partials with respect to the three coordinates, as columns.
+    /// Partials of the unit vector with respect to the three coordinates, as columns.
     turning: Matrix3,
-    /// Linear unit.
+    /// Height in the linear unit.
     height: f64,
-    /// The air at this height; none unless the model of the air needs it.
+    /// Air at this height; vacuum unless the air model needs it.
     air: Air,
 }
 
-/// How far a point is lifted along a vertical, and the partials of that.
+/// Lift of a point along a vertical, and its partials.
 #[derive(Debug, Clone, Copy)]
 struct Rise {
     value: f64,
@@ -98,7 +97,7 @@ struct Rise {
     by_heights: [f64; 2],
 }
 
-/// K, and its partials.
+/// K and its partials.
 #[derive(Debug, Clone, Copy, Default)]
 struct Bending {
     value: f64,
@@ -109,7 +108,7 @@ struct Bending {
 }
 
 impl Refraction {
-    /// The vertical at a position of the object space.
+    /// Returns the vertical at a position of the object space.
     pub fn vertical(&self, space: ObjectSpace, coordinates: [f64; 3]) -> Vertical {
         let height = coordinates[2] + self.datum;
         let air = match self.air {
@@ -128,7 +127,7 @@ impl Refraction {
         Vertical { up, turning, height, air }
     }
 
-    /// What lifts a point to where a photo sees it; `station` and `foot` are the verticals at the two.
+    /// Returns the lift of a point for one photo; `station` and `foot` are the verticals at photo and point.
     pub fn lift(&self, photo: &Orientation, station: &Vertical, point: &Point, foot: &Vertical) -> Lift {
         let d = point.position() - photo.centre();
         let (square, drop) = (d.norm_squared(), -station.up.dot(&d));
@@ -151,7 +150,7 @@ impl Refraction {
         lift
     }
 
-    /// K_a between a camera and a point.
+    /// Returns K_a between a camera and a point.
     fn air(&self, station: &Vertical, foot: &Vertical) -> Bending {
         let metres = self.metres_per_unit;
         let drop = metres * (station.height - foot.height);
@@ -164,15 +163,15 @@ impl Refraction {
     }
 }
 
-/// K_a of the GIANT guide, Appendix F, heights in km; partials per metre.
+/// Returns K_a of the GIANT guide, Appendix F, for heights in km; partials per metre.
 fn appendix_f(station: f64, point: f64) -> (f64, [f64; 2]) {
     let (drop, thinning) = (station - point, 1.0 - 0.02 * (2.0 * station + point));
     (13e-6 * drop * thinning, [13e-9 * (thinning - 0.04 * drop), 13e-9 * (-thinning - 0.02 * drop)])
 }
 
-/// K_a = N0 [R T0 / (M g) (p_h - p_H) / (H - h) - rho_H], p and rho relative to sea level; partials per metre.
+/// Returns K_a = N0 [R T0 / (M g) (p_h - p_H) / (H - h) - rho_H], p and rho relative to sea level; partials per metre.
 ///
-/// The mean of n - n(H) over the height: in equilibrium the integral of the density is the difference of the pressures.
+/// The mean of n - n(H) over the height: in equilibrium the integral of the density is the pressure difference.
 fn layered(station: &Air, point: &Air, drop: f64) -> (f64, [f64; 2]) {
     let mean = SCALE_HEIGHT * (point.pressure - station.pressure) / drop;
     let by_station = (station.density - mean) / drop - station.gradient;
@@ -187,7 +186,7 @@ impl Bending {
         (0..2).for_each(|k| self.by_heights[k] += other.by_heights[k]);
     }
 
-    /// dZ = K D.D / dZ0, the square of the horizontal distance being D.D - dZ0^2.
+    /// Returns dZ = K D.D / dZ0; the square of the horizontal distance is D.D - dZ0^2.
     fn rise(&self, square: f64, drop: f64) -> Rise {
         let stretch = square / drop;
         Rise {
@@ -199,29 +198,29 @@ impl Bending {
     }
 }
 
-/// The depth of a point, and its partials.
+/// Smoothed depth of a point and its partials.
 #[derive(Debug, Clone, Copy)]
 struct Depth {
     value: f64,
-    /// With respect to the depth as it is.
+    /// With respect to the unsmoothed depth.
     by_depth: f64,
     /// With respect to the height of the camera above the water.
     by_height: f64,
 }
 
-/// d - d', what the true depth d exceeds the apparent one by, and its partials.
+/// Difference d - d' of true and apparent depth, and its partials.
 #[derive(Debug, Clone, Copy)]
 struct Shallowing {
     value: f64,
-    /// With respect to the square of the horizontal distance, the height of the camera above the water, the depth.
+    /// With respect to the square of the horizontal distance, the camera height above the water, and the depth.
     by: [f64; 3],
 }
 
 impl Water {
-    /// The depth of a point for a camera at `height` above the water; None for a camera below it, and for points above.
+    /// Returns the depth of a point for a camera at `height` above the water; None if the camera is below it or the point above it.
     ///
-    /// max(0, d) has a kink, and where the sum of squares has its least value on a kink no iteration ends: within
-    /// e = `SHORE` x height of the level the depth is (d + e)^2 / (4 e) instead.
+    /// max(0, d) has a kink, and iterations do not converge to a minimum on a kink. Within e = `SHORE` x height of the level the depth is
+    /// therefore (d + e)^2 / (4 e).
     fn depth(&self, foot: &Vertical, height: f64) -> Option<Depth> {
         let (depth, shore) = (self.level - foot.height, SHORE * height);
         if height <= 0.0 || depth <= -shore {
@@ -234,8 +233,8 @@ impl Water {
         }
     }
 
-    /// K_w of the GIANT guide, Appendix G, heights of camera and point being those above the ellipsoid:
-    /// (d - d') / (Hc + d') / (1 + L^2 / (Hc + d)^2).
+    /// Returns K_w = (d - d') / (Hc + d') / (1 + L^2 / (Hc + d)^2) of the GIANT guide, Appendix G. Heights of camera and point are
+    /// ellipsoidal.
     fn bending(&self, across: f64, station: &Vertical, foot: &Vertical) -> Bending {
         let height = station.height - self.level;
         let Some(depth) = self.depth(foot, height) else { return Bending::default() };
@@ -243,7 +242,7 @@ impl Water {
         let (drop, apparent) = (height + depth.value, height + depth.value - value);
         let slant = drop * drop + across;
         let steep = drop * drop / slant;
-        // K_w = steep (d - d') / apparent, where steep and apparent depend on drop
+        // K_w = steep (d - d') / apparent; steep and apparent depend on drop.
         let bending = steep * value / apparent;
         let by_value = steep * drop / (apparent * apparent);
         let by_drop = bending * (2.0 * across / (drop * slant) - 1.0 / apparent);
@@ -251,12 +250,12 @@ impl Water {
         Bending {
             value: bending,
             by_across: by_value * by[0] - bending / slant,
-            // A higher point is less deep.
+            // A higher point has a smaller depth.
             by_heights: [by_height + by_depth * depth.by_height, -by_depth * depth.by_depth],
         }
     }
 
-    /// The lift of the rigorous ray, d - d', in the frame of the point; `drop` is that of the point below the camera there.
+    /// Returns the lift d - d' of the rigorous ray in the frame of the point; `drop` is the camera height above the point in that frame.
     fn rise(&self, square: f64, drop: f64, foot: &Vertical) -> Rise {
         let height = drop - (self.level - foot.height);
         let Some(depth) = self.depth(foot, height) else {
@@ -269,21 +268,21 @@ impl Water {
             value,
             by_square: by_across,
             by_drop: by_height - 2.0 * drop * by_across,
-            // A higher point is less deep, and at the same drop its camera stands higher above the water.
+            // A higher point has a smaller depth; at the same drop its camera is higher above the water.
             by_heights: [0.0, by_height - by_depth * depth.by_depth],
         }
     }
 
-    /// d - d' = d (1 - q) for a camera at `height` above the water and the square `across` of the horizontal distance L.
+    /// Returns d - d' = d (1 - q) for a camera at `height` above the water and the square `across` of the horizontal distance L.
     ///
-    /// With T = tan i above the water, tan r = q T below it, q = 1 / sqrt(n^2 + (n^2 - 1) T^2), so that L = T (Hc + d q);
-    /// implicit differentiation gives (Hc + d n^2 q^3) dT = dL - T dHc - q T dd.
+    /// With T = tan i above the water: tan r = q T below it, q = 1 / sqrt(n^2 + (n^2 - 1) T^2), L = T (Hc + d q). Implicit differentiation
+    /// gives (Hc + d n^2 q^3) dT = dL - T dHc - q T dd.
     fn shallowing(&self, across: f64, height: f64, depth: f64) -> Shallowing {
         let index_square = self.index * self.index;
         let tangent = self.tangent(across.max(0.0).sqrt(), height, depth);
         let tangent_square = tangent * tangent;
         let q = (index_square + (index_square - 1.0) * tangent_square).sqrt().recip();
-        // dq = -(n^2 - 1) q^3 T dT, with T dL = d(L^2) / 2 / (Hc + d q)
+        // dq = -(n^2 - 1) q^3 T dT, with T dL = d(L^2) / 2 / (Hc + d q).
         let scale = depth * (index_square - 1.0) * q.powi(3) / (height + depth * index_square * q.powi(3));
         Shallowing {
             value: depth * (1.0 - q),
@@ -295,8 +294,8 @@ impl Water {
         }
     }
 
-    /// T of L = T (Hc + d q(T)) by Newton's method. The right side is concave and q <= 1/n, so that T rises from the start
-    /// to the root without passing it.
+    /// Returns T of L = T (Hc + d q(T)) by Newton's method. The right side is concave and q <= 1/n, so that T increases monotonically from
+    /// the initial value to the root.
     fn tangent(&self, across: f64, height: f64, depth: f64) -> f64 {
         const MOST_STEPS: usize = 50;
         let index_square = self.index * self.index;
@@ -314,8 +313,8 @@ impl Water {
     }
 }
 
-/// Adds a rise along a vertical to a lift, all but what the turning of the vertical changes: that is returned, for the
-/// end of the ray where it stands.
+/// Adds a rise along a vertical to a lift. Returns the partials due to the rotation of the vertical, which belong to the end of the ray at
+/// the vertical.
 fn add(
     lift: &mut Lift,
     rise: &Rise,

@@ -2,7 +2,7 @@
 
 use super::axes::{Matrix3, Vector3};
 
-/// The rotation matrix M(omega, phi, kappa), angles in radians.
+/// Returns the rotation matrix M(omega, phi, kappa), angles in radians.
 ///
 /// ```text
 ///  ck cp    so sp ck + co sk   -co sp ck + so sk
@@ -24,7 +24,7 @@ pub fn rotation(angles: [f64; 3]) -> Matrix3 {
     )
 }
 
-/// M and its partial derivatives with respect to omega, phi and kappa.
+/// Returns M and its partial derivatives with respect to omega, phi and kappa.
 pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     let m = rotation(angles);
     let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
@@ -45,20 +45,19 @@ pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     (m, [omega, phi, kappa])
 }
 
-/// The angles omega, phi, kappa of a rotation matrix: omega and kappa in [-pi, pi], phi in [-pi/2, pi/2].
+/// Returns the angles omega, phi, kappa of a rotation matrix: omega and kappa in [-pi, pi], phi in [-pi/2, pi/2].
 ///
-/// Where phi is +-90 degrees only omega + kappa (or their difference) is determined; the angles returned
-/// still give the matrix.
+/// If phi is +-90 degrees, only omega + kappa (or their difference) is determined; the returned angles still reproduce the matrix.
 pub fn rotation_angles(m: &Matrix3) -> [f64; 3] {
     let omega = (-m[(2, 1)]).atan2(m[(2, 2)]);
     let phi = m[(2, 0)].atan2(m[(2, 1)].hypot(m[(2, 2)]));
-    // Turning omega back leaves sin kappa and cos kappa in the second column, whatever phi is.
+    // After removal of omega the second column contains sin kappa and cos kappa, for any phi.
     let (so, co) = omega.sin_cos();
     let kappa = (so * m[(0, 2)] + co * m[(0, 1)]).atan2(so * m[(1, 2)] + co * m[(1, 1)]);
     [omega, phi, kappa]
 }
 
-/// Angles shifted by whole turns so that they are nearest to known ones (NaN where unknown), with which they are compared.
+/// Shifts angles by full rotations so that they are nearest to known ones (NaN if unknown).
 pub fn nearest_turns<const N: usize>(angles: [f64; N], known: [f64; N]) -> [f64; N] {
     const TURN: f64 = std::f64::consts::TAU;
     std::array::from_fn(|k| {

@@ -1,32 +1,32 @@
-//! From the apparent place of a star to refracted standard coordinates, and back (NOAA TR NOS 55, equations 1 to 18).
+//! Transformation of apparent places of stars to refracted standard coordinates, and its inverse (NOAA TR NOS 55, equations 1 to 18).
 //!
-//! Standard coordinates are the gnomonic projection on the plane one unit towards the zenith: xi north, eta east. Hour angles are
-//! positive west; azimuths count from south, positive west.
+//! Standard coordinates are the gnomonic projection on the plane at unit distance towards the zenith: xi north, eta east. Hour angles are
+//! positive west; azimuths are counted from south, positive west.
 //!
-//! The attitude alpha, omega, kappa of a camera under the sky (NOAA TR NOS 55, equation 19).
+//! The attitude alpha, omega, kappa of a stellar camera follows equation 19 of NOAA TR NOS 55.
 
 use super::axes::{Matrix3, Vector3};
 
 /// One second of arc in radians.
 pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
-/// The coefficients tau of the report's fit to Garfinkel's tables, in seconds of arc.
+/// Coefficients tau of the report's fit to Garfinkel's tables, in seconds of arc.
 pub const REFRACTION: [f64; 4] = [1050.6103, 706.115_02, 262.060_86, 142.672_93];
 /// Gamma of the same fit.
 const GAMMA: f64 = 8.7137;
 /// Standard conditions: 0 degrees Celsius in kelvin, one atmosphere in millimetres of mercury.
 const STANDARD: (f64, f64) = (273.15, 760.0);
 
-/// The air at a station, and its refraction (equations 7 to 9).
+/// Air at a station and its refraction (equations 7 to 9).
 #[derive(Debug, Clone, Copy)]
 pub struct Air {
-    /// P T^(-3/2), relative to standard conditions, in radians for each second of arc.
+    /// P T^(-3/2), relative to standard conditions, in radians per second of arc.
     scale: f64,
     /// T^(1/2) / gamma.
     slope: f64,
 }
 
-/// Refraction at an observed zenith distance z, with its derivatives; radians.
+/// Refraction at an observed zenith distance z, with its derivatives, in radians.
 #[derive(Debug, Clone, Copy)]
 pub struct Refraction {
     /// True minus observed zenith distance.
@@ -38,13 +38,13 @@ pub struct Refraction {
 }
 
 impl Air {
-    /// Air of a temperature in kelvin and a pressure in millimetres of mercury; without pressure there is no refraction.
+    /// Returns the air of a temperature in kelvin and a pressure in millimetres of mercury; a pressure of 0 disables refraction.
     pub fn new(temperature: f64, pressure: f64) -> Self {
         let (t, p) = (temperature / STANDARD.0, pressure / STANDARD.1);
         Self { scale: p * t.powf(-1.5) * ARCSEC, slope: t.sqrt() / GAMMA }
     }
 
-    /// Refraction at an observed zenith distance.
+    /// Returns the refraction at an observed zenith distance.
     pub fn refraction(&self, zenith_distance: f64, tau: &[f64; 4]) -> Refraction {
         let (sin, cos) = zenith_distance.sin_cos();
         let u = (0.5 * (self.slope * sin).atan2(cos)).tan();
@@ -60,7 +60,7 @@ impl Air {
         }
     }
 
-    /// The observed zenith distance of a true one, by Newton's method to the last digits.
+    /// Returns the observed zenith distance of a true one, by Newton's method to full precision.
     pub fn observed(&self, zenith_distance: f64, tau: &[f64; 4]) -> f64 {
         let mut observed = zenith_distance;
         for _ in 0..20 {
@@ -74,7 +74,7 @@ impl Air {
         observed
     }
 
-    /// Refraction at a true zenith distance by the report's iteration: substitution until two values differ by no more than
+    /// Returns the refraction at a true zenith distance by the report's iteration: substitution until two values differ by at most
     /// `tolerance` (radians), then their mean (equation 11).
     pub fn published(&self, zenith_distance: f64, tau: &[f64; 4], tolerance: f64) -> f64 {
         let (mut observed, mut last) = (zenith_distance, 0.0);
@@ -90,14 +90,14 @@ impl Air {
     }
 }
 
-/// Where and through what the sky is seen.
+/// Observing station: latitude, aberration and air.
 #[derive(Debug, Clone, Copy)]
 pub struct Station {
     /// Sine and cosine of the latitude.
     latitude: (f64, f64),
     /// Constant of diurnal aberration in radians.
     aberration: f64,
-    /// The air.
+    /// Air at the station.
     pub air: Air,
 }
 
@@ -113,13 +113,13 @@ pub struct Standard {
 }
 
 impl Station {
-    /// A station at a latitude (radians), with the constant of diurnal aberration at the equator (radians).
+    /// Returns a station at a latitude (radians), with the constant of diurnal aberration at the equator (radians).
     pub fn new(latitude: f64, aberration: f64, air: Air) -> Self {
         Self { latitude: latitude.sin_cos(), aberration, air }
     }
 
-    /// Hour angle and declination with diurnal aberration, and the partials of each with respect to right ascension and
-    /// declination (equations 17 and 18).
+    /// Returns hour angle and declination with diurnal aberration, and the partials of each with respect to right ascension and declination
+    /// (equations 17 and 18).
     pub fn aberrated(&self, [ra, dec]: [f64; 2], sidereal_time: f64) -> ([f64; 2], [[f64; 2]; 2]) {
         let k = self.aberration * self.latitude.1;
         let hour = sidereal_time - ra;
@@ -129,21 +129,21 @@ impl Station {
         (values, partials)
     }
 
-    /// Unit vector north, east, zenith of an hour angle and declination (equations 1 to 3).
+    /// Returns the unit vector north, east, zenith of an hour angle and declination (equations 1 to 3).
     pub fn direction(&self, [hour, dec]: [f64; 2]) -> [f64; 3] {
         let (sp, cp) = self.latitude;
         let ((sh, ch), (sd, cd)) = (hour.sin_cos(), dec.sin_cos());
         [cp * sd - sp * cd * ch, -cd * sh, sp * sd + cp * cd * ch]
     }
 
-    /// Hour angle and declination of a direction north, east, zenith (equation 5).
+    /// Returns hour angle and declination of a direction north, east, zenith (equation 5).
     pub fn equatorial(&self, [north, east, zenith]: &[f64; 3]) -> [f64; 2] {
         let (sp, cp) = self.latitude;
         let (x, y, z) = (cp * zenith - sp * north, -east, sp * zenith + cp * north);
         [y.atan2(x), z.atan2(x.hypot(y))]
     }
 
-    /// Refracted standard coordinates of an apparent place; not finite at and below the horizon.
+    /// Returns the refracted standard coordinates of an apparent place; not finite at and below the horizon.
     pub fn standard(&self, place: [f64; 2], sidereal_time: f64, tau: &[f64; 4]) -> Standard {
         let (equatorial, by_place) = self.aberrated(place, sidereal_time);
         let direction = self.direction(equatorial);
@@ -160,9 +160,9 @@ impl Station {
         Standard { coordinates: by_direction.0, place, coefficients: by_direction.2 }
     }
 
-    /// Standard coordinates of a true direction, and their partials with respect to its components and to tau.
+    /// Returns the standard coordinates of a true direction, and their partials with respect to its components and to tau.
     ///
-    /// With s the sine of the true zenith distance and T the tangent of the observed one, xi = north T / s.
+    /// xi = north T / s with the sine s of the true zenith distance and the tangent T of the observed one.
     fn refracted(
         &self,
         &[north, east, zenith]: &[f64; 3],
@@ -177,7 +177,7 @@ impl Station {
         let observed = self.air.observed(s.atan2(zenith), tau);
         let refraction = self.air.refraction(observed, tau);
         let (sin, cos) = observed.sin_cos();
-        // Below the horizon the tangent would come back as that of a direction above it.
+        // Below the horizon the tangent would equal the tangent of a direction above it.
         let tangent = if cos > 0.0 { sin / cos } else { f64::NAN };
         let growth = (1.0 + refraction.slope).recip() / (cos * cos);
         let (w, unit) = (tangent / s, [north / s, east / s]);
@@ -193,8 +193,8 @@ impl Station {
         ([unit[0] * tangent, unit[1] * tangent], [row(0), row(1)], by_tau)
     }
 
-    /// The apparent place of refracted standard coordinates: once refraction at the observed zenith distance, then aberration
-    /// until it reproduces them.
+    /// Returns the apparent place of refracted standard coordinates: refraction is evaluated once at the observed zenith distance,
+    /// aberration is iterated.
     pub fn place(&self, coordinates: [f64; 2], sidereal_time: f64, tau: &[f64; 4]) -> [f64; 2] {
         let tangent = coordinates[0].hypot(coordinates[1]);
         let observed = tangent.atan();
@@ -210,7 +210,7 @@ impl Station {
         place
     }
 
-    /// Partials of standard coordinates with respect to a refracted right ascension and declination (the report's AA to DD);
+    /// Returns the partials of standard coordinates with respect to a refracted right ascension and declination (the report's AA to DD);
     /// rows xi and eta.
     pub fn standard_by_refracted(&self, [hour, dec]: [f64; 2], zenith: f64, xi: f64) -> [[f64; 2]; 2] {
         let ((sh, ch), (sd, _)) = (hour.sin_cos(), dec.sin_cos());
@@ -220,10 +220,10 @@ impl Station {
     }
 }
 
-/// The matrix from north, east, zenith (left-handed) to x, y and axis of a diapositive; its determinant is -1.
+/// Returns the matrix from north, east, zenith (left-handed) to x, y and axis of a diapositive; its determinant is -1.
 ///
-/// Alpha turns about east (zenith towards north), omega about the turned north (axis towards east), kappa about the axis; then x is
-/// reflected. The axis points to (sin alpha cos omega, sin omega, cos alpha cos omega).
+/// The rotations are alpha about east (zenith towards north), omega about the rotated north (axis towards east), kappa about the axis; then
+/// x is reflected. The axis points to (sin alpha cos omega, sin omega, cos alpha cos omega).
 pub fn pointing([alpha, omega, kappa]: [f64; 3]) -> Matrix3 {
     let [(sa, ca), (so, co), (sk, ck)] = [alpha, omega, kappa].map(f64::sin_cos);
     Matrix3::new(
@@ -239,7 +239,7 @@ pub fn pointing([alpha, omega, kappa]: [f64; 3]) -> Matrix3 {
     )
 }
 
-/// The matrix and its partials with respect to alpha, omega, kappa.
+/// Returns the matrix and its partials with respect to alpha, omega, kappa.
 pub fn pointing_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     let m = pointing(angles);
     let [(sa, ca), (so, co), (sk, ck)] = angles.map(f64::sin_cos);
@@ -251,9 +251,9 @@ pub fn pointing_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
     (m, [alpha, omega, kappa])
 }
 
-/// The angles of a matrix (equations 96 to 98): alpha and kappa in [-pi, pi], omega in [-pi/2, pi/2].
+/// Returns the angles of a matrix (equations 96 to 98): alpha and kappa in [-pi, pi], omega in [-pi/2, pi/2].
 ///
-/// With the axis due east or west only a combination of alpha and kappa is determined; kappa is then zero.
+/// If the axis points due east or west, only a combination of alpha and kappa is determined; kappa is then zero.
 pub fn pointing_angles(m: &Matrix3) -> [f64; 3] {
     let cos_omega = m[(2, 0)].hypot(m[(2, 2)]);
     let omega = m[(2, 1)].atan2(cos_omega);

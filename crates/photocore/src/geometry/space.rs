@@ -1,9 +1,9 @@
-//! The object space: coordinates of points and photos, and the cartesian positions that they stand for.
+//! Object space: coordinates of points and photos, and their cartesian positions.
 
 use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::Ellipsoid;
 
-/// The coordinates in which positions of photos and points are given and adjusted.
+/// Coordinate system in which positions of photos and points are given and adjusted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ObjectSpace {
     /// X, Y, Z.
@@ -13,7 +13,7 @@ pub enum ObjectSpace {
 }
 
 impl ObjectSpace {
-    /// The coordinates of a cartesian position.
+    /// Returns the coordinates of a cartesian position.
     pub fn coordinates(self, position: Vector3) -> [f64; 3] {
         match self {
             ObjectSpace::Rectangular => position.into(),
@@ -21,7 +21,7 @@ impl ObjectSpace {
         }
     }
 
-    /// The cartesian position of given coordinates.
+    /// Returns the cartesian position of given coordinates.
     pub fn cartesian(self, coordinates: [f64; 3]) -> Vector3 {
         match self {
             ObjectSpace::Rectangular => coordinates.into(),
@@ -29,7 +29,7 @@ impl ObjectSpace {
         }
     }
 
-    /// The cartesian position and, as columns, its partials with respect to the coordinates.
+    /// Returns the cartesian position and, as columns, its partials with respect to the coordinates.
     #[inline]
     pub fn cartesian_with_partials(self, coordinates: [f64; 3]) -> (Vector3, Matrix3) {
         match self {
@@ -39,7 +39,7 @@ impl ObjectSpace {
     }
 }
 
-/// A point: its cartesian position and the partials of that with respect to the three unknown coordinates.
+/// Cartesian position of a point with its partials with respect to the three unknown coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
     position: Vector3,
@@ -48,7 +48,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// The point with the given coordinates of the object space.
+    /// Returns the point with the given coordinates of the object space.
     #[inline]
     pub fn new(space: ObjectSpace, coordinates: [f64; 3]) -> Self {
         match space {
@@ -60,19 +60,19 @@ impl Point {
         }
     }
 
-    /// The cartesian position.
+    /// Returns the cartesian position.
     #[inline]
     pub fn position(&self) -> Vector3 {
         self.position
     }
 
-    /// Partials of the cartesian position with respect to the three coordinates, as columns.
+    /// Returns the partials of the cartesian position with respect to the three coordinates, as columns.
     #[inline]
     pub fn partials(&self) -> Matrix3 {
         self.partials.unwrap_or_else(Matrix3::identity)
     }
 
-    /// A gradient with respect to the coordinates from that with respect to the cartesian position.
+    /// Transforms a gradient from the cartesian position to the coordinates.
     #[inline(always)]
     pub fn by_coordinates(&self, by_position: &Vector3) -> Vector3 {
         match &self.partials {
@@ -81,26 +81,25 @@ impl Point {
         }
     }
 
-    /// The point where the lift puts it.
+    /// Returns the point displaced by a lift.
     pub fn lifted(&self, lift: &Lift) -> Self {
         Self { position: self.position + lift.vector, partials: Some(self.partials() + lift.by_point) }
     }
 }
 
-/// By how much one photo sees a point away from its place (see [`super::refraction`]): a cartesian vector, and its partials
-/// as columns.
+/// Apparent displacement of a point in one photo (see [`super::refraction`]): a cartesian vector, and its partials as columns.
 #[derive(Debug, Clone, Copy)]
 pub struct Lift {
-    /// From the point to where it is seen.
+    /// Vector from the point to its apparent position.
     pub vector: Vector3,
-    /// With respect to the position of the photo.
+    /// Partials with respect to the position of the photo.
     pub by_photo: Matrix3,
-    /// With respect to the coordinates of the point.
+    /// Partials with respect to the coordinates of the point.
     pub by_point: Matrix3,
 }
 
 impl Lift {
-    /// The point is seen where it is.
+    /// Returns the zero lift.
     pub fn none() -> Self {
         Self { vector: Vector3::zeros(), by_photo: Matrix3::zeros(), by_point: Matrix3::zeros() }
     }

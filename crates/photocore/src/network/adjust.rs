@@ -1,4 +1,4 @@
-//! The adjustment of a network: iterations, and what leaves it between them.
+//! Adjustment of a network: iterations, and exclusions between them.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
 use crate::sorting::sort_by;
 
-/// An adjustment of a network to be run: from where, on which threads, watched by whom, and into which datum.
+/// An adjustment to be run: initial state, threads, progress function and datum.
 ///
 /// ```no_run
 /// # use photocore::network::{Network, NetworkError, Options, Solution};
@@ -31,17 +31,17 @@ pub struct NetworkAdjustment<'a> {
     watch: Option<Watch<'a>>,
 }
 
-/// What an adjustment is to give besides the solution.
+/// Requested results besides the solution.
 #[derive(Debug, Clone, Copy, Default)]
 struct Goal<'a> {
     datum: Option<&'a InnerConstraints>,
-    /// Where what tests need is kept: points whose cofactors with each other are kept too.
+    /// Points with joint cofactors; Some if the results for tests are stored.
     keep: Option<&'a [usize]>,
 }
 
 impl<'a> NetworkAdjustment<'a> {
-    /// From where an adjustment of the network has ended, perhaps with other weights: in the order that was in force, and without the
-    /// points that had run into a station.
+    /// Starts from the final state of an adjustment of the network, perhaps with other weights. The elimination order and the exclusion of
+    /// points at stations are adopted.
     #[must_use]
     pub fn from_state(mut self, state: &'a State) -> Self {
         self.options.ordering = state.ordering;
@@ -49,40 +49,40 @@ impl<'a> NetworkAdjustment<'a> {
         self
     }
 
-    /// Takes a network that is free to the datum of inner constraints.
+    /// Transforms a free network to the datum of inner constraints.
     #[must_use]
     pub fn in_datum(mut self, datum: &'a InnerConstraints) -> Self {
         self.goal.datum = Some(datum);
         self
     }
 
-    /// Keeps what tests of it need ([`Solution::converged`]) where it converges by least squares and there is memory: it takes about a
-    /// twentieth longer. Cofactors of some points with each other are kept too ([`Solution::joint`]), from the last factor.
+    /// Stores the results for tests ([`Solution::converged`]) if the adjustment converges by least squares and memory suffices; it costs 5
+    /// % of the time. Joint cofactors of some points ([`Solution::joint`]) are also computed from the last factor.
     #[must_use]
     pub fn kept(mut self, points: &'a [usize]) -> Self {
         self.goal.keep = Some(points);
         self
     }
 
-    /// On threads of the caller; otherwise it starts its own.
+    /// Uses threads of the caller; by default new ones are started.
     #[must_use]
     pub fn on(mut self, threads: &'a Threads) -> Self {
         self.threads = Some(threads);
         self
     }
 
-    /// Tells `watch`, on the calling thread, what is going on; when that breaks, the adjustment stops.
+    /// Reports progress to `watch` on the calling thread; the adjustment stops if it returns a break.
     #[must_use]
     pub fn watched(mut self, watch: Watch<'a>) -> Self {
         self.watch = Some(watch);
         self
     }
 
-    /// Adjusts.
+    /// Runs the adjustment.
     ///
     /// # Errors
-    /// A network that contradicts itself, has nothing to adjust, or leaves unknowns undetermined; a state that is not of this network; a
-    /// datum for a network that is not free, or that its points and photos do not carry; an interruption; threads that cannot be started.
+    /// An inconsistent or empty network, undetermined parameters, a state of another network. A datum for a network that is not free, or
+    /// that its points and photos cannot define. An interruption, threads that cannot be started.
     pub fn run(self) -> Result<Solution, NetworkError> {
         let Self { network, options, state, goal, threads, watch } = self;
         let own;
@@ -98,18 +98,18 @@ impl<'a> NetworkAdjustment<'a> {
 }
 
 impl Network {
-    /// Adjusts the network by least squares, on threads of its own.
+    /// Adjusts the network by least squares, on its own threads.
     ///
-    /// Points that their image points cannot determine are left out first (see [`super::Dropped`]). So are points that run into the station
-    /// of a photo: the adjustment goes on without them from where it was. Observations of points that are left out do not take part.
+    /// Points that their image observations cannot determine are excluded first (see [`super::Dropped`]). Points that move to the station
+    /// of a photo are excluded later, and the adjustment continues without them. Observations of excluded points are ignored.
     ///
     /// # Errors
-    /// Those of [`NetworkAdjustment::run`].
+    /// Errors of [`NetworkAdjustment::run`].
     pub fn adjust(&self, options: &Options) -> Result<Solution, NetworkError> {
         self.adjustment(options).run()
     }
 
-    /// The same with more to say: from where, on which threads, watched by whom, in which datum.
+    /// Returns an adjustment with further options: initial state, threads, progress function and datum.
     pub fn adjustment(&self, options: &Options) -> NetworkAdjustment<'_> {
         NetworkAdjustment {
             network: self,
@@ -166,7 +166,7 @@ impl Network {
         }
     }
 
-    /// What has been found, in the datum that is asked for.
+    /// Returns the solution in the requested datum.
     fn solved(
         &self,
         options: &Options,
@@ -208,12 +208,12 @@ impl Network {
     }
 }
 
-/// Where an adjustment has moved images beyond the knots that they were to step with, it goes on with others.
+/// Returns a restart if images have moved beyond the active knots of their lens spline.
 fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
     (assembled.problem.model.beyond_windows(&ended.unknowns) > 0).then_some(Begin::FromHere)
 }
 
-/// Iterates, after so many iterations that were done before.
+/// Iterates; `done` is the number of preceding iterations.
 fn iterated(
     assembled: &Assembled,
     options: &Options,
@@ -227,8 +227,8 @@ fn iterated(
     own.max_iterations = own.max_iterations.saturating_sub(done);
     let plain = own.covariance && own.loss.is_none();
     match datum {
-        // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only, and trajectories follow
-        // moves so nearly that steps after one would not be short.
+        // The adjustment runs in the requested datum. Exceptions: weights of a loss are known only at the end; trajectories follow a
+        // transformation only approximately, so that steps after it would not be short.
         Some(inner)
             if plain
                 && matches!(own.method, Method::Damped(_))
@@ -251,7 +251,7 @@ fn iterated(
     }
 }
 
-/// Takes an adjusted network to the datum of inner constraints; returns how large a part of its variances may be rounding.
+/// Transforms an adjusted network to the datum of inner constraints; returns the relative rounding error of its variances.
 fn take_to(
     inner: &InnerConstraints,
     options: &adjustment::Options,

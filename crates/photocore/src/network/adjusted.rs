@@ -1,4 +1,4 @@
-//! Photos and points after the adjustment.
+//! Adjusted photos and points.
 
 use nalgebra::DMatrix;
 
@@ -15,15 +15,15 @@ use crate::parallel;
 /// An adjusted photo.
 #[derive(Debug, Clone)]
 pub struct AdjustedPhoto {
-    /// The six unknowns of its pose; of a photo on a frame those that it would have, from the poses of frame and sensor.
+    /// Six parameters of its pose; for a photo on a frame, the equivalent parameters of the composed pose.
     pub pose: [f64; POSE],
-    /// The parameters of its camera.
+    /// Parameters of its camera.
     pub camera: Vec<f64>,
-    /// Cofactors (a priori unit weight) of pose and, unless it is held or shared, camera; NaN where there are none.
+    /// Cofactors (a priori unit weight) of the pose and its own free camera; NaN without cofactors.
     pub cofactors: DMatrix<f64>,
-    /// Redundancy numbers of these unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
+    /// Redundancy numbers of these parameters as their own observations; zero unless weighted, NaN without cofactors.
     pub redundancy: Vec<f64>,
-    /// Number of images that took part.
+    /// Number of active images.
     pub images: usize,
 }
 
@@ -32,19 +32,19 @@ pub struct AdjustedPhoto {
 pub struct AdjustedPoint {
     /// Coordinates in the object space.
     pub coordinates: [f64; 3],
-    /// Cofactors (a priori unit weight); NaN where there are none.
+    /// Cofactors (a priori unit weight); NaN without cofactors.
     pub cofactors: Matrix3,
-    /// Redundancy numbers of its components as observations of themselves; zero unless weighted, NaN where there are no cofactors.
+    /// Redundancy numbers of its coordinates as their own observations; zero unless weighted, NaN without cofactors.
     pub redundancy: [f64; 3],
-    /// Its correction in the last iteration.
+    /// Correction in the last iteration.
     pub last_correction: [f64; 3],
     /// Number of images.
     pub rays: usize,
-    /// How many of them have it behind the camera.
+    /// Number of images with the point behind the camera.
     pub behind: usize,
 }
 
-/// Photos that a thread takes at least.
+/// Minimum number of photos per thread.
 const PHOTOS_TOGETHER: usize = 128;
 pub(super) fn adjusted_photos(
     network: &Network,
@@ -65,10 +65,10 @@ pub(super) fn adjusted_photos(
         let absolute = |k: usize| {
             let counted = if k < positions { values[k] + origin[k] } else { values[k] };
             let counted = angles.filter(|_| k >= 3).map_or(counted, |angles| angles[k - 3]);
-            // Fixed ones as they were given, to the last bit.
+            // Fixed coordinates are returned bit by bit.
             if k < positions && photo.sd[k] == 0.0 { photo.pose[k] } else { counted }
         };
-        // A photo without images that is held has no cofactors: nothing was asked of it.
+        // Cofactors of a fixed photo without images are undefined.
         let asked = model.images_on[index] > 0 || problem.sd[first..end].iter().any(|&sd| sd != 0.0);
         let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
         let redundancy = adjustment.prior_redundancy.as_ref();
@@ -78,7 +78,7 @@ pub(super) fn adjusted_photos(
             None => model.cameras[index].parameters(),
         };
         if model.is_carried(index) {
-            // In a part of a network its images may be at home below.
+            // In a node of a larger network, its images may belong to child nodes.
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
             let (pose, cofactors) = mounted_pose(network, problem, &placed, index, cofactors);
@@ -104,7 +104,7 @@ pub(super) fn adjusted_photos(
     parallel::map(network.photos.len(), PHOTOS_TOGETHER, photo)
 }
 
-/// The six numbers of the pose of a photo that is mounted, and their cofactors; NaN where there are none.
+/// Returns the six pose parameters of a mounted photo and their cofactors; NaN without cofactors.
 fn mounted_pose(
     network: &Network,
     problem: &Problem<Bundle>,
@@ -125,15 +125,15 @@ fn mounted_pose(
     (pose, found.unwrap_or_else(|| DMatrix::repeat(POSE, POSE, f64::NAN)))
 }
 
-/// The angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega takes the sum.
+/// Returns the angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega is the sum.
 fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64; 3]> {
     let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
     let angles = [values[3], values[4], values[5]];
     Some(if numbers.is_singular(angles) { numbers.numbers(&numbers.attitude(angles)) } else { angles })
 }
 
-/// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
-/// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
+/// Converts cofactors of a photo to its angles by diag(I, K^-1, I) if its attitude steps by a rotation vector rho = K d(angles). NaN for
+/// undetermined angles, if phi is 90 degrees.
 fn in_angles(model: &Bundle, photo: usize, values: &[f64], mut found: DMatrix<f64>) -> DMatrix<f64> {
     let Some(sense) = model.turning_sense(photo) else { return found };
     let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
@@ -162,7 +162,7 @@ pub(super) fn adjusted_points(
         let first = model.of_point(i).start;
         let own = cofactors.map(|all| match i.checked_sub(model.locals) {
             None => &all.local[9 * i..],
-            // The last retained blocks.
+            // Points are the last retained blocks.
             Some(tied) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - tied)..],
         });
         let found =
@@ -183,8 +183,8 @@ pub(super) fn adjusted_points(
     })
 }
 
-/// What `each` makes of the things of a network that take part, as the network numbers them; None for all others. `order` are those that
-/// do, as the problem has them; `each` is given both numbers.
+/// Returns `each` for every active item of a network, in the order of the network; None for others. `order` lists the active items in the
+/// order of the problem; `each` is called with both indices.
 pub(super) fn in_order<T: Send>(
     count: usize,
     order: &[usize],
@@ -199,7 +199,7 @@ pub(super) fn in_order<T: Send>(
     parallel::map_in_place(count, TOGETHER, &of)
 }
 
-/// The correction of each unknown in the last iteration; zero where there was none.
+/// Returns the correction of each parameter in the last iteration; zero before any iteration.
 fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
     let local = &adjustment.last_local_corrections;
     let retained = adjustment.history.last_chunk::<2>();

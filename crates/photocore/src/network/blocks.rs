@@ -1,4 +1,4 @@
-//! Where the unknowns of photos, cameras and common unknowns are among the retained ones.
+//! Positions of the parameters of photos, cameras and shared parameters among the retained ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,35 +7,35 @@ use super::in_block::InBlock;
 use super::{Network, Photo, Trajectory};
 use crate::geometry::POSE;
 
-/// The retained blocks before those of points: photos (six of the pose, then those of a camera of their own, then those of their film; six
-/// that are held where it is on a frame), then shared cameras, then common unknowns.
+/// Retained blocks, except points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The pose of
+/// a photo on a frame is fixed.
 #[derive(Debug)]
 pub(super) struct Blocks {
-    /// The unknowns of block i are `first[i]..first[i + 1]` of the retained ones.
+    /// Block i contains the retained parameters `first[i]..first[i + 1]`.
     pub first: Vec<usize>,
-    /// Where the cofactors of each block start among those of all retained ones.
+    /// Start of the cofactors of each block among the cofactors of all retained blocks.
     pub squares: Vec<usize>,
-    /// The cameras that several photos share, as the network numbers them.
+    /// Indices of the shared cameras in the network.
     pub shared: Vec<usize>,
-    /// The block of each photo's camera where that is shared.
+    /// Block of each photo's camera if it is shared.
     pub of_camera: Vec<Option<usize>>,
-    /// Where each common unknown is, unless it is known.
+    /// Position of each shared parameter, None if it is fixed.
     pub of_common: Vec<Option<InBlock>>,
-    /// The common unknowns of each photo, as they stand in its block behind pose and camera.
+    /// Shared parameters in the block of each photo, in their order behind pose and camera.
     pub of_photo: Vec<Vec<usize>>,
-    /// The common unknowns of each block after those of cameras, as they stand in it.
+    /// Shared parameters of each block behind the cameras, in their order.
     pub commons: Vec<Vec<usize>>,
 }
 
 impl Blocks {
-    /// `shared` are the cameras that have a block of their own, ascending; so have the common unknowns `elsewhere`, which other nodes of a
-    /// larger network touch, each.
+    /// Numbers the blocks. `shared` lists the cameras with own blocks, ascending. Shared parameters `elsewhere`, used by other nodes of a
+    /// larger network, have individual blocks.
     pub fn new(network: &Network, shared: Vec<usize>, elsewhere: &BTreeSet<usize>) -> Self {
         let mut first = vec![0];
         let mut add = |width: usize| first.push(first[first.len() - 1] + width);
         let photos = network.photos.len();
         let mut of_common = vec![None; network.commons.len()];
-        // Behind so many unknowns of a block; returns how many it then has.
+        // Appends parameters behind the first ones of a block; returns the resulting width.
         let mut place = |block: usize, behind: usize, together: &[usize]| {
             let dim = |common: usize| network.commons[common].sd.len();
             let width = behind + together.iter().map(|&common| dim(common)).sum::<usize>();
@@ -67,7 +67,7 @@ impl Blocks {
 }
 
 impl Blocks {
-    /// The common unknowns of a block, as they stand in it: those of a photo behind pose and camera.
+    /// Returns the shared parameters of a block in their order; in the block of a photo they follow pose and camera.
     pub fn commons_of(&self, block: usize) -> &[usize] {
         let photos = self.of_camera.len();
         let own = match block.checked_sub(photos + self.shared.len()) {
@@ -79,10 +79,10 @@ impl Blocks {
 }
 
 impl Network {
-    /// The common unknowns that are not known: those in the blocks of photos, photo by photo, or none at all, and those of the blocks behind.
+    /// Returns the free shared parameters: lists by photo (or an empty list), and lists by block behind the cameras.
     ///
-    /// Together are the coefficients of one trajectory by functions that are never zero, all of which every image of it touches, and what
-    /// the same passages have everywhere: in the block of a photo where that is the only one to pass them.
+    /// Coefficients with global support of one trajectory share a block, because every image of it depends on all of them. So do parameters
+    /// of the same corrections, which are in the block of a photo if only its images depend on them.
     pub(super) fn commons_by_block(&self, elsewhere: &BTreeSet<usize>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let mut leader: Vec<usize> = (0..self.commons.len()).collect();
         let mut uses = vec![0; self.commons.len()];
@@ -95,7 +95,7 @@ impl Network {
         let mut of_photo = vec![];
         let mut placed: Vec<bool> = self.commons.iter().map(Common::is_held).collect();
         for (passages, together) in self.passed_together(elsewhere) {
-            // The block of an image with a mount is that of its frame or trajectory.
+            // The block of an image with a mount is its frame or trajectory.
             let photo = self.passages[passages[0]].photo().filter(|_| self.mounts.is_empty());
             if let (Some(photo), [_]) = (photo, &*passages) {
                 together.iter().for_each(|&common| placed[common] = true);
@@ -112,8 +112,8 @@ impl Network {
         (of_photo, members.into_iter().filter(|own| !own.is_empty()).collect())
     }
 
-    /// The common unknowns that are not known and that passages have everywhere, together those of which that is the same passages; but for
-    /// those that are touched elsewhere.
+    /// Returns the free shared parameters that all images of a correction depend on, grouped by equal lists of corrections. Parameters that
+    /// are used elsewhere are excluded.
     fn passed_together(&self, elsewhere: &BTreeSet<usize>) -> BTreeMap<Vec<usize>, Vec<usize>> {
         let mut having = vec![vec![]; self.commons.len()];
         let mut everywhere: Vec<bool> =

@@ -1,4 +1,4 @@
-//! A network as observation equations.
+//! Conversion of a network to observation equations.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -16,7 +16,7 @@ use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local
 use crate::parallel;
 
 impl Network {
-    /// The observation equations of what takes part: `images` are those of its points, `images_on` how many are on each photo.
+    /// Returns the observation equations of the active points; `images` are their images, `images_on` counts images by photo.
     pub(super) fn bundle(
         &self,
         selected: &mut Selected,
@@ -38,7 +38,7 @@ impl Network {
         let mut bundle = Bundle {
             space: self.space,
             poses: self.poses,
-            // Coordinates are counted from the origin; heights are not.
+            // Coordinates are relative to the origin; heights are not.
             refraction: self
                 .refraction
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
@@ -79,12 +79,12 @@ impl Network {
         Ok(bundle)
     }
 
-    /// The mounts, with what they are made of, coordinates counted from an origin.
+    /// Returns the mounts with trajectories relative to an origin.
     pub(super) fn placed_mounts(&self, origin: [f64; 3]) -> Mounts {
         Mounts::new((&self.mounts, self.photos.len()), (&self.trajectories, origin), &self.commons)
     }
 
-    /// The common unknowns, with how many observations and images that take part are of each.
+    /// Returns the shared parameters, each with the number of dependent active observations and images.
     fn placed_commons(
         &self,
         selected: &Selected,
@@ -108,7 +108,7 @@ impl Network {
         placed
     }
 
-    /// The axes amid the photos, as rows, that shifts and drifts are told in: X, Y, Z or, in geographic space, east, north and up.
+    /// Returns the axes of shifts and drifts as rows: X, Y, Z or, in geographic space, east, north and up at the centre of the photos.
     fn vertical(&self, middle: [f64; 3]) -> Matrix3 {
         match self.space {
             ObjectSpace::Rectangular => Matrix3::identity(),
@@ -116,14 +116,14 @@ impl Network {
         }
     }
 
-    /// Whether the datum is the user's.
+    /// Returns true if the network defines its datum.
     pub(super) fn is_placed(&self, selected: &Selected) -> bool {
         self.given_datum(selected, &self.placed_mounts([0.0; 3])).placed
     }
 
-    /// What the network itself says of the datum.
+    /// Returns the datum information of the network itself.
     fn given_datum(&self, selected: &Selected, mounts: &Mounts) -> GivenDatum {
-        // Angles alone leave position and scale open.
+        // Angles alone define neither position nor scale.
         let positions = if let PoseNumbers::Angles(_) = self.poses { 3 } else { POSE };
         let own = |photo: &Photo| photo.sd[..positions].iter().any(|sd| sd.is_finite());
         let counts = |index: usize| !mounts.is_carried(index) && own(&self.photos[index]);
@@ -139,12 +139,12 @@ impl Network {
         GivenDatum { placed, anchor, minimum: None }
     }
 
-    /// Whether coefficients are all known or weighted.
+    /// Returns true if all coefficients are weighted or fixed.
     fn is_given(&self, coefficients: &[usize]) -> bool {
         coefficients.iter().all(|&common| self.commons[common].sd.iter().all(|sd| sd.is_finite()))
     }
 
-    /// The unknown that the first parameter of a camera is; None where no photo has it.
+    /// Returns the index of the first parameter of a camera; None without photos.
     fn first_parameter(&self, model: &Bundle, camera: usize) -> Option<usize> {
         Some(match model.blocks.shared.binary_search(&camera) {
             Ok(shared) => model.of_block(model.cameras.len() + shared).start,
@@ -154,7 +154,7 @@ impl Network {
         })
     }
 
-    /// The observations that take part.
+    /// Returns the active additional observations.
     fn tied_observations(
         &self,
         selected: &Selected,

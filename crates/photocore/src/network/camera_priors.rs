@@ -1,4 +1,4 @@
-//! Cameras whose parameters were observed with their full covariance: by a calibration of their own.
+//! Prior information of cameras with a full covariance matrix from a separate calibration.
 
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
@@ -6,17 +6,17 @@ use smallvec::SmallVec;
 use super::Camera;
 use crate::adjustment::Term;
 
-/// The observation of the weighted parameters of a camera.
+/// Observation of the weighted parameters of a camera.
 #[derive(Debug, Clone)]
 pub struct CameraPrior {
-    /// The unknown that its first parameter is.
+    /// Index of its first parameter.
     first: usize,
-    /// The inverse of the Cholesky factor of the covariance matrix, rows and columns of parameters that are not weighted zero.
+    /// Inverse Cholesky factor of the covariance matrix; rows and columns of other parameters are zero.
     root: DMatrix<f64>,
 }
 
 impl CameraPrior {
-    /// What was observed of a camera whose first parameter is the given unknown; None without a covariance matrix.
+    /// Returns the prior of a camera with a given first parameter; None without a covariance matrix.
     pub fn of(camera: &Camera, first: usize) -> Option<Self> {
         let (whitening, weighted, count) = (camera.whitening()?, camera.weighted(), camera.sd.len());
         let mut root = DMatrix::zeros(count, count);
@@ -26,10 +26,10 @@ impl CameraPrior {
         Some(Self { first, root })
     }
 
-    /// Its equations at given values of the unknowns: L^-1 (p0 - p), S = L L^T.
+    /// Returns its equations at given values: L^-1 (p0 - p), S = L L^T.
     pub fn equations(&self, values: &[f64], prior: &[f64]) -> Term {
         let count = self.root.nrows();
-        // Where nothing is observed the column is zero, and what stands there any number.
+        // Values without prior information may be arbitrary: their column is zero.
         let weighted = |k: usize| self.root.column(k).iter().any(|&value| value != 0.0);
         let apart = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
@@ -43,12 +43,11 @@ impl CameraPrior {
 }
 
 impl Camera {
-    /// The parameters that are weighted.
     pub(super) fn weighted(&self) -> Vec<usize> {
         (0..self.sd.len()).filter(|&k| self.sd[k] > 0.0 && self.sd[k].is_finite()).collect()
     }
 
-    /// The inverse of the Cholesky factor of the covariance matrix of these; None where there is no such matrix, or it is none.
+    /// Returns the inverse Cholesky factor of the covariance matrix; None if it is missing or not positive definite.
     fn whitening(&self) -> Option<DMatrix<f64>> {
         let covariance = self.covariance.as_ref()?;
         let scale = DMatrix::from_diagonal(&covariance.diagonal().map(|variance| variance.sqrt().recip()));
@@ -56,8 +55,8 @@ impl Camera {
         Some(correlations.cholesky()?.l().try_inverse()? * scale)
     }
 
-    /// Whether the covariance matrix, where there is one, is that of the weighted parameters: symmetric and positive definite, with the
-    /// squares of their standard deviations in its diagonal.
+    /// Returns true if the covariance matrix is missing or valid. It must be symmetric and positive definite, with the variances of the
+    /// weighted parameters on its diagonal.
     pub(super) fn has_sound_covariance(&self) -> bool {
         let Some(covariance) = &self.covariance else { return true };
         let weighted = self.weighted();
@@ -68,7 +67,7 @@ impl Camera {
             && self.whitening().is_some()
     }
 
-    /// Redundancy numbers of the parameters as one observation, the diagonal of Qvv S^-1 = I - Q S^-1; None unless it is one.
+    /// Returns the redundancy numbers of the parameters as one observation, the diagonal of I - Q S^-1; None without a matrix.
     pub(super) fn redundancy(&self, cofactors: &DMatrix<f64>) -> Option<Vec<f64>> {
         let (root, weighted, count) = (self.whitening()?, self.weighted(), self.sd.len());
         let q = cofactors.select_rows(&weighted).select_columns(&weighted);

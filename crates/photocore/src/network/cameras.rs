@@ -1,4 +1,4 @@
-//! Cameras whose parameters are unknown: those of one photo are unknowns of that, those of several are blocks of their own.
+//! Cameras with free parameters: in the block of a single photo, or in a block of their own.
 
 use std::ops::Range;
 
@@ -14,33 +14,33 @@ use crate::adjustment::{Adjustment, Problem};
 /// An adjusted camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedCamera {
-    /// Its parameters.
+    /// Adjusted parameters.
     pub parameters: Vec<f64>,
-    /// Their cofactors (a priori unit weight): zero for those that are held; NaN where there are none.
+    /// Cofactors of the parameters (a priori unit weight): zero for fixed ones, NaN without cofactors.
     pub cofactors: DMatrix<f64>,
-    /// Redundancy numbers of the parameters as observations of themselves; zero unless weighted, NaN where there are no cofactors.
+    /// Redundancy numbers of the parameters as their own observations; zero unless weighted, NaN without cofactors.
     pub redundancy: Vec<f64>,
-    /// Their diagonal of the normal equations, weights counted: the reciprocal cofactor that each would have if all other unknowns were
-    /// known; zero for those that are held, NaN where there are no cofactors.
+    /// Diagonal of the normal equations including weights: the reciprocal cofactors if all other parameters were fixed. Zero for fixed
+    /// parameters, NaN without cofactors.
     pub information: Vec<f64>,
-    /// How many photos it has.
+    /// Number of photos.
     pub photos: usize,
-    /// How many images on these took part.
+    /// Number of active images of these photos.
     pub images: usize,
 }
 
 impl Network {
-    /// The cameras with unknown parameters that several photos share, here or in other nodes, or one that is mounted has, ascending.
+    /// Returns the free cameras of several photos (here or in other nodes) or of a mounted photo, ascending.
     pub(super) fn shared_cameras(&self, surroundings: &Surroundings) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
-        // The unknowns of a photo that is mounted are of no camera.
+        // The block of a mounted photo cannot contain camera parameters.
         self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo()].camera] += 1);
         surroundings.cameras().into_iter().for_each(|camera| photos[camera] += 2);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 
-    /// The adjusted cameras, in the order of the network; `photos` are the adjusted photos.
+    /// Returns the adjusted cameras, in the order of the network; `photos` are the adjusted photos.
     pub(super) fn adjusted_cameras(
         &self,
         Assembled { problem, .. }: &Assembled,
@@ -52,7 +52,7 @@ impl Network {
         let given = |camera: &super::Camera| {
             let parameters = camera.camera.parameters();
             let count = parameters.len();
-            // Nothing is asked of a camera without photos.
+            // Results of a camera without photos are undefined.
             let missing = if adjustment.cofactors.is_some() && camera.is_held() { 0.0 } else { f64::NAN };
             AdjustedCamera {
                 parameters,
@@ -89,7 +89,7 @@ impl Network {
 }
 
 impl Bundle {
-    /// The places of the shared cameras: the medians of those of their photos.
+    /// Returns the positions of the shared cameras: the medians of the positions of their photos.
     pub(super) fn places_of_cameras(&self, photos: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut of_cameras: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.blocks.shared.len()];
         for (place, block) in photos.iter().zip(&self.blocks.of_camera) {
@@ -98,8 +98,8 @@ impl Bundle {
         of_cameras.into_iter().map(|places| middle(&places)).collect()
     }
 
-    /// The places of the common unknowns that have blocks: the medians of those of the photos and points that they belong to; `tied`
-    /// are those of the points that are not local. Those of a trajectory that count at some times only are where it is then.
+    /// Returns the positions of the blocks of shared parameters: medians over their photos and points; `tied` are the points that are not
+    /// local. Coefficients with local support have the position of the trajectory there.
     pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
         for (photo, &place) in photos.iter().enumerate() {
@@ -123,13 +123,13 @@ impl Bundle {
     }
 }
 
-/// The medians of coordinates.
+/// Returns the component-wise median of coordinates.
 fn middle(places: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|k| median(places.iter().map(|place| place[k]).collect()).unwrap_or_default())
 }
 
 impl AdjustedCamera {
-    /// Takes over what was found of the camera of one photo, the last unknowns of that.
+    /// Copies the results of the camera of one photo, the last parameters of its block.
     fn take_over(&mut self, photo: &AdjustedPhoto) {
         let own = photo.camera.len();
         self.parameters.clone_from(&photo.camera);
@@ -137,7 +137,7 @@ impl AdjustedCamera {
         self.cofactors = photo.cofactors.view((6, 6), (own, own)).into_owned();
     }
 
-    /// Takes the diagonal of the normal equations of its unknowns; a held one has none.
+    /// Copies the diagonal of the normal equations; zero for fixed parameters.
     fn inform(&mut self, problem: &Problem<Bundle>, unknowns: Range<usize>, adjustment: &Adjustment) {
         let Some(all) = &adjustment.cofactors else { return };
         let first = problem.layout().all_retained().start;
@@ -147,7 +147,7 @@ impl AdjustedCamera {
         self.information = unknowns.map(of).collect();
     }
 
-    /// Takes what was found of a retained block of its own.
+    /// Copies the results of a retained block.
     fn take_block(&mut self, model: &Bundle, block: usize, adjustment: &Adjustment, unknowns: &[f64]) {
         let own = model.of_block(block);
         self.parameters = unknowns[own.clone()].to_vec();

@@ -1,4 +1,4 @@
-//! Networks that contradict themselves are refused.
+//! Consistency checks of networks.
 
 use std::mem::discriminant;
 
@@ -10,7 +10,6 @@ use super::{CommonKind, Image, Mount, Network, NetworkError, Passage, Trajectory
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
-    /// Refuses a network that contradicts itself.
     pub(super) fn check(&self) -> Result<(), NetworkError> {
         let counts = (self.photos.len(), self.points.len());
         let outside = |image: &Image| image.photo >= counts.0 || image.point >= counts.1;
@@ -54,7 +53,7 @@ impl Network {
         if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
     }
 
-    /// Which photos are on a trajectory, and on nothing else.
+    /// Returns which photos are mounted on a trajectory only.
     fn flies(&self) -> Vec<bool> {
         let mut mounts = vec![(0, false); self.photos.len()];
         for mount in &self.mounts {
@@ -65,7 +64,7 @@ impl Network {
         mounts.into_iter().map(|(count, flies)| flies && count == 1).collect()
     }
 
-    /// Refuses trajectories without the coefficients that they need, images without a time where others have one.
+    /// Returns an error for invalid trajectories or coefficients, or if the number of image times is wrong.
     fn check_trajectories(&self) -> Result<(), NetworkError> {
         let of_kind = |all: &[usize], kind: CommonKind| {
             all.iter().all(|&common| self.commons.get(common).is_some_and(|own| own.kind == kind))
@@ -84,7 +83,7 @@ impl Network {
         if times == 0 || times == self.images.len() { Ok(()) } else { Err(NetworkError::ImageTimes(times)) }
     }
 
-    /// Refuses mounts that contradict the network or each other.
+    /// Returns an error for mounts that contradict the network or each other.
     fn check_mounts(&self) -> Result<(), NetworkError> {
         let mut mounted = vec![vec![]; self.photos.len()];
         let mut carries = vec![false; self.photos.len()];
@@ -98,7 +97,7 @@ impl Network {
             if !there || !flies || !mount.unknowns().into_iter().all(of_type) {
                 return Err(NetworkError::Mount(index));
             }
-            // On another photo's frame first, once each; where a trajectory is, first that, then a sensor on it.
+            // A mount on another frame is the only one; a trajectory precedes its sensor; types are distinct.
             let before: &mut Vec<&Mount> = &mut mounted[photo];
             let carried = frame.is_some_and(|frame| frame != photo);
             let again = |own: &&Mount| discriminant(*own) == discriminant(mount);
@@ -114,7 +113,7 @@ impl Network {
         self.check_flights()
     }
 
-    /// Refuses passages that are none of the network.
+    /// Returns an error for image corrections that do not fit the network.
     fn check_passages(&self) -> Result<(), NetworkError> {
         let of_type = |(common, kind): (usize, CommonKind)| {
             self.commons.get(common).is_some_and(|own| own.kind == kind)
@@ -132,7 +131,7 @@ impl Network {
         self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
     }
 
-    /// Refuses photos and images at times that their trajectory does not reach.
+    /// Returns an error for times of photos and images outside their trajectory.
     fn check_flights(&self) -> Result<(), NetworkError> {
         if self.trajectories.is_empty() {
             return Ok(());
@@ -152,7 +151,7 @@ impl Network {
         (0..self.photos.len()).try_for_each(|photo| reach(photo, None, AT_PHOTO))
     }
 
-    /// Refuses names of blocks that are not there.
+    /// Returns an error for indices of missing blocks.
     pub(super) fn check_blocks(&self, surroundings: &Surroundings) -> Result<(), NetworkError> {
         let there = |block: BlockOf| match block {
             BlockOf::Photo(photo) => photo < self.photos.len(),
@@ -170,7 +169,7 @@ impl Network {
     }
 }
 
-/// Refuses motions of what does not move.
+/// Returns an error for motion observations of photos that are not on a trajectory.
 fn check_motion(observation: &Observation, flies: &[bool]) -> Result<(), Fault> {
     let at_rest = |&photo: &usize| observation.moves() && !flies[photo];
     let photo = observation.touches().photos.into_iter().find(at_rest);

@@ -1,4 +1,4 @@
-//! Poses of a model that are made of several blocks: which these are, the poses, and their cofactors.
+//! Poses that depend on several blocks: the blocks, the poses and their cofactors.
 
 use std::borrow::Cow;
 
@@ -15,17 +15,16 @@ use crate::normals::{Cofactors, GroupRows, Layout};
 use crate::sorting::sort_by;
 
 impl Bundle {
-    /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
+    /// Returns the photo whose six parameters are the start of the pose of a photo: its frame, or itself.
     pub(super) fn carrier(&self, photo: usize) -> usize {
         self.mounts.carrier(photo)
     }
 
-    /// Whether its own six count for nothing.
     pub(super) fn is_carried(&self, photo: usize) -> bool {
         self.mounts.is_carried(photo)
     }
 
-    /// The retained blocks that a pose is made of: the main one, then those of common unknowns that are not known.
+    /// Returns the retained blocks of a pose: the main one, then blocks of free shared parameters.
     pub(super) fn blocks_of_pose(&self, photo: usize, at: f64) -> impl Iterator<Item = usize> {
         let main = self.main_block_of_pose(photo);
         let commons = self.mounts.commons(photo, at).into_iter();
@@ -41,7 +40,7 @@ impl Bundle {
         std::iter::once(main).chain(others.filter(once))
     }
 
-    /// The first of them, which is that of all poses of a photo.
+    /// Returns the first of them, which all poses of a photo share.
     pub(super) fn main_block_of_pose(&self, photo: usize) -> usize {
         self.mounts.main_block(photo, &|common| self.blocks.of_common[common])
     }
@@ -54,7 +53,7 @@ impl Bundle {
         Grounds { space: self.space, mounts: &self.mounts, photo, common }
     }
 
-    /// The pose of a photo that is mounted; None of others. `unknowns` are those of all stations.
+    /// Returns the pose of a mounted photo; None for others. `unknowns` contains the parameters of [`Bundle::of_stations`].
     pub(super) fn composed(&self, photo: usize, unknowns: &[f64]) -> Option<Composed> {
         let own = |photo: usize| {
             let pose = &unknowns[self.blocks.first[photo]..][..POSE];
@@ -65,7 +64,7 @@ impl Bundle {
         self.grounds(&own, &common).composed(photo, AT_PHOTO)
     }
 
-    /// The poses of all photos that are mounted, which those that are carried take; None where there are none.
+    /// Composes the poses of all mounted photos and stores them in replaced photos; None without mounts.
     pub(super) fn mount_all(&self, photos: &mut [Station], commons: &[CommonState]) -> Option<Mounted> {
         if self.mounts.is_empty() {
             return None;
@@ -83,8 +82,8 @@ impl Bundle {
         Some(Mounted { own, composed })
     }
 
-    /// Writes the equations of an image that is not plain. Out of line, so that plain images do not pay for it. Its pose is put in the
-    /// place of another.
+    /// Writes the equations of an image with corrections into `rows`. It is not inlined, so that plain images do not pay for it; `own` is
+    /// reused storage for the pose.
     #[inline(never)]
     pub(super) fn observe_bent(
         &self,
@@ -101,7 +100,7 @@ impl Bundle {
         bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, rows);
     }
 
-    /// The point of an image that is not plain, in the axes of its photo.
+    /// Returns the point of an image with corrections, in the axes of its photo.
     #[inline(never)]
     pub(super) fn sight_bent(
         &self,
@@ -124,7 +123,7 @@ impl Bundle {
         bent.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
     }
 
-    /// Puts the pose of an image that has one of its own in the place of another; false where it has none.
+    /// Composes the individual pose of an image into existing storage; returns false if it shares the pose of its photo.
     pub(super) fn compose(
         &self,
         mounted: &Mounted,
@@ -138,21 +137,20 @@ impl Bundle {
         self.mounts.are_timed(of) && self.grounds(&photo, &common).compose(of, self.time_of(image), own)
     }
 
-    /// How a photo moves; None where it is on no trajectory.
     pub(super) fn moving(&self, mounted: &Mounted, commons: &[CommonState], photo: usize) -> Option<Moving> {
         let own = |photo: usize| mounted.own[photo];
         let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
         self.grounds(&own, &common).moving(photo, AT_PHOTO)
     }
 
-    /// The six numbers of a pose, counted from the origin, and what leads to them from its own unknowns; None where angles are singular.
+    /// Returns the six reported pose parameters, relative to the origin, and their partials by its own parameters; None at singular angles.
     pub(super) fn reported(&self, orientation: &Orientation) -> ([f64; POSE], Option<Matrix6<f64>>) {
         let numbers = orientation.numbers(self.poses, self.space);
         let by_step = Orientation::new(self.poses, self.space, &numbers).unknowns_by_step();
         (numbers, by_step.map(|by_step| by_step * orientation.step_matrix()))
     }
 
-    /// The pairs of retained blocks whose cofactors those of the poses of mounted photos need.
+    /// Returns the pairs of retained blocks whose cofactors are required for poses of mounted photos.
     pub(super) fn pairs(&self) -> Vec<[u32; 2]> {
         let of_photo = |photo: usize| {
             let mut blocks: Vec<u32> =
@@ -167,7 +165,7 @@ impl Bundle {
             .collect()
     }
 
-    /// Cofactors of the six unknowns, as its orientation has them, of a photo that is mounted: J Q J^T over all pairs of its blocks.
+    /// Returns the cofactors of the six parameters of a mounted photo: J Q J^T over all pairs of its blocks.
     pub(super) fn mounted_cofactors(
         &self,
         layout: &Layout,
@@ -187,7 +185,7 @@ impl Bundle {
             by_i * DMatrix::from_fn(rows, columns, of) * by_j.transpose()
         };
         let mut parts = composed.parts();
-        // What it does not step with adds nothing, even where nothing is known of that.
+        // Blocks with zero partials contribute nothing, even if their cofactors are undefined.
         parts.retain(|(_, by)| by.iter().any(|&partial| partial != 0.0));
         sort_by(&mut parts, &|a, b| a.0.cmp(&b.0));
         let mut sum = Matrix6::zeros();

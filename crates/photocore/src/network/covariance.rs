@@ -1,4 +1,4 @@
-//! Covariances of anything in an adjusted network with anything else, and the network in other datums, without adjusting again.
+//! Covariances between any parameters of an adjusted network, and datum transformations without a new adjustment.
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
@@ -15,51 +15,47 @@ use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Eve
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Function;
 
-/// Shares that are more than rounding.
+/// Smallest share that is not attributed to rounding.
 const NOTABLE: f64 = 1e-6;
 
-/// What has cofactors.
+/// An object with cofactors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
-    /// The six unknowns of a photo's pose as they are reported: with angles, where poses are in angles.
+    /// Six reported pose parameters of a photo: with angles if the poses are in angles.
     Photo(usize),
-    /// Its position, and the rotation step rho about its own axes: A -> A Exp(rho).
+    /// Position of a photo, and the rotation step rho about its own axes: A -> A Exp(rho).
     PhotoStep(usize),
-    /// The coordinates of a point.
+    /// Coordinates of a point.
     Point(usize),
-    /// The parameters of a camera.
+    /// Parameters of a camera.
     Camera(usize),
-    /// Unknowns that observations, or photos on frames, have in common; rotations are those about their own axes.
+    /// Components of a shared parameter, with rotations about its own axes.
     Common(usize),
 }
 
-/// An adjusted network whose normal equations are factored: cofactors of anything with anything.
+/// An adjusted network with factored normal equations, which provides cofactors of any parameters.
 #[derive(Debug)]
 pub struct Covariances {
     pub(super) assembled: Assembled,
     pub(super) linearized: Linearized,
-    /// How many images the network has.
     pub(super) images: usize,
-    /// How many observations beside these.
+    /// Number of additional observations.
     pub(super) observations: usize,
-    /// The place of each point among those that took part.
+    /// Index of each point among the active ones.
     pub(super) point: Vec<Option<usize>>,
-    /// A photo of each camera.
     pub(super) photo_of_camera: Vec<Option<usize>>,
-    /// The camera of each photo.
     pub(super) camera_of_photo: Vec<usize>,
     pub(super) suspects: OnceLock<Arc<Suspects>>,
     memory: Option<usize>,
 }
 
 impl Network {
-    /// Prepares for covariances of an adjusted network, in the datum it is in or another.
+    /// Factors the normal equations of an adjusted network, in its datum or another one.
     ///
-    /// `options` are those of the adjustment, and `state` is where it ended ([`Solution::state`]).
+    /// `options` are the options of the adjustment, and `state` is its final state ([`Solution::state`]).
     ///
     /// # Errors
-    /// A state that is not of this network, a network that is not determined there, a datum that it cannot be taken to; no memory; an
-    /// interruption.
+    /// A state of another network, undetermined parameters, an impossible datum, insufficient memory, an interruption.
     pub fn covariances(
         &self,
         options: &Options,
@@ -113,13 +109,12 @@ impl Network {
         })
     }
 
-    /// Takes an adjusted network to another datum without adjusting again: values, cofactors, redundancy numbers.
+    /// Transforms an adjusted network to another datum without a new adjustment: values, cofactors, redundancy numbers.
     ///
-    /// Control and weights of poses that are exactly what a datum takes are given up for inner constraints: what they say is no
-    /// observation but the choice of a datum.
+    /// For inner constraints, minimal control and weights of poses are removed: they are only a choice of the datum, not observations.
     ///
     /// # Errors
-    /// Those of [`Network::covariances`].
+    /// Errors of [`Network::covariances`].
     pub fn in_datum(
         &self,
         options: &Options,
@@ -155,12 +150,12 @@ impl Network {
         Ok(solution)
     }
 
-    /// What keeps an adjusted network from moving: for each kind of observation that does, the share of what a motion changes in its
-    /// observations that remains when all unknowns move together, the greatest of all shifts, rotations and the scale. What a datum may
-    /// be chosen for has none.
+    /// Returns the observation types that fix the datum, each with its greatest sensitivity to shifts, rotations and scale. The sensitivity
+    /// is the share of the changes of its observations that a joint change of all parameters cannot compensate.
+    /// It is zero for degrees of freedom of the datum.
     ///
     /// # Errors
-    /// A state that is not of this network.
+    /// A state of another network.
     pub fn resistance(
         &self,
         options: &Options,
@@ -193,7 +188,7 @@ impl Network {
         Ok(notable.collect())
     }
 
-    /// The network without what is known of points and poses themselves.
+    /// Returns the network without prior information of points and poses.
     fn without_control(&self) -> Self {
         let mut free = self.clone();
         let mut held = vec![true; self.photos.len()];
@@ -204,7 +199,7 @@ impl Network {
         free
     }
 
-    /// The state in which a network that was controlled goes on without control: unknowns are held in its place.
+    /// Returns the state for the network without control: a minimal datum replaces the control.
     fn released(&self, options: &Options, state: &State, threads: &Threads) -> Result<State, NetworkError> {
         let state = State { released: false, ..state.clone() };
         if !state.held.is_empty() {
@@ -215,7 +210,7 @@ impl Network {
         Ok(State { held, ..state })
     }
 
-    /// What carries a datum, and the values that it stays near to; None where nothing is to move.
+    /// Returns the datum parameters, and the reference values; None if no values change.
     fn datum(
         &self,
         assembled: &Assembled,
@@ -232,7 +227,7 @@ impl Network {
                     return Err(NetworkError::NoPhoto(*photo));
                 }
                 let model = &assembled.problem.model;
-                // A photo on a frame stands and falls with that.
+                // The datum of a photo on a frame is the frame.
                 let pose = model.of_block(model.carrier(*photo)).take(POSE);
                 let carriers = pose.map(|unknown| (unknown, 1.0)).collect();
                 Ok((assembled.relative(carriers), None))
@@ -251,7 +246,7 @@ impl State {
     }
 }
 
-/// Tells of what is going on.
+/// Returns a progress function.
 fn forming(
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     assembled: &Assembled,
@@ -261,10 +256,10 @@ fn forming(
 }
 
 impl Covariances {
-    /// The cofactors (a priori unit weight) of every two unknowns of what `rows` names, or of those with what `columns` names.
+    /// Returns the cofactors (a priori unit weight) of all parameters of `rows`, with each other or with `columns`.
     ///
     /// # Errors
-    /// Something that is not there or was left out, more memory than there may be, an interruption.
+    /// A missing or excluded object, insufficient memory, an interruption.
     pub fn cofactors(
         &self,
         rows: &[Of],
@@ -277,10 +272,10 @@ impl Covariances {
         self.of_functions(&rows, columns.as_deref(), threads, watch)
     }
 
-    /// J Q J^T, for partials J of functions of the unknowns of what is named: a row for each function.
+    /// Returns J Q J^T for partials J of functions of the parameters of `of`: one row per function.
     ///
     /// # Errors
-    /// Those of [`Covariances::cofactors`]; rows that are not as long as there are unknowns.
+    /// Errors of [`Covariances::cofactors`]; rows of wrong length.
     pub fn propagate(
         &self,
         partials: &[f64],
@@ -292,7 +287,7 @@ impl Covariances {
         self.of_functions(&functions, None, threads, watch)
     }
 
-    /// Linear functions of the unknowns of what is named, a row of partials for each.
+    /// Returns linear functions of the parameters of `of`, from one row of partials each.
     fn functions(&self, partials: &[f64], of: &[Of]) -> Result<Vec<Function>, NetworkError> {
         let unknowns = self.unknowns(of)?;
         if unknowns.is_empty() || !partials.len().is_multiple_of(unknowns.len()) {
@@ -309,7 +304,7 @@ impl Covariances {
         Ok(partials.chunks_exact(unknowns.len()).map(function).collect())
     }
 
-    /// Q h of such functions h, over all unknowns, in the datum of what was held.
+    /// Returns Q h of such functions h, over all parameters, in the minimal datum.
     pub(super) fn solutions(
         &self,
         partials: &[f64],
@@ -344,15 +339,15 @@ impl Covariances {
         })?;
         Ok(match columns {
             Some(columns) => DMatrix::from_row_slice(rows.len(), columns.len(), &found),
-            // Symmetric: it may be large, and is not copied.
+            // The matrix is symmetric and may be large: it is not copied.
             None => DMatrix::from_vec(rows.len(), rows.len(), found),
         })
     }
 
-    /// How many unknowns something has.
+    /// Returns the number of parameters of an object.
     ///
     /// # Errors
-    /// It is not there, or was left out.
+    /// A missing or excluded object.
     pub fn width(&self, of: Of) -> Result<usize, NetworkError> {
         Ok(self.unknowns_of(of)?.len())
     }
@@ -365,7 +360,7 @@ impl Covariances {
         Ok(all)
     }
 
-    /// The unknowns of something, as functions of those of the adjustment.
+    /// Returns the parameters of an object, as functions of the parameters of the adjustment.
     fn unknowns_of(&self, of: Of) -> Result<Vec<Function>, NetworkError> {
         let model = &self.assembled.problem.model;
         let themselves = |unknowns: std::ops::Range<usize>| unknowns.map(|unknown| vec![(unknown, 1.0)]);
@@ -404,14 +399,14 @@ impl Covariances {
                     None if model.has_own_camera(photo) => {
                         themselves(model.of_block(photo)).skip(POSE).collect()
                     }
-                    // What is held has cofactors of zero.
+                    // Cofactors of fixed parameters are zero.
                     None => vec![vec![]; model.cameras[photo].parameters().len()],
                 })
             }
         }
     }
 
-    /// The pose of a photo that is mounted, by the unknowns of all blocks that it is made of.
+    /// Returns the pose of a mounted photo, as functions of the parameters of all its blocks.
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
         let unknowns = &self.linearized.values()[model.of_stations()];
@@ -430,8 +425,8 @@ impl Covariances {
         (0..POSE).map(row).collect()
     }
 
-    /// What leads from the last three unknowns of a photo to its angles as they are reported, or to its rotation step; NaN for angles
-    /// that are not determined, phi being 90 degrees.
+    /// Returns the partials of the reported angles, or of the rotation step, by the last three parameters of a photo. NaN for undetermined
+    /// angles, if phi is 90 degrees.
     fn attitude(&self, photo: usize, step: bool) -> Matrix3 {
         let model = &self.assembled.problem.model;
         let PoseNumbers::Angles(sense) = model.poses else { return Matrix3::identity() };

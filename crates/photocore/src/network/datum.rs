@@ -1,4 +1,4 @@
-//! The datum of networks that are free: how they move as a whole, and what carries their datum.
+//! Datum of free networks: similarity transformations and datum parameters.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -20,12 +20,12 @@ use crate::geometry::{
 };
 use crate::sorting::sort_by;
 
-/// The last of the [`MOTIONS`].
+/// Index of the scale, the last of the [`MOTIONS`].
 const SCALE: usize = 6;
-/// A photo so many times as far from the central one as the others has left the network.
+/// Ratio to the median distance from the central photo above which a photo counts as diverged.
 const LEFT: f64 = 10.0;
 
-/// How motion `k` moves a place, `from` its origin, by a unit.
+/// Returns the displacement of a position per unit of transformation `k`, for `from` relative to its origin.
 fn displacement(k: usize, from: &Vector3) -> Vector3 {
     match k {
         0..3 => Vector3::ith(k, 1.0),
@@ -34,8 +34,7 @@ fn displacement(k: usize, from: &Vector3) -> Vector3 {
     }
 }
 
-/// V e: where the origin comes to in the time of one when it moves by e and turns and grows about itself meanwhile, the last column of
-/// exp [s + [w]x, e; 0, 0].
+/// Returns V e, the displacement of the origin under exp of the rates: the last column of exp [s + [w]x, e; 0, 0].
 fn along(shift: Vector3, rotation: &Vector3, scale: f64) -> Vector3 {
     let mut rates = Matrix4::zeros();
     let turning = rotation.cross_matrix() + Matrix3::from_diagonal_element(scale);
@@ -45,12 +44,12 @@ fn along(shift: Vector3, rotation: &Vector3, scale: f64) -> Vector3 {
 }
 
 impl Bundle {
-    /// The parts of the network, found when they are first asked for.
+    /// Returns the connected components of the network, computed at first use.
     pub(super) fn parts(&self) -> &Parts {
         self.parts.get_or_init(|| self.find_parts())
     }
 
-    /// A frame has the images of all photos on it.
+    /// Finds the connected components; a frame counts the images of all photos on it.
     fn find_parts(&self) -> Parts {
         let (photos, points) = (self.images_on.len(), self.points.len());
         let of_point = |point: usize| photos + point;
@@ -105,8 +104,8 @@ impl Bundle {
         Parts { all: found.into_iter().map(part).collect(), of_photo, of_point, of_common }
     }
 
-    /// The motions of each part about its central photo, whose pose is held first, and for the scale the coordinate of another in which the
-    /// two are farthest apart.
+    /// Returns the similarity transformations of each component about its central photo. The preferred datum is the pose of this photo and,
+    /// for the scale, the coordinate of another photo with the longest distance.
     pub(super) fn rigid_motions(&self, unknowns: &[f64]) -> Option<Motions> {
         let parts = self.parts();
         if parts.all.is_empty() {
@@ -165,7 +164,7 @@ impl Bundle {
         Some(Motions { vectors, preferred })
     }
 
-    /// What is held first, part by part: the pose of its central photo, then coordinates of others along which these are far from it.
+    /// Returns the preferred datum by component: pose of its central photo, then coordinates of distant photos along their direction.
     fn preferred(
         &self,
         parts: &Parts,
@@ -181,7 +180,7 @@ impl Bundle {
             preferred.extend(coordinate.and_then(|(photo, number)| self.holding(photo).get(number).copied()));
             let others = || own.iter().filter(|&photo| photo != central);
             let away = |&photo: &usize| (photos[photo].orientation.centre() - origin).norm();
-            // A photo that its images hardly hold may have left the network, and is the last to hold it.
+            // Weakly determined photos may have diverged and are the last choice.
             let limit = median(others().map(away).collect()).map_or(f64::INFINITY, |middle| LEFT * middle);
             let shifts = others().filter(|&&photo| !self.is_carried(photo)).flat_map(|photo| {
                 let (left, block) = (away(photo) > limit, self.of_block(*photo).start);
@@ -198,7 +197,7 @@ impl Bundle {
         preferred
     }
 
-    /// The first of the motions of an observation's part, and what each makes of the displacement that it misses by (see [`Evaluated::carried`]).
+    /// Returns the first transformation of an observation's component, and the effects on its misclosure (see [`Evaluated::carried`]).
     pub(super) fn carried_by_motions(
         &self,
         stations: &Stations,
@@ -215,7 +214,7 @@ impl Bundle {
         Some((MOTIONS * part, rows))
     }
 
-    /// Has common unknowns moved, those of one part only.
+    /// Calls `moved`, but changes only shared parameters of one component.
     fn move_commons_of(
         &self,
         parts: &Parts,
@@ -230,8 +229,8 @@ impl Bundle {
         retained.into_iter().for_each(|(range, values)| unknowns[range].copy_from_slice(&values));
     }
 
-    /// Moves each part as a whole, exactly: along the motion that e, w and s are the rates of, for the time of one. A turn about any place so
-    /// leaves this place where it is. P -> o + e^s Exp(w) (P - o) + V e, o being the centre of its central photo.
+    /// Transforms each component exactly, along the motion with rates e, w and s for unit time: a rotation about any centre fixes this
+    /// centre. P -> o + e^s Exp(w) (P - o) + V e, with o the centre of the central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
         let (parts, placed) = (self.parts(), self.placed(&unknowns[self.of_stations()]));
         for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
@@ -291,7 +290,7 @@ impl Bundle {
 }
 
 impl Network {
-    /// Refuses photos that cannot carry a datum.
+    /// Returns an error for photos that cannot define a datum.
     pub(super) fn check_carriers(
         &self,
         inner: &InnerConstraints,
@@ -306,7 +305,7 @@ impl Network {
 }
 
 impl Assembled {
-    /// The unknowns that carry a datum, and the values that they stay near to.
+    /// Returns the datum parameters and their reference values.
     pub(super) fn datum(&self, inner: &InnerConstraints) -> (Datum, Vec<f64>) {
         let model = &self.problem.model;
         let mut reference = self.problem.initial.clone();
@@ -319,7 +318,7 @@ impl Assembled {
             of.map(|(index, &point)| (point, model.of_point(index).start)).collect();
         let points = inner.points.iter().filter_map(|point| first.get(point).copied());
         let photos = inner.photos.iter().filter(|&&photo| photo < model.cameras.len());
-        // The position of a photo on a frame is that of the frame.
+        // The position of a photo on a frame is the position of the frame.
         let frames: BTreeSet<usize> = photos.map(|&photo| model.carrier(photo)).collect();
         let photos = frames.into_iter().map(|photo| model.of_block(photo).start);
         let lengths = |first: usize| {
@@ -339,13 +338,13 @@ impl Assembled {
         (Datum { carriers, left, relative: false }, reference)
     }
 
-    /// Whether the attitude of a photo steps by a rotation about its own axes, as that of a carrier must.
+    /// Returns true if the attitude of a photo, or of its frame, steps by a rotation about its own axes.
     pub(super) fn turns(&self, photo: usize) -> bool {
         let model = &self.problem.model;
         photo >= model.cameras.len() || model.turning_sense(model.carrier(photo)).is_some()
     }
 
-    /// The root mean square distance of all points and photos from their middle, at their initial values.
+    /// Returns the root mean square distance of all points and photos from their centre, at the initial values.
     fn radius(&self) -> f64 {
         let (model, unknowns) = (&self.problem.model, &self.problem.initial);
         let points = model.coordinates(unknowns).map(|&at| model.space.cartesian(at));
@@ -357,7 +356,7 @@ impl Assembled {
         (places.iter().map(|place| (place - middle).norm_squared()).sum::<f64>() / count).sqrt()
     }
 
-    /// The unknowns of points and poses that are weighted or fixed, ascending: what may give a datum besides observations.
+    /// Returns the weighted and fixed parameters of points and poses, ascending: possible datum information besides observations.
     pub(super) fn controlled(&self) -> Vec<usize> {
         let model = &self.problem.model;
         let photos = (0..model.cameras.len()).filter(|&photo| !model.is_carried(photo));
@@ -370,25 +369,25 @@ impl Assembled {
         all
     }
 
-    /// Whether control and weights of poses are exactly what a datum takes: without them as many motions of the whole would be open as
-    /// they are numbers. Their redundancy numbers are zero, and the network is free but for the choice that they are.
+    /// Returns true if control and weights of poses are a minimal datum: without them, the datum defect equals their number. Then their
+    /// redundancy numbers are zero, and they only select a datum.
     pub(super) fn is_minimal(&self, values: &[f64], threads: &Threads) -> bool {
         let (controlled, model) = (self.controlled(), &self.problem.model);
         let some = !controlled.is_empty() && controlled.len() <= MOTIONS * MOST_PARTS;
-        // A point of one image is determined by control alone.
+        // Control alone determines a point with a single image.
         let seen =
             |point: usize| model.points[point].held() == [false; 3] || model.images_of(point).len() > 1;
         some && (0..model.points.len()).all(seen)
             && self.problem.any().open_if_free(values, &controlled, threads) == controlled.len()
     }
 
-    /// The datum in which cofactors are relative to some unknowns, scale staying as it is.
+    /// Returns the datum in which cofactors are relative to some parameters, with unchanged scale.
     pub(super) fn relative(&self, carriers: Vec<(usize, f64)>) -> Datum {
         let left = self.left(&carriers, true);
         Datum { carriers, left, relative: true }
     }
 
-    /// The motions that are left as they are: all of parts without carriers and, if so asked, the scale of the others.
+    /// Returns the excluded transformations: all of components without datum parameters and, if requested, the scale of others.
     fn left(&self, carriers: &[(usize, f64)], scale: bool) -> Vec<usize> {
         let (model, parts) = (&self.problem.model, self.problem.model.parts());
         let mut carried = vec![false; parts.all.len()];

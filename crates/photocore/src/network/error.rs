@@ -1,4 +1,4 @@
-//! Why a network cannot be adjusted.
+//! Errors of networks.
 
 use thiserror::Error;
 
@@ -8,200 +8,200 @@ use crate::Stopped;
 use crate::adjustment::{CofactorError, DatumError, gib};
 use crate::normals::LayoutError;
 
-/// Why a network cannot be adjusted, or has no cofactors. Photos, cameras and points are indices into the network.
+/// Error of a network that cannot be adjusted or has undefined cofactors. Photos, cameras and points are indices into the network.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NetworkError {
-    /// An image names a photo or point that is not there.
+    /// An image refers to a missing photo or point.
     #[error("image {0} names a photo or point that is not there")]
     Index(usize),
-    /// A photo names a camera that is not there.
+    /// A photo refers to a missing camera.
     #[error("photo {0} names a camera that is not there")]
     NoCamera(usize),
-    /// There is no photo of this index.
+    /// Index of a missing photo.
     #[error("there is no photo {0}")]
     NoPhoto(usize),
-    /// There is no point of this index.
+    /// Index of a missing point.
     #[error("there is no point {0}")]
     NoPoint(usize),
-    /// There is no camera of this index.
+    /// Index of a missing camera.
     #[error("there is no camera {0}")]
     CameraIndex(usize),
-    /// There is no common unknown of this index.
+    /// Index of a missing shared parameter.
     #[error("there is no common unknown {0}")]
     NoCommon(usize),
-    /// The point took no part in the adjustment.
+    /// The point was excluded from the adjustment.
     #[error("point {0} was left out of the adjustment")]
     LeftOut(usize),
-    /// Partials that are not those of functions of the unknowns.
+    /// The length of partials is not a multiple of the number of parameters.
     #[error("{numbers} partials are not rows of {unknowns}, as many as there are unknowns")]
     Partials {
-        /// How many unknowns there are.
+        /// Number of parameters.
         unknowns: usize,
-        /// How many partials.
+        /// Number of partials.
         numbers: usize,
     },
-    /// The state is not that of an adjustment of this network.
+    /// The state belongs to another network or adjustment.
     #[error("the adjusted state is not of this network")]
     State,
-    /// A camera has more or fewer standard deviations than parameters.
+    /// The number of standard deviations of a camera differs from the number of its parameters.
     #[error("camera {0} has not as many standard deviations as parameters")]
     CameraDeviations(usize),
-    /// A camera has a covariance matrix that is not one of its weighted parameters.
+    /// The covariance matrix of a camera does not fit its weighted parameters.
     #[error("camera {0} has a covariance matrix that is not that of its weighted parameters")]
     CameraCovariance(usize),
-    /// A common unknown has more or fewer standard deviations than unknowns.
+    /// The number of standard deviations of a shared parameter differs from the number of its components.
     #[error("common unknown {0} has not as many standard deviations as unknowns")]
     CommonDeviations(usize),
-    /// A photo that is mounted twice, on itself, on a photo that is mounted, or names a photo or sensor that is not there.
+    /// A mount refers to a missing photo or sensor, or its photo is mounted twice or carries other photos.
     #[error(
         "mount {0} names a photo or sensor that is not there, or a photo that is mounted twice or has others mounted on it"
     )]
     Mount(usize),
-    /// What images pass names unknowns, points, photos or cameras that are not there, or not such as it may have.
+    /// A correction refers to missing parameters, points, photos or cameras, or to ones of a wrong type.
     #[error("passage {0} names unknowns, points, photos or cameras that are not there, or not of its kind")]
     Passage(usize),
-    /// A trajectory whose basis is none, or that has not a coefficient of the right type for each function.
+    /// A trajectory has invalid knots, or coefficients that do not match its basis.
     #[error(
         "trajectory {0} has knots that are none, or more or fewer coefficients than functions of its basis"
     )]
     Trajectory(usize),
-    /// Some images have a time, and others have none.
+    /// The number of image times differs from the number of images.
     #[error("{0} times are given for another number of images")]
     ImageTimes(usize),
-    /// A photo or an image at a time that a trajectory does not reach.
+    /// The time of a photo or image is outside its trajectory.
     #[error(
         "photo {photo} is at {time} s of trajectory {trajectory}, which reaches from {first} to {last} s: half a record beyond its table, within its knots"
     )]
     OutsideTrajectory {
-        /// The photo.
+        /// Photo.
         photo: usize,
-        /// The point of its image; None where it is the photo itself.
+        /// Point of the image; None for the photo itself.
         point: Option<usize>,
-        /// The trajectory.
+        /// Trajectory.
         trajectory: usize,
-        /// The time of the photo or of one of its images.
+        /// Time of the photo or image.
         time: f64,
-        /// The first time that may be asked for.
+        /// First valid time.
         first: f64,
-        /// The last.
+        /// Last valid time.
         last: f64,
     },
-    /// A constant of a camera has a standard deviation.
+    /// A constant of a camera has a nonzero standard deviation.
     #[error(
         "{parameter} of camera {camera} is a constant and cannot be free or weighted: its standard deviation is 0"
     )]
     CameraConstant {
-        /// The camera.
+        /// Camera.
         camera: usize,
-        /// What the constant is called.
+        /// Name of the constant.
         parameter: &'static str,
     },
-    /// An observation that contradicts itself or the network.
+    /// An observation is invalid or contradicts the network.
     #[error("observation {index}, of kind {kind}, {fault}")]
     Observation {
-        /// Its index.
+        /// Index of the observation.
         index: usize,
-        /// The name of its kind.
+        /// Name of its type.
         kind: &'static str,
-        /// What is wrong with it.
+        /// Reason.
         fault: Fault,
     },
-    /// Poses in vectors in a space where they are not defined.
+    /// Poses in vectors in a space in which they are undefined.
     #[error("poses in vectors need rectangular space and no refraction, and carry no datum")]
     Vectors,
-    /// Photos whose attitudes are to carry a datum but do not step by rotations: poses in vectors, fixed angles, full steps.
+    /// The attitude of a photo cannot take part in a datum: poses in vectors, fixed angles or full steps.
     #[error(
         "the attitude of photo {0} cannot carry a datum: an angle is fixed, or steps are those of a program of its time"
     )]
     Attitude(usize),
-    /// Nothing to adjust.
+    /// No point can be adjusted.
     #[error("no point is left to adjust: none is on two photos")]
     Empty,
-    /// The rays of a point do not say where it is.
+    /// The rays of a point do not intersect.
     #[error("the rays of point {0} do not intersect, so that it has no initial position")]
     NoIntersection(usize),
-    /// Points whose image points do not determine them.
+    /// Image observations do not determine these points.
     #[error("{} points are not determined by their image points", .0.len())]
     UndeterminedPoints(Vec<usize>),
-    /// Combinations of the unknowns of photos and of cameras that the observations do not determine.
+    /// Observations do not determine these combinations of parameters of photos and cameras.
     #[error("{} combinations of the unknowns of photos and cameras are not determined", .0.len())]
     Undetermined(Vec<Combination>),
-    /// The initial values put a point into the plane of a projection centre, so that its image is not finite.
+    /// At the initial values, a point is in the plane of a projection centre: its image is not finite.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
     /// Values too large for double precision.
     #[error(transparent)]
     Coarse(#[from] Coarse),
-    /// The adjustment would take more memory than it may.
+    /// The adjustment needs more memory than is available.
     #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
     Memory {
-        /// Bytes that it would take.
+        /// Required bytes.
         needed: usize,
-        /// Bytes that it may take.
+        /// Available bytes.
         available: usize,
     },
-    /// More cofactors than there may be.
+    /// Too many cofactors.
     #[error(transparent)]
     Cofactors(CofactorError),
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was interrupted, or memory or threads were insufficient.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// It cannot be taken to a datum.
+    /// The datum transformation is impossible.
     #[error(transparent)]
     Datum(#[from] DatumError),
-    /// A block of unknowns that other nodes touch is not there, or has no unknowns of its own.
+    /// An interface block of other nodes is missing or without free parameters.
     #[error("{0:?}, named for other nodes, is not there or has no unknowns of its own")]
     NoBlock(BlockOf),
-    /// A node of a larger network cannot go on with what it is given.
+    /// Invalid input of a node of a larger network.
     #[error("{0}")]
     Node(&'static str),
-    /// More than can be numbered.
+    /// Too many parameters or observations.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
 
-/// Coordinates or angles that double precision rounds by more than their standard deviations, or than image coordinates show.
+/// Coordinates or angles with rounding errors above their standard deviations, or visible in image coordinates.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{} photos and {} points have coordinates or angles too large for double precision", .photos.len(), .points.len())]
 pub struct Coarse {
-    /// Photos that have them.
+    /// Photos with such values.
     pub photos: Vec<usize>,
-    /// Points that have them.
+    /// Points with such values.
     pub points: Vec<usize>,
 }
 
-/// What a combination of unknowns moves.
+/// Parameters of an undetermined combination.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Combination {
-    /// Photos, by their pose or a camera that is theirs alone.
+    /// Photos, by their pose or own camera.
     pub photos: Vec<usize>,
-    /// Cameras that several photos share.
+    /// Shared cameras.
     pub cameras: Vec<usize>,
-    /// Cameras and their parameters that take a notable part; none where this was not looked into.
+    /// Cameras and parameters with a notable share; empty if not computed.
     pub parameters: Vec<(usize, usize)>,
-    /// Parts of the poses of photos that do.
+    /// Parts of poses with a notable share.
     pub poses: Vec<PosePart>,
-    /// Common unknowns.
+    /// Shared parameters.
     pub commons: Vec<usize>,
 }
 
-/// A part of the poses of photos.
+/// Part of the poses of photos.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PosePart {
-    /// Positions along the directions of view.
+    /// Positions along the viewing directions.
     Along,
-    /// Positions across these.
+    /// Positions across the viewing directions.
     Across,
-    /// Turns about axes across the directions of view.
+    /// Rotations about axes across the viewing directions.
     Tilt,
-    /// Turns about the directions of view.
+    /// Rotations about the viewing directions.
     Swing,
 }
 
 impl PosePart {
     pub(super) const ALL: [Self; 4] = [Self::Along, Self::Across, Self::Tilt, Self::Swing];
 
-    /// What it is called.
+    /// Returns the name of the part.
     pub fn name(self) -> &'static str {
         match self {
             Self::Along => "along",

@@ -1,4 +1,4 @@
-//! The bundle as a model of the adjustment, and at given values of its unknowns.
+//! Implementation of the adjustment's model by the bundle, at given parameter values.
 
 use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::model::Bundle;
@@ -12,14 +12,13 @@ use crate::geometry::{AttitudeNumbers, Vector3};
 use crate::normals::{GroupRows, TieRows};
 use crate::sorting::sort_by;
 
-/// A bundle at given values of the unknowns.
+/// A bundle at given parameter values.
 pub(super) struct At<'a> {
     pub bundle: &'a Bundle,
     pub stations: Stations,
 }
 
 impl Bundle {
-    /// The equations of an image.
     pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
         match &stations.bent {
             None => {
@@ -32,7 +31,6 @@ impl Bundle {
         }
     }
 
-    /// The equations of a tie.
     pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
             return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);
@@ -47,7 +45,7 @@ impl Model for Bundle {
         Box::new(At { bundle: self, stations: self.evaluated(unknowns) })
     }
 
-    /// Angles of photos that step by a rotation vector go by way of their matrix.
+    /// Angles of photos that step by a rotation vector are updated through their rotation matrix.
     fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
         let start = self.of_stations().start + 3;
         let turn = |photo: usize| {
@@ -60,7 +58,7 @@ impl Model for Bundle {
         turned.into_iter().for_each(|(first, angles)| unknowns[first..first + 3].copy_from_slice(&angles));
     }
 
-    /// Attitudes that step by a rotation vector are that apart, A^T B = Exp(rho).
+    /// Rotation vectors between attitudes satisfy A^T B = Exp(rho).
     fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let mut step: Vec<f64> = to.iter().zip(from).map(|(to, from)| to - from).collect();
         let start = self.of_stations().start + 3;
@@ -86,7 +84,7 @@ impl Model for Bundle {
         all
     }
 
-    /// Intersects the points anew.
+    /// Intersects the points again.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let photos = self.of_stations();
         let Ok(coordinates) = self.intersect(&self.placed(&unknowns[photos.clone()])) else { return false };
@@ -96,12 +94,12 @@ impl Model for Bundle {
         true
     }
 
-    /// Cameras are determined together with what they are correlated with: attitudes, positions, heights.
+    /// Shared cameras are correlated with attitudes, positions and heights, which slows convergence.
     fn ends_slowly(&self) -> bool {
         !self.blocks.shared.is_empty()
     }
 
-    /// Knots do what a turn of all photos does.
+    /// A common displacement of all knots is nearly a rotation of all photos.
     fn steps_swing(&self) -> bool {
         !self.passages.lenses().is_empty()
     }
@@ -110,7 +108,7 @@ impl Model for Bundle {
         self.beyond_windows(unknowns)
     }
 
-    /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.
+    /// Straight rays are invariant to similarity transformations; frames may contain known lengths.
     fn groups_leave_open(&self) -> bool {
         self.refraction.is_none() && self.mounts.is_empty()
     }
@@ -153,7 +151,7 @@ impl Evaluated for At<'_> {
             }
             return true;
         }
-        // The main block of an image that is not mounted is its photo.
+        // The main block of an image without mounts is its photo.
         locals.len() >= FEWEST && {
             let Station { orientation, camera } = &stations.photos[bundle.images[groups[0] as usize].photo];
             each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))

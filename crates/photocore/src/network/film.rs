@@ -1,4 +1,4 @@
-//! What the film of a photo is made of in a network: which common unknowns, and what is never unknown.
+//! Film of a photo in a network: its shared parameters and constants.
 
 use nalgebra::Matrix2x3;
 use smallvec::SmallVec;
@@ -8,51 +8,51 @@ use crate::geometry::Vector3;
 use crate::geometry::correction::{COEFFICIENTS, Correction};
 use crate::geometry::film::{Bend, Deformation, Film, Functions, Grid, Pattern, Reading, Scanner};
 
-/// Common unknowns that hold the coefficients of the polynomials of a scanner.
+/// Number of shared parameters with polynomial coefficients of a scanner.
 const CURVES: usize = 2 * COEFFICIENTS / 3;
 
-/// The film of a photo, or a plate: common unknowns by their indices in the network.
+/// Film or plate of a photo, by indices of shared parameters of the network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilmOf {
-    /// Where it lay, a [`CommonKind::FilmPlacement`].
+    /// Position and rotation on the scanner, a [`CommonKind::FilmPlacement`].
     pub placement: usize,
-    /// A [`CommonKind::FilmSize`].
+    /// Affine deformation, a [`CommonKind::FilmSize`].
     pub size: usize,
-    /// A [`CommonKind::FilmBend`].
+    /// Nonaffine deformation, a [`CommonKind::FilmBend`].
     pub bend: Option<usize>,
-    /// Whether this is g, not h.
+    /// Whether `bend` is g (projective) instead of h (bilinear).
     pub projective: bool,
-    /// A [`CommonKind::Roll`] whose m is added to that of the photo.
+    /// A [`CommonKind::Roll`] whose m is added to the m of the photo.
     pub roll: Option<usize>,
-    /// A [`CommonKind::Scanner`].
+    /// Scanner parameters, a [`CommonKind::Scanner`].
     pub scanner: usize,
-    /// Coefficients of its polynomials: six of [`CommonKind::ScannerCurve`], or none.
+    /// Polynomial coefficients of the scanner: six of [`CommonKind::ScannerCurve`], or none.
     pub curves: Vec<usize>,
-    /// What its readings count.
+    /// Units and axes of the readings.
     pub readings: Readings,
-    /// The functions of its deformation.
+    /// Functions of its deformation.
     pub pattern: Option<Pattern>,
-    /// The weights of these, pair by pair: [`CommonKind::Pattern`].
+    /// Weights of these functions in pairs: [`CommonKind::Pattern`].
     pub weights: Vec<usize>,
-    /// Whether it was seen from the other side.
+    /// Whether the film is mirrored (emulsion side).
     pub mirrored: bool,
 }
 
-/// What the readings of a scanner count: never unknown.
+/// Units and axes of scanner readings, which are constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
-    /// mm in a unit of readings.
+    /// Unit of readings in mm.
     pub pitch: f64,
-    /// o1, o2.
+    /// Origin o1, o2.
     pub origin: [f64; 2],
-    /// Whether the second coordinate counts down.
+    /// Whether the second coordinate points down.
     pub down: bool,
-    /// hx, hy of its polynomials.
+    /// Half ranges hx, hy of the polynomials.
     pub half_range: [f64; 2],
 }
 
 impl Readings {
-    /// The scanner with the given parameters of its correction, as far as there are any; `curved`: with polynomials.
+    /// Returns the scanner with the first correction parameters given; `curved` includes polynomials.
     fn scanner(&self, parameters: impl Iterator<Item = f64>, curved: bool) -> Scanner {
         let Self { pitch, origin, down, half_range } = *self;
         let mut all = Correction::NONE.parameters();
@@ -62,7 +62,7 @@ impl Readings {
     }
 }
 
-/// The film of a photo at given values of the unknowns.
+/// Film of a photo at given parameter values.
 #[derive(Debug, Clone)]
 pub struct FilmAt {
     film: Film,
@@ -70,10 +70,10 @@ pub struct FilmAt {
     pattern: Option<(Pattern, Vec<[f64; 2]>)>,
 }
 
-/// A reading, and the functions of the pattern that it was computed with.
+/// A reading, and the pattern functions from which it was computed.
 #[derive(Debug, Clone)]
 pub struct Read {
-    /// The reading with its partials; NaN where the scanner has none.
+    /// Reading with its partials; NaN outside the range of the scanner.
     pub reading: Reading,
     functions: Functions,
 }
@@ -85,8 +85,8 @@ impl Default for Read {
 }
 
 impl FilmOf {
-    /// From indices and numbers, as callers have them: commons in the order of the fields; mirrored, rows down, pitch, o1, o2, hx, hy; 0, 1
-    /// or 2 for nothing, h or g; whether there are a roll and curves; 0 to 3 for no pattern, quadratic, Ebner's or a grid, and its numbers.
+    /// Returns a film from indices (in the order of the fields) and numbers. The numbers are mirrored, rows down, pitch, o1, o2, hx, hy; 0,
+    /// 1 or 2 for none, h or g; flags of roll and curves; 0 to 3 for no pattern, quadratic, Ebner or grid, and the pattern's numbers.
     pub fn from_numbers(commons: &[usize], numbers: &[f64]) -> Option<Self> {
         let (&[mirrored, down, pitch, o1, o2, hx, hy, bend, roll, curves, pattern], own) =
             numbers.split_first_chunk()?;
@@ -125,7 +125,7 @@ impl FilmOf {
         })
     }
 
-    /// Whether its numbers are such as it can have.
+    /// Returns true if all constants are valid.
     pub fn is_sound(&self) -> bool {
         let Readings { pitch, origin, half_range, .. } = &self.readings;
         let ranges = half_range.iter().chain([pitch]).all(|&own| own > 0.0 && own.is_finite());
@@ -140,18 +140,17 @@ impl FilmOf {
         ranges && pattern && origin.iter().all(|own| own.is_finite())
     }
 
-    /// Whether its pattern has several cells.
+    /// Returns true if its pattern consists of several cells.
     pub(super) fn has_cells(&self) -> bool {
         matches!(self.pattern, Some(Pattern::Grid(_)))
     }
 
-    /// The cell of its pattern where a place is.
+    /// Returns the pattern cell of a position.
     pub fn cell(&self, place: [f64; 2]) -> usize {
         self.pattern.map_or(0, |pattern| pattern.cell(place))
     }
 
-    /// The common unknowns that a reading steps with whose place is in a cell of the pattern; those of [`Self::partials`] are known by
-    /// their number in this list.
+    /// Returns the shared parameters of a reading in a pattern cell; [`Self::partials`] uses indices into this list.
     pub(super) fn commons(&self, cell: usize) -> SmallVec<[(usize, CommonKind); 16]> {
         let mut all = SmallVec::new();
         all.push((self.placement, CommonKind::FilmPlacement));
@@ -165,7 +164,7 @@ impl FilmOf {
         all
     }
 
-    /// At given values of the common unknowns; None of those that do not count where it will be asked.
+    /// Returns the film at given values of the shared parameters; None for values that are not required.
     pub fn at(&self, common: &dyn Fn(usize) -> Option<Vector3>) -> FilmAt {
         let vector = |own: usize| common(own).map_or([0.0; 3], |own| own.into());
         let mut size = vector(self.size);
@@ -187,7 +186,7 @@ impl FilmOf {
         }
     }
 
-    /// The partials of a reading by the offset of each common unknown of [`Self::commons`], to be added up.
+    /// Adds the partials of a reading by the offset of each shared parameter of [`Self::commons`].
     pub(super) fn partials(&self, read: &Read, mut add: impl FnMut(usize, &Matrix2x3<f64>)) {
         let Read { reading, functions } = read;
         let three = |rows: [&[f64]; 2]| Matrix2x3::from_fn(|row, k| rows[row].get(k).copied().unwrap_or(0.0));
@@ -218,14 +217,14 @@ impl FilmOf {
 }
 
 impl FilmAt {
-    /// Puts the reading of a place in the frame of the camera, with the functions of a cell of the pattern, in the place of another.
+    /// Computes the reading of a position in the camera frame, with the functions of a pattern cell, into existing storage.
     pub fn read(&self, q: [f64; 2], cell: usize, read: &mut Read) {
         let deformation = self.deformation(q, cell, &mut read.functions);
         let reading = self.film.read(q, &deformation, &self.scanner);
         read.reading = reading.unwrap_or(Reading::NONE);
     }
 
-    /// A reading less that of a place in the frame of the camera.
+    /// Returns a reading minus the computed reading of a position in the camera frame.
     pub(super) fn missing(&self, q: [f64; 2], cell: usize, reading: [f64; 2]) -> [f64; 2] {
         let deformation = self.deformation(q, cell, &mut Functions::new());
         let read = self.film.read(q, &deformation, &self.scanner);
@@ -233,23 +232,23 @@ impl FilmAt {
         [0, 1].map(|k| reading[k] - xy[k])
     }
 
-    /// The place in the frame of the camera that has a reading.
+    /// Returns the position in the camera frame for a reading.
     pub fn place(&self, reading: [f64; 2], cell: usize) -> Option<[f64; 2]> {
         self.film.place(reading, |q| self.deformation(q, cell, &mut Functions::new()), &self.scanner)
     }
 
-    /// The cell of the pattern where a reading is.
+    /// Returns the pattern cell of a reading.
     pub fn cell_of_reading(&self, reading: [f64; 2]) -> usize {
         let place = || self.film.place(reading, |_| Deformation::default(), &self.scanner);
         self.pattern.as_ref().map_or(0, |(pattern, _)| place().map_or(0, |place| pattern.cell(place)))
     }
 
-    /// Units of readings in a mm.
+    /// Returns the number of reading units per mm.
     pub(super) fn units(&self) -> f64 {
         self.scanner.scale()
     }
 
-    /// D, with the functions that it is the sum of.
+    /// Returns the deformation D and stores its functions.
     fn deformation(&self, q: [f64; 2], cell: usize, functions: &mut Functions) -> Deformation {
         let Some((pattern, weights)) = &self.pattern else { return Deformation::default() };
         *functions = pattern.at(cell, q);

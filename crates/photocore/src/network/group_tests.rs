@@ -1,4 +1,4 @@
-//! Tests of all groups of observations of a network that is tried.
+//! Tests of all observation groups in outlier detection.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,33 +9,33 @@ use crate::adjustment::{Few, GroupTest, Leverages, Terms};
 use crate::normals::GroupCofactors;
 use crate::{Threads, parallel};
 
-/// Tests of all suspects; the rows and square blocks of one stand after those of another.
+/// Tests of all groups; rows and square blocks are concatenated group by group.
 #[derive(Debug, Clone, Default)]
 pub struct Tests {
-    /// Whether it takes part, or some of its rows do; nothing else is known of those that do not.
+    /// Whether at least some rows of the group are active; results of other groups are undefined.
     pub active: Vec<bool>,
-    /// Directions in which an error shows.
+    /// Number of directions with a detectable error.
     pub rank: Vec<usize>,
     /// T, see [`GroupTest`].
     pub statistic: Vec<f64>,
-    /// The smallest redundancy of a direction that shows.
+    /// The smallest redundancy of a detectable direction.
     pub least: Vec<f64>,
     /// See [`GroupTest::shared`].
     pub shared: Vec<f64>,
-    /// Residual of each row over its standard deviation; NaN for rows that are out.
+    /// Standardized residual of each row; NaN for excluded rows.
     pub residual: Vec<f64>,
-    /// R: the cofactors of these residuals; zero for rows that are out.
+    /// Cofactors R of these residuals; zero for excluded rows.
     pub cofactors: Vec<f64>,
-    /// The estimated error of each row and its standard deviation (a priori unit weight), in the unit of the observation.
+    /// Estimated error of each row and its standard deviation (a priori unit weight), in the unit of the observation.
     pub error: Vec<f64>,
     /// See [`Tests::error`].
     pub error_sd: Vec<f64>,
 }
 
-/// Suspects that are tested one after the other.
+/// Number of groups per chunk.
 const TOGETHER: usize = 1024;
 
-/// The tests of some suspects that follow each other: what is not yet written of [`Tests`].
+/// Unwritten part of [`Tests`] for consecutive groups.
 struct Part<'a> {
     active: &'a mut [bool],
     rank: &'a mut [usize],
@@ -47,7 +47,7 @@ struct Part<'a> {
 }
 
 impl Tests {
-    /// Of so many suspects, none of which takes part.
+    /// Returns tests of `count` inactive groups.
     fn unknown(count: usize, row_starts: &[usize], block_starts: &[usize]) -> Self {
         let (rows, blocks) = (row_starts[count], block_starts[count]);
         let nothing = |count: usize| vec![f64::NAN; count];
@@ -64,7 +64,7 @@ impl Tests {
         }
     }
 
-    /// Parts of [`TOGETHER`] suspects.
+    /// Splits the tests into chunks of [`TOGETHER`] groups.
     fn parts<'a>(&'a mut self, row_starts: &[usize], block_starts: &[usize]) -> Vec<Part<'a>> {
         let Self { active, rank, statistic, least, shared, residual, cofactors, error, error_sd } = self;
         let of_suspects = [statistic, least, shared].map(|all| all.chunks_mut(TOGETHER));
@@ -88,7 +88,7 @@ impl Tests {
 }
 
 impl Part<'_> {
-    /// Writes the next suspect, of so many rows, and goes on behind it.
+    /// Writes the test of the next group with `size` rows.
     fn put(&mut self, size: usize, tested: Option<Tested>) {
         let (active, rank) = (taken(&mut self.active, 1), taken(&mut self.rank, 1));
         let own = self.of_suspects.each_mut().map(|rest| taken(rest, 1));
@@ -102,14 +102,14 @@ impl Part<'_> {
     }
 }
 
-/// The first ones of a slice, which goes on behind them.
+/// Splits the first elements off a slice, which then begins behind them.
 fn taken<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let (first, others) = std::mem::take(rest).split_at_mut(count);
     *rest = others;
     first
 }
 
-/// A test of a suspect, in its units.
+/// Test of one group, in its units.
 pub(super) struct Tested {
     pub test: GroupTest,
     pub residual: Few,
@@ -119,10 +119,10 @@ pub(super) struct Tested {
 }
 
 impl Trial {
-    /// Tests every group of observations that takes part.
+    /// Tests every active observation group.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Tests before any adjustment.
     pub fn tests(&self, threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
         let groups = found.cofactors.groups.as_ref().ok_or(NetworkError::State)?;
@@ -140,7 +140,7 @@ impl Trial {
         Ok(all)
     }
 
-    /// None where nothing of it takes part.
+    /// Tests a group; None if all its rows are excluded.
     pub(super) fn test(
         &self,
         suspect: &Suspect,
@@ -195,7 +195,7 @@ impl Trial {
         })
     }
 
-    /// The test of an image of a local point: nearly all are.
+    /// Tests an image of a local point; nearly all groups are of this type.
     fn image_test(&self, group: usize, found: &Leverages, groups: &GroupCofactors) -> Option<Tested> {
         let rows = 2 * group..2 * group + 2;
         if self.assembled.problem.observation_sd[rows.clone()].iter().any(|sd| sd.is_infinite()) {
@@ -218,7 +218,7 @@ impl Trial {
         })
     }
 
-    /// Residuals of unit weight of some rows of a suspect, a Q a^T of these, and the same with all known but the own point.
+    /// Returns whitened residuals of some rows, their leverages A Q A^T, and the leverages with only the own point free.
     fn leverages(
         &self,
         suspect: &Suspect,
@@ -256,7 +256,7 @@ impl Trial {
         (residuals, leverages, by_point)
     }
 
-    /// The equations of some rows of a suspect, of unit weight, by the unknowns of its block.
+    /// Returns the whitened equations of some rows of a group by the parameters of its block.
     pub(super) fn term_rows(&self, suspect: &Suspect, some: &[usize], terms: &Terms<'_>) -> DMatrix<f64> {
         let range = self.unknowns_at(suspect.home);
         let mut rows = DMatrix::zeros(some.len(), range.len());
@@ -278,13 +278,13 @@ impl Trial {
         }
     }
 
-    /// The cofactors of the unknowns of a point or block.
+    /// Returns the cofactors of the parameters of a point or block.
     pub(super) fn cofactors_at(&self, found: &Leverages, home: Home) -> DMatrix<f64> {
         let (model, retained) = (&self.assembled.problem.model, &found.cofactors.retained);
         let width = self.unknowns_at(home).len();
         let values = match home {
             Home::Point(place) if place < model.locals => &found.cofactors.local[9 * place..9 * place + 9],
-            // The last retained blocks.
+            // Points are the last retained blocks.
             Home::Point(place) => {
                 let behind = model.points.len() - place;
                 &retained[retained.len() - 9 * behind..][..9]
@@ -296,12 +296,12 @@ impl Trial {
     }
 }
 
-/// Some rows and columns of a square matrix of so many rows, row by row.
+/// Returns some rows and columns of a square matrix with `size` rows, row by row.
 pub(super) fn sub(matrix: &[f64], size: usize, some: &[usize]) -> Vec<f64> {
     some.iter().flat_map(|&i| some.iter().map(move |&j| matrix[i * size + j])).collect()
 }
 
-/// Errors of unit weight with their cofactors in other units: values and standard deviations.
+/// Converts whitened errors and their cofactors to other units: values and standard deviations.
 pub(super) fn in_units(units: &DMatrix<f64>, error: &[f64], cofactors: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let count = error.len();
     let values = units * DVector::from_column_slice(error);

@@ -1,4 +1,4 @@
-//! Groups of the observations of a network, and what errors of some leave as residuals of others.
+//! Groups of the observations of a network, and the effect of errors of some observations on the residuals of others.
 
 use std::ops::ControlFlow;
 
@@ -9,30 +9,30 @@ use crate::Threads;
 use crate::adjustment::{AdjustError, EquationGroups, Event, GroupSquares, Phase, Probing};
 use crate::geometry::POSE;
 
-/// Groups of the observations of a network: a number for each, in the order of the network; that many groups or more for none.
+/// Group number of each observation, in the order of the network; a number of `count` or more means none.
 #[derive(Debug, Clone, Default)]
 pub struct Groups {
-    /// How many there are.
+    /// Number of groups.
     pub count: usize,
-    /// Of x and y of every image.
+    /// Groups of x and y of every image.
     pub images: Vec<[usize; 2]>,
-    /// Of the components of every point.
+    /// Groups of the components of every point.
     pub points: Vec<[usize; 3]>,
-    /// Of the six unknowns of every photo's pose.
+    /// Groups of the six parameters of every pose.
     pub photos: Vec<[usize; POSE]>,
-    /// Of the parameters of every camera.
+    /// Groups of the cameras.
     pub cameras: Vec<usize>,
-    /// Of the unknowns of every common one.
+    /// Groups of the shared parameters.
     pub commons: Vec<usize>,
-    /// Of every other observation.
+    /// Groups of the additional observations.
     pub observations: Vec<usize>,
 }
 
 impl Covariances {
-    /// Sums of `R_ij^2` over every two groups of observations, R being what takes their errors, in standard deviations, to residuals.
+    /// Returns sums of `R_ij^2` over every two groups. R maps standardized errors of the observations to residuals.
     ///
     /// # Errors
-    /// Groups that are not of the network, an interruption.
+    /// Groups that do not fit the network, an interruption.
     pub fn group_squares(
         &self,
         groups: &Groups,
@@ -48,10 +48,10 @@ impl Covariances {
         found.map_err(|error| self.named(error))
     }
 
-    /// The same within each of many groups, which share the columns of so many classes (see [`crate::adjustment::Linearized::own_squares`]).
+    /// Returns the sums within each of many groups, in `classes` column classes (see [`crate::adjustment::Linearized::own_squares`]).
     ///
     /// # Errors
-    /// Those of [`Covariances::group_squares`].
+    /// Errors of [`Covariances::group_squares`].
     pub fn own_squares(
         &self,
         groups: &Groups,
@@ -68,11 +68,11 @@ impl Covariances {
         found.map_err(|error| self.named(error))
     }
 
-    /// What errors of the images leave as their residuals, both in standard deviations: columns of x and y of every image, one column
-    /// after the other. Images that took no part have neither.
+    /// Returns the residuals that errors of the images cause, both in standard deviations. Columns contain x and y of every image, column
+    /// by column. Excluded images neither contribute errors nor have residuals.
     ///
     /// # Errors
-    /// Columns that are not of the images, an interruption.
+    /// Columns of wrong length, an interruption.
     pub fn project_images(
         &self,
         columns: &[f64],
@@ -108,7 +108,7 @@ impl Covariances {
         NetworkError::new(error, &self.assembled)
     }
 
-    /// The groups of the equations of the adjustment.
+    /// Returns the groups of the equations of the adjustment.
     fn equation_groups(&self, groups: &Groups) -> Result<EquationGroups, NetworkError> {
         let problem = &self.assembled.problem;
         let model = &problem.model;

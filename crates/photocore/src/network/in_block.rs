@@ -1,18 +1,17 @@
-//! Where unknowns are among the retained ones.
+//! Positions of parameters among the retained ones.
 
-/// Where unknowns are: in a block, from one of its unknowns on.
+/// Position of consecutive parameters inside a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InBlock {
-    /// The block.
     pub block: usize,
-    /// The first of them.
+    /// First parameter inside the block.
     pub first: usize,
-    /// How many unknowns the block has.
+    /// Number of parameters of the block.
     pub width: usize,
 }
 
 impl InBlock {
-    /// All unknowns of a block.
+    /// Returns the position of a whole block.
     pub fn whole(block: usize, width: usize) -> Self {
         Self { block, first: 0, width }
     }

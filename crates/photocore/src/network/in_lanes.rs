@@ -1,4 +1,4 @@
-//! The equations of several images of one photo, computed side by side in the lanes of vectors.
+//! SIMD computation of the equations of several images of one photo.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -6,25 +6,24 @@ use super::Image;
 use crate::geometry::{self, CameraModel, Orientation, POSE, Pose, Vector3};
 use crate::normals::GroupRows;
 
-/// Images that are computed side by side.
+/// Number of images per vector.
 const LANES: usize = 8;
-/// So many images at the least are worth it.
+/// Minimum number of images for SIMD.
 pub(super) const FEWEST: usize = 2;
-/// Parameters that a camera has at the most: images of others are computed one by one.
+/// Maximum number of camera parameters; images of larger cameras are computed one by one.
 const PARAMETERS: usize = 16;
 
-/// A number of each of the images.
+/// One number per image.
 type Lanes = [f64; LANES];
 
-/// A point, its image, and the standard deviations of that.
+/// A point, its image observation, and the standard deviations.
 pub(super) struct Sight<'a> {
     pub point: &'a geometry::Point,
     pub image: &'a Image,
     pub sd: [f64; 2],
 }
 
-/// Writes the equations, in unit weight, of so many images of one photo, one after the other; false where the camera or the pose is not
-/// one for it.
+/// Writes the whitened equations of `count` images of one photo; returns false if the camera or pose does not support SIMD.
 #[inline(always)]
 pub(super) fn write_in_lanes<'s, C: CameraModel>(
     orientation: &Orientation,
@@ -40,7 +39,7 @@ pub(super) fn write_in_lanes<'s, C: CameraModel>(
         let mut lanes = Input::default();
         for first in (0..count).step_by(LANES) {
             let own = LANES.min(count - first);
-            // What stands in the lanes beyond is computed too, and not looked at.
+            // Results of unused lanes are computed but ignored.
             for t in 0..own {
                 lanes.put(t, &sight(first + t));
             }
@@ -51,7 +50,7 @@ pub(super) fn write_in_lanes<'s, C: CameraModel>(
     false
 }
 
-/// What the images are computed from.
+/// Input numbers of the images.
 #[derive(Default, Clone, Copy)]
 struct Input {
     point: [Lanes; 3],
@@ -72,7 +71,7 @@ impl Input {
     }
 }
 
-/// The equations of x or of y, column by column.
+/// Equations of x or y by column.
 struct Columns {
     constant: Lanes,
     point: [Lanes; 3],
@@ -88,7 +87,7 @@ impl Columns {
         camera: [[0.0; LANES]; PARAMETERS],
     };
 
-    /// Puts one equation into a lane.
+    /// Writes one equation into a lane.
     #[inline(always)]
     fn put(
         &mut self,
@@ -112,7 +111,7 @@ impl Columns {
     }
 }
 
-/// Computes some images, and writes them to their places among `count`.
+/// Computes some images and writes them to their positions among `count`.
 #[inline(never)]
 fn write<C: CameraModel>(
     pose: &Pose,
@@ -140,14 +139,14 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { input, places, count, rows, .. } = self;
-        // Copies: nothing that is written can be one of them, so that the compiler makes vectors of the lanes.
+        // Copies without aliases, so that the compiler vectorizes the lanes.
         let (pose, camera) = (*self.pose, self.camera.clone());
         let Input { point, image, sd } = *input;
         let (mut x, mut y) = (Columns::ZERO, Columns::ZERO);
         for t in 0..LANES {
             let u = pose.sight(&Vector3::new(point[0][t], point[1][t], point[2][t]));
             let (residual, computed) = camera.compare(&u, [image[0][t], image[1][t]]);
-            // One after the other, not in a loop, which would keep them in memory.
+            // Unrolled: a loop would store them in memory.
             let [by_x, by_y] = &computed.by_parameters;
             x.put(t, residual[0], &pose.chain(&u, &computed.by_u[0]), by_x.as_ref(), sd[0][t]);
             y.put(t, residual[1], &pose.chain(&u, &computed.by_u[1]), by_y.as_ref(), sd[1][t]);
@@ -175,7 +174,7 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
     }
 }
 
-/// Takes one lane of some columns.
+/// Copies one lane of some columns.
 #[inline(always)]
 fn put(target: &mut [f64], columns: &[Lanes], t: usize) {
     for (value, column) in target.iter_mut().zip(columns) {
@@ -189,7 +188,7 @@ mod tests {
     use crate::geometry::camera::{Perspective, Unit};
     use crate::geometry::{Camera, Matrix3, ObjectSpace, Point, rotation};
 
-    /// The rows of so many images that have their camera in common with others.
+    /// Returns the rows of `count` images with a shared camera.
     fn rows_of(count: usize, parameters: usize, fill: impl FnOnce(&mut GroupRows<'_>)) -> Vec<f64> {
         let mut parts = [1, 3, POSE, parameters].map(|width| vec![0.0; 2 * count * width]);
         let [constant, local, retained, shared] = &mut parts;
@@ -292,7 +291,7 @@ mod tests {
         }
     }
 
-    /// A camera of one parameter more than there is room for, without effect all but the first.
+    /// A camera with one parameter above the limit; only the first parameter matters.
     #[derive(Clone, Copy)]
     struct Wide([f64; PARAMETERS + 1]);
 

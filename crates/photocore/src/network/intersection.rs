@@ -1,4 +1,4 @@
-//! Coordinates of points by intersection of their rays from given photos.
+//! Intersection of points from the rays of given photos.
 
 use super::median::median;
 use super::model::Bundle;
@@ -8,21 +8,21 @@ use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
 use crate::parallel;
 
-/// Determinant of the normal matrix, relative to its largest possible value, below which rays count as parallel
-/// (about a hundredth of a degree between two rays).
+/// Determinant of the normal matrix, relative to its maximum, below which rays count as parallel (about a hundredth of a degree between two
+/// rays).
 const PARALLEL: f64 = 1e-8;
 
-/// Points that a thread takes at least.
+/// Minimum number of points per thread.
 const TOGETHER: usize = 64;
 
 impl Bundle {
-    /// Coordinates of all points from given photos: held components as they are, the others where the rays meet.
+    /// Returns the coordinates of all points: fixed or weighted components as given, others from the intersection of rays.
     ///
-    /// Rays from coarse photos may be parallel or meet behind a camera; such a point stands on its first ray, as far out
-    /// as the median of the others.
+    /// Approximate photos may lead to parallel rays or intersections behind a camera. Such a point is set on its first ray, at the median
+    /// distance of the others.
     ///
     /// # Errors
-    /// The point whose rays give it no place.
+    /// The index of a point without usable rays.
     pub fn intersect(&self, placed: &Placed) -> Result<Vec<[f64; 3]>, usize> {
         let met: Vec<Option<Vector3>> = parallel::by_parts(self.points.len(), TOGETHER, &|points| {
             let mut rays = Vec::new();
@@ -33,7 +33,7 @@ impl Bundle {
             };
             points.map(meeting).collect()
         });
-        // Hardly ever is there one that needs it.
+        // Rarely needed.
         let distance = if met.contains(&None) { self.median_distance(&placed.photos, &met) } else { None };
         let place = |point: usize| {
             let met = met[point];
@@ -49,7 +49,7 @@ impl Bundle {
         all.into_iter().collect()
     }
 
-    /// The rays of a point, each from the pose of its image.
+    /// Returns the rays of a point, each from the pose of its image.
     fn rays(&self, placed: &Placed, point: usize) -> impl Iterator<Item = Ray> {
         let Placed { photos, commons, mounted, films } = placed;
         let ray = move |image: usize| {
@@ -67,7 +67,7 @@ impl Bundle {
         (self.point_images.start[point]..self.point_images.start[point + 1]).filter_map(ray)
     }
 
-    /// Median distance of the intersected points from their first photos.
+    /// Returns the median distance of the intersected points from their first photos.
     fn median_distance(&self, photos: &[Station], met: &[Option<Vector3>]) -> Option<f64> {
         let distance = |(&first, met): (&usize, &Option<Vector3>)| {
             Some((met.as_ref()? - photos[self.images[first].photo].orientation.centre()).norm())
@@ -75,11 +75,11 @@ impl Bundle {
         median(self.point_images.start.iter().zip(met).filter_map(distance).collect())
     }
 
-    /// Puts the held components in place and moves the others to where the rays then pass nearest: least squares of the distances
-    /// from the rays, linear in rectangular space and all but linear in geographic space.
+    /// Sets the fixed and weighted components and computes the others by least squares of the distances from the rays. The problem is
+    /// linear in rectangular space, and nearly linear in geographic space.
     fn hold(&self, placed: &Placed, point: usize, start: [f64; 3]) -> [f64; 3] {
         let (held, given) = (self.points[point].held(), self.points[point].coordinates);
-        // One ray and two held components need no start for the third.
+        // One ray and two given components determine the third without an initial value.
         let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };
         let mut coordinates = std::array::from_fn(|k| match (held[k], start[k].is_finite()) {
             (true, _) => given[k],
@@ -111,7 +111,7 @@ impl Bundle {
     }
 }
 
-/// The part of a vector across a ray.
+/// Returns the component of a vector perpendicular to a ray.
 fn across(v: &Vector3, ray: &Ray) -> Vector3 {
     v - v.dot(&ray.direction) * ray.direction
 }
@@ -120,8 +120,7 @@ fn along(ray: &Ray, distance: f64) -> Vector3 {
     ray.origin + distance * ray.direction
 }
 
-/// The position nearest to all rays, in front of every camera: sum of (I - d d^T)(P - O) = 0. None when the rays are parallel or
-/// meet behind a camera.
+/// Returns the position nearest to all rays: sum of (I - d d^T)(P - O) = 0. None if the rays are parallel or intersect behind a camera.
 pub fn meet(rays: &[Ray]) -> Option<Vector3> {
     let first = rays.first()?.origin;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());

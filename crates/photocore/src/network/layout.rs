@@ -1,4 +1,4 @@
-//! The blocks of a network's unknowns.
+//! Block layout of a network.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use super::model::Bundle;
 use super::surroundings::{BlockOf, Surroundings};
 use crate::normals::Layout;
 
-/// The blocks of a model, at the given places, and what ties them.
+/// Returns the block layout of a model at given positions, with its ties.
 pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
     let (groups, tied) = (model.point_images.start[model.locals], model.points.len() - model.locals);
     let widths = model.blocks.first.windows(2).map(|pair| pair[1] - pair[0]);
@@ -33,11 +33,11 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
 }
 
 impl Surroundings {
-    /// The retained blocks of a model of these points that outer ones are, and those that each node below leaves something for; each once,
-    /// common unknowns may stand in one.
+    /// Returns the distinct retained blocks of the outer parameters, and of the contribution of each child node. Several shared parameters
+    /// may be in one block.
     ///
     /// # Errors
-    /// One that has no unknowns of its own here.
+    /// A block without parameters of its own here.
     pub(super) fn blocks(
         &self,
         model: &Bundle,

@@ -1,10 +1,9 @@
 //! Networks of photos: poses, cameras, points and images adjusted together.
 //!
-//! Unknowns are the pose of every photo, the parameters of the cameras unless they are held, and the coordinates of every point,
-//! each weighted from free to fixed; observations are image coordinates and, beside them, those of [`observations`]. A block of aerial
-//! photographs (GIANT guide, sections 4 to 9) has cameras that are held, and poses in angles; a collection "in the large" (Agarwal,
-//! Snavely, Seitz and Szeliski 2010) has a camera of its own for every photo, and poses in vectors; a block that calibrates its camera
-//! has one for all. Positions are X, Y, Z or longitude, latitude, height.
+//! Parameters are the pose of every photo, the coordinates of every point and the parameters of the cameras that are not fixed. Each is
+//! fixed, weighted or free. Observations are image coordinates and the additional [`observations`]. Aerial blocks (GIANT guide, sections 4
+//! to 9) have fixed cameras and poses in angles. Collections "in the large" (Agarwal, Snavely, Seitz and Szeliski 2010) have one camera per
+//! photo and poses in vectors; self-calibrating blocks share one camera. Positions are X, Y, Z or longitude, latitude, height.
 //!
 //! Two photos over four control points:
 //!
@@ -124,12 +123,12 @@ pub use suspects::{Subject, Suspects};
 pub use trial::{Converged, Out, Outcome, Trial};
 pub use weak_points::WeakPoint;
 
-/// A photo as it is known beforehand.
+/// Initial values and prior information of a photo.
 #[derive(Debug, Clone, Copy)]
 pub struct Photo {
-    /// Initial values of the six unknowns of its pose (see [`PoseNumbers`]); those of fixed ones.
+    /// Initial values of the six parameters of its pose (see [`PoseNumbers`]), and the values of fixed ones.
     pub pose: [f64; POSE],
-    /// Observed values; those count that are weighted. Angles, and longitudes, may be whole turns apart.
+    /// Observed values; only weighted components count. Angles and longitudes may differ by full circles.
     pub observed: [f64; POSE],
     /// Standard deviations: infinite free, zero fixed.
     pub sd: [f64; POSE],
@@ -138,74 +137,74 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// Of which nothing is known: its pose is where to start from.
+    /// Returns a photo without prior information; `pose` contains the initial values.
     pub fn free(pose: [f64; POSE], camera: usize) -> Self {
         Self::known(pose, [f64::INFINITY; POSE], camera)
     }
 
-    /// Of which the pose was observed, with these standard deviations.
+    /// Returns a photo with an observed pose and its standard deviations.
     pub fn known(pose: [f64; POSE], sd: [f64; POSE], camera: usize) -> Self {
         Self { pose, observed: pose, sd, camera }
     }
 }
 
-/// A camera as it is known beforehand. Photos may share it: then its unknown parameters are a block of their own; those of a camera of
-/// one photo are unknowns of that.
+/// Initial values and prior information of a camera. The free parameters of a camera that several photos share form their own parameter
+/// block; otherwise they belong to the block of its photo.
 #[derive(Debug, Clone)]
 pub struct Camera {
-    /// The camera with its initial (and, where weighted, observed) parameters.
+    /// Camera with initial values (and, if weighted, observed values) of its parameters.
     pub camera: geometry::Camera,
     /// Standard deviations of the parameters: infinite free, zero fixed.
     pub sd: Vec<f64>,
-    /// Covariance matrix of those that are weighted, in their order; None where these were observed one by one.
+    /// Covariance matrix of the weighted parameters in their order; None if they were observed independently.
     pub covariance: Option<DMatrix<f64>>,
 }
 
 impl Camera {
-    /// A camera whose parameters are known one by one: standard deviations, infinite free, zero fixed.
+    /// Returns a camera with independent parameters: standard deviations, infinite free, zero fixed.
     pub fn new(camera: geometry::Camera, sd: Vec<f64>) -> Self {
         Self { camera, sd, covariance: None }
     }
 
-    /// A camera whose parameters are known.
+    /// Returns a camera with fixed parameters.
     pub fn held(camera: geometry::Camera) -> Self {
         let count = camera.parameter_names().len();
         Self::new(camera, vec![0.0; count])
     }
 
-    /// Whether its parameters are known.
+    /// Returns true if all parameters are fixed.
     pub fn is_held(&self) -> bool {
         self.sd.iter().all(|&sd| sd == 0.0)
     }
 }
 
-/// A point as it is known beforehand.
+/// Initial values and prior information of an object point.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
-    /// Coordinates in the object space; NaN where unknown.
+    /// Coordinates in the object space; NaN if unknown.
     pub coordinates: [f64; 3],
-    /// Standard deviations: finite for held components (zero fixed), infinite for all others.
+    /// Standard deviations: infinite free, zero fixed, otherwise weighted.
     pub sd: [f64; 3],
 }
 
 impl Point {
-    /// Of which nothing is known.
+    /// Returns a point without prior information.
     pub fn free() -> Self {
         Self { coordinates: [f64::NAN; 3], sd: [f64::INFINITY; 3] }
     }
 
-    /// Of which the coordinates were determined, with these standard deviations.
+    /// Returns a control point with coordinates and standard deviations.
     pub fn control(coordinates: [f64; 3], sd: [f64; 3]) -> Self {
         Self { coordinates, sd }
     }
 
-    /// Which components are held.
+    /// Returns which components are fixed or weighted.
     pub fn held(&self) -> [bool; 3] {
         self.sd.map(f64::is_finite)
     }
 }
 
-/// An image point.
+/// An image observation of a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Image {
     /// Index of its photo.
@@ -223,34 +222,34 @@ pub struct Image {
 pub struct Network {
     /// Coordinates of positions and points.
     pub space: ObjectSpace,
-    /// What the six unknowns of a pose are.
+    /// Parametrization of a pose.
     pub poses: PoseNumbers,
-    /// What bends the rays, applied in every iteration; None for images that are free of it.
+    /// Atmospheric refraction, applied in every iteration; None for images that are free of it.
     pub refraction: Option<Refraction>,
-    /// Its cameras.
+    /// Cameras.
     pub cameras: Vec<Camera>,
-    /// Its photos.
+    /// Photos.
     pub photos: Vec<Photo>,
-    /// Its points.
+    /// Object points.
     pub points: Vec<Point>,
-    /// Its image points.
+    /// Image observations.
     pub images: Vec<Image>,
-    /// What else was observed.
+    /// Additional observations.
     pub observations: Vec<Observation>,
-    /// Unknowns that observations, and photos that are mounted, have in common.
+    /// Shared parameters of observations and mounted photos.
     pub commons: Vec<Common>,
-    /// Which photos are on a frame with others, or on a trajectory.
+    /// Relations of photos to a rig frame or a trajectory.
     pub mounts: Vec<Mount>,
-    /// The trajectories.
+    /// Trajectories.
     pub trajectories: Vec<Trajectory>,
-    /// Of each image its number on the scale of its photo's time (see [`mounts::OnTrajectory`]); nothing at all where all are zero.
+    /// Number of each image on the time scale of its photo (see [`mounts::OnTrajectory`]); empty if all are zero.
     pub image_times: Vec<f64>,
-    /// What images pass beside pose, point and camera.
+    /// Corrections of images after the projection.
     pub passages: Vec<Passage>,
 }
 
 impl Network {
-    /// Without anything yet, in rectangular space, poses in angles of the rotation from ground to photo, images free of refraction.
+    /// Returns an empty network: rectangular space, poses in angles from ground to photo, images free of refraction.
     pub fn new() -> Self {
         Self::default()
     }
@@ -276,59 +275,59 @@ impl Default for Network {
     }
 }
 
-/// What the variance of unit weight is based on (GIANT guide, Appendix E).
+/// Definition of the variance of unit weight (GIANT guide, Appendix E).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum UnitVariance {
-    /// The rule of 1987, photos completely free: image coordinates and ground control count, weights of poses and cameras do not,
-    /// though what these determine is taken off. Its expectation is above 1 where these are strong.
+    /// The rule of 1987 for free photos: image coordinates and ground control count, weights of poses and cameras do not. The parameters
+    /// are subtracted in full. The expectation exceeds 1 if these weights are strong.
     Free,
-    /// Every weighted quantity counts as the observation that it is: the expectation is 1 whatever the weights are.
+    /// Every weighted quantity counts as an observation: the expectation is 1 for any weights.
     #[default]
     Constrained,
-    /// Image coordinates, ground control and what was observed beside these, over the sum of their redundancy numbers: right whatever the
-    /// weights of poses and cameras are.
+    /// Sum of squares of image coordinates, ground control and additional observations, divided by their redundancy. It is valid for any
+    /// weights of poses and cameras.
     Redundancy,
     /// Set to one.
     Unity,
 }
 
-/// Where points start from.
+/// Source of the initial coordinates of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Start {
-    /// Where their (straight) rays meet, but for the components that are held.
+    /// Intersection of the (straight) rays.
     #[default]
     Intersected,
-    /// Their given coordinates where these are known, otherwise as above.
+    /// The given coordinates if they are known, otherwise the intersection.
     Given,
 }
 
-/// The photo, and the coordinate of another one, that are to be held where nothing else gives a datum.
+/// Minimal datum to fix if no other information defines one: a photo, and a coordinate of another photo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Minimum {
-    /// The photo whose pose is held.
+    /// Photo whose pose is fixed.
     pub photo: usize,
-    /// Photo and number of its unknown, held for the scale; where there is none, the one in which a photo is farthest from the first.
+    /// Photo and number of its parameter, fixed for the scale; with None, the coordinate with the longest distance from `photo`.
     pub coordinate: Option<(usize, usize)>,
 }
 
-/// What may leave a network for the good of the rest while it is adjusted, see [`Reason`]; each is on unless it is switched off, and then
-/// stays and does its harm.
+/// Screens that may exclude points and photos during the adjustment, see [`Reason`]. Each is on by default; if it is off, the points and
+/// photos remain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Screens {
-    /// Points and photos that their images do not determine, where they are few.
+    /// Points and photos that their images do not determine, if these are few.
     pub not_determined: bool,
-    /// Points that rays which part, or are parallel, lead out of the network.
+    /// Points that diverging or parallel rays move out of the network.
     pub ran_off: bool,
-    /// Points that two rays lead to the station of a photo.
+    /// Points that two rays move to the station of a photo.
     pub ran_into_station: bool,
-    /// Points given at the place of a station that sees them.
+    /// Points with given coordinates at the position of a station that observes them.
     pub at_station: bool,
-    /// Points held near a station that sees them, where the adjustment goes wrong with them and not without.
+    /// Fixed or weighted points near a station that observes them, if the adjustment fails with them only.
     pub near_station: bool,
 }
 
 impl Default for Screens {
-    /// All.
+    /// All screens are on.
     fn default() -> Self {
         Self {
             not_determined: true,
@@ -340,31 +339,31 @@ impl Default for Screens {
     }
 }
 
-/// How to adjust a network.
+/// Options of the adjustment of a network.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// When to stop, and what to compute.
+    /// Convergence criteria, method and results to compute.
     pub adjustment: adjustment::Options,
-    /// How to order the photos.
+    /// Elimination order of the photos.
     pub ordering: Ordering,
-    /// What the variance of unit weight is based on.
+    /// Definition of the variance of unit weight.
     pub unit_variance: UnitVariance,
-    /// Where points start from.
+    /// Source of the initial coordinates of points.
     pub start: Start,
-    /// Whether photos without images stay as they are; otherwise their unknowns are unknowns, and determined only if they are weighted.
+    /// Whether photos without images are fixed; otherwise they have parameters, which only weights can determine.
     pub hold_unused: bool,
-    /// Bytes that the adjustment may take (see [`crate::normals::System::memory`]); None for any number.
+    /// Bytes available to the adjustment (see [`crate::normals::System::memory`]); None for no limit.
     pub memory: Option<usize>,
-    /// Bytes of these that the caller takes besides: an interpreter for what it loads.
+    /// Bytes of `memory` that the caller needs for itself.
     pub reserved: usize,
-    /// What to hold where nothing else gives a datum; None for what is best held.
+    /// Datum to fix if no other information defines one; None to select the best one.
     pub minimum: Option<Minimum>,
-    /// What may leave for the good of the rest.
+    /// Screens that may exclude points and photos.
     pub screens: Screens,
 }
 
 impl Default for Options {
-    /// Strict least squares of constrained photos, points from where their rays meet.
+    /// Strict least squares of constrained photos, points from the intersection of their rays.
     fn default() -> Self {
         Self {
             adjustment: adjustment::Options::default(),

@@ -1,4 +1,4 @@
-//! The observation equations of a network.
+//! Observation equations of a network.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -23,65 +23,62 @@ use crate::geometry::{
 use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
 use crate::parallel;
 
-/// Images of points by photos, and other observations of these: the local blocks are the points that no such observation touches, the
-/// retained blocks the photos with their pose and, unless it is held or shared, their camera, then the cameras that several photos share,
-/// then common unknowns, then all other points. The images of these are ties, and so are the observations, in this order.
+/// Model of a network. Local blocks are the points without additional observations. Retained blocks are, in this order, photos (pose and
+/// own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and additional
+/// observations are the ties, in this order.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
     pub poses: PoseNumbers,
-    /// None where images are free of refraction.
+    /// None if images are free of refraction.
     pub refraction: Option<Refraction>,
-    /// Of each photo, with the parameters that it starts from.
+    /// Camera of each photo with initial values.
     pub cameras: Vec<Camera>,
-    /// Where the unknowns of photos, shared cameras and common unknowns are.
+    /// Positions of the parameters of photos, shared cameras and shared parameters.
     pub blocks: Blocks,
-    /// What was observed of cameras with a covariance matrix.
+    /// Observed camera parameters with a covariance matrix.
     pub camera_priors: Vec<CameraPrior>,
-    /// The common unknowns.
     pub commons: Vec<PlacedCommon>,
-    /// Which photos are on a frame, or on a trajectory.
+    /// Relations of photos to rig frames and trajectories.
     pub mounts: Mounts,
-    /// The number of each image on the scale of its photo's time; none at all where all are zero.
+    /// Number of each image on the time scale of its photo; empty if all are zero.
     pub image_times: Vec<f64>,
-    /// What images pass beside pose, point and camera.
+    /// Corrections of images after the projection.
     pub passages: Passages,
-    /// What coordinates are counted from.
+    /// Origin of the coordinates.
     pub origin: [f64; 3],
-    /// The points, local ones first; coordinates counted from the origin.
+    /// Points, local ones first; coordinates are relative to the origin.
     pub points: Vec<Point>,
-    /// How many of them are local.
+    /// Number of local points.
     pub locals: usize,
-    /// The images, point by point: the groups of observations, then the first ties.
+    /// Image observations, sorted by point: first the groups of local points, then ties.
     pub images: Vec<Image>,
-    /// Which of them are of each point, and their indices in the network.
+    /// Range of the images of each point, and their indices in the network.
     pub point_images: PointImages,
-    /// How many images each photo has.
+    /// Number of images of each photo.
     pub images_on: Vec<usize>,
-    /// Which photos step by a rotation vector about their own axes: those without a fixed angle.
+    /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
-    /// What else was observed.
     pub observations: Vec<TiedObservation>,
-    /// What network and user say of the datum.
+    /// Datum information of the network and the user.
     pub datum: GivenDatum,
-    /// What may leave while it is adjusted.
     pub screens: Screens,
-    /// What hangs together, once it was asked for: it depends on all above.
+    /// Connected components, computed at first use from all fields above.
     pub parts: OnceLock<Parts>,
 }
 
-/// What is known of the datum before anything is computed.
+/// Datum information that is available before any computation.
 #[derive(Debug)]
 pub struct GivenDatum {
-    /// Whether the position of anything is weighted, or of more than one photo fixed: then the datum is the user's.
+    /// Whether the datum is given: any position is weighted, or positions of several photos are fixed.
     pub placed: bool,
-    /// The only photo whose position is fixed, where nothing else is placed: the user has chosen what to hold.
+    /// The only photo with a fixed position, if no other position is given: it is the origin chosen by the user.
     pub anchor: Option<usize>,
-    /// What the user wants to be held where nothing else gives a datum.
+    /// The user's datum, in force if no other information defines one.
     pub minimum: Option<Minimum>,
 }
 
-/// What a retained block belongs to: indices into the network.
+/// Owner of a retained block: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {
     Photo(usize),
@@ -90,54 +87,54 @@ pub enum Owner {
 }
 
 impl Bundle {
-    /// The unknowns that are those of photos, shared cameras and common unknowns, of all.
+    /// Returns the range of parameters of photos, shared cameras and shared parameters among all.
     pub fn of_stations(&self) -> Range<usize> {
         let start = 3 * self.locals;
         start..start + self.blocks.first[self.stations()]
     }
 
-    /// Number of photos, shared cameras and common unknowns: the first retained blocks.
+    /// Returns the number of blocks of photos, shared cameras and shared parameters: the first retained blocks.
     pub fn stations(&self) -> usize {
         self.blocks.first.len() - 1
     }
 
-    /// The unknowns of a photo, shared camera or common unknown, of all.
+    /// Returns the range of parameters of a photo, shared camera or shared parameter among all.
     pub fn of_block(&self, block: usize) -> Range<usize> {
         let start = 3 * self.locals;
         start + self.blocks.first[block]..start + self.blocks.first[block + 1]
     }
 
-    /// The unknowns of a photo that are those of its pose and, unless that is held or shared, its camera, of all: the first of its block.
+    /// Returns the range of parameters of a photo among all: its pose and its own free camera, the first of its block.
     pub fn of_photo(&self, photo: usize) -> Range<usize> {
         let all = self.of_block(photo);
         let beside = self.blocks.commons_of(photo).first().and_then(|&common| self.of_common(common));
         all.start..beside.map_or(all.end, |beside| beside.start)
     }
 
-    /// Whether a photo has a camera with unknown parameters that is no other's.
+    /// Returns true if a photo has a camera with free parameters that no other photo shares.
     pub fn has_own_camera(&self, photo: usize) -> bool {
         self.of_photo(photo).len() > POSE
     }
 
-    /// Where the coordinates of a point stand among the unknowns.
+    /// Returns the range of coordinates of a point among all parameters.
     pub fn of_point(&self, point: usize) -> Range<usize> {
         let start = if point < self.locals { 0 } else { self.of_stations().len() };
         start + 3 * point..start + 3 * point + 3
     }
 
-    /// The coordinates of all points, counted from the origin, at given values of the unknowns.
+    /// Returns the coordinates of all points, relative to the origin, at given parameter values.
     pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
         let (local, tied) = self.all_coordinates(unknowns);
         local.iter().chain(tied)
     }
 
-    /// The same of local points, and of all others.
+    /// Returns the coordinates of local points, and of all others.
     pub fn all_coordinates<'a>(&self, unknowns: &'a [f64]) -> (&'a [[f64; 3]], &'a [[f64; 3]]) {
         let photos = self.of_stations();
         (unknowns[..photos.start].as_chunks().0, unknowns[photos.end..].as_chunks().0)
     }
 
-    /// The ties: images of points that are not local, then observations.
+    /// Returns the ties: images of points that are not local, then additional observations.
     pub fn ties(&self) -> Vec<Tie> {
         let images = (self.point_images.start[self.locals]..self.images.len()).map(|image| {
             let point = self.point_of(image);
@@ -152,37 +149,36 @@ impl Bundle {
         images.chain(observations).collect()
     }
 
-    /// The retained block of a point that is not local.
+    /// Returns the retained block of a point that is not local.
     fn block_of_point(&self, point: usize) -> usize {
         self.stations() + point - self.locals
     }
 
-    /// How many unknowns a retained block has.
+    /// Returns the number of parameters of a retained block.
     fn width(&self, block: usize) -> usize {
         if block < self.stations() { self.of_block(block).len() } else { 3 }
     }
 
-    /// The retained blocks of an image: those of its pose, the main one first, then those of what it passes, then the camera where that is
-    /// shared.
+    /// Returns the retained blocks of an image: blocks of its pose (main block first), of its corrections, and its shared camera.
     pub fn blocks_of_image(&self, image: usize) -> impl Iterator<Item = usize> {
         let photo = self.images[image].photo;
         let passed = self.blocks_of_passages(image);
         self.blocks_of_pose(photo, self.time_of(image)).chain(passed).chain(self.blocks.of_camera[photo])
     }
 
-    /// The number of an image on the scale of its photo's time.
+    /// Returns the number of an image on the time scale of its photo.
     #[inline]
     pub fn time_of(&self, image: usize) -> f64 {
         self.image_times.get(image).copied().unwrap_or(AT_PHOTO)
     }
 
-    /// The retained block that the equations of an image are kept with.
+    /// Returns the main block of an image.
     pub fn main_block(&self, image: usize) -> usize {
         let photo = self.images[image].photo;
         if self.mounts.is_empty() { photo } else { self.main_block_of_pose(photo) }
     }
 
-    /// The retained blocks of what an observation touches, each once; points as the model numbers them.
+    /// Returns the distinct retained blocks of an observation, sorted; points are numbered as in the model.
     pub fn blocks_of(&self, touches: &Touches) -> Vec<usize> {
         let points = touches.points.iter().map(|&point| self.block_of_point(point));
         let photos = touches.photos.iter().flat_map(|&photo| self.blocks_of_pose(photo, AT_PHOTO));
@@ -194,17 +190,16 @@ impl Bundle {
         blocks
     }
 
-    /// How many ties are images.
+    /// Returns the number of ties that are image observations.
     pub fn tied_images(&self) -> usize {
         self.images.len() - self.point_images.start[self.locals]
     }
 
-    /// The point of an image.
     pub(super) fn point_of(&self, image: usize) -> usize {
         self.point_images.start.partition_point(|&start| start <= image) - 1
     }
 
-    /// Writes the equations of an image whose point is not local.
+    /// Writes the equations of an image observation of a point that is not local.
     pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
         let all = rows.coefficients.len() / 2;
         let width = self.of_block(self.main_block(image)).len();
@@ -221,7 +216,7 @@ impl Bundle {
         }
     }
 
-    /// Hands over what observations are computed from, at given values of the unknowns.
+    /// Calls `take` with the model of additional observations at the linearization point.
     pub(super) fn with_tied<T>(&self, stations: &Stations, take: impl FnOnce(&TiedModel<'_>) -> T) -> T {
         let point = |point: usize| PointSite {
             point: stations.points[point],
@@ -255,7 +250,7 @@ impl Bundle {
         })
     }
 
-    /// Photos and common unknowns at given values of the unknowns of photos, shared cameras and common unknowns.
+    /// Returns photos and shared parameters at given values of the parameters of [`Bundle::of_stations`].
     pub fn placed(&self, unknowns: &[f64]) -> Placed {
         let commons = self.common_states(unknowns);
         let lenses = self.passages.lenses().iter().map(|own| own.commons.iter());
@@ -278,31 +273,28 @@ impl Bundle {
         Placed { photos, commons, mounted, films }
     }
 
-    /// The photos alone.
     pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
         self.placed(unknowns).photos
     }
 
-    /// The common unknowns at given values of the same unknowns.
     pub fn common_states(&self, unknowns: &[f64]) -> Vec<CommonState> {
         (0..self.commons.len()).map(|common| self.common_state(common, unknowns)).collect()
     }
 
-    /// One of them.
     pub fn common_state(&self, common: usize, unknowns: &[f64]) -> CommonState {
         let start = 3 * self.locals;
         let own = self.of_common(common).map_or(0..0, |own| own.start - start..own.end - start);
         self.commons[common].at(&unknowns[own])
     }
 
-    /// The unknowns of a common unknown, of all; None where it is known.
+    /// Returns the range of a shared parameter among all; None if it is fixed.
     pub fn of_common(&self, common: usize) -> Option<Range<usize>> {
         let InBlock { block, first, .. } = self.blocks.of_common[common]?;
         let start = self.of_block(block).start + first;
         Some(start..start + self.commons[common].kind.unknowns().len())
     }
 
-    /// What a block of photos, shared cameras and common unknowns belongs to, with the unknowns of each, of all.
+    /// Returns the owners of a retained block, each with the range of its parameters among all.
     pub fn owners(&self, block: usize) -> Vec<(Owner, Range<usize>)> {
         let photos = self.cameras.len();
         let first = match self.blocks.shared.get(block.wrapping_sub(photos)) {
@@ -314,7 +306,7 @@ impl Bundle {
         first.into_iter().chain(commons).collect()
     }
 
-    /// What one of their unknowns, of all, belongs to, and its number there; None for those of points.
+    /// Returns the owner of one of these parameters and its number there; None for points.
     pub fn owner(&self, unknown: usize) -> Option<(Owner, usize)> {
         let all = self.of_stations();
         let retained = all.contains(&unknown).then(|| unknown - all.start)?;
@@ -323,17 +315,16 @@ impl Bundle {
         own.map(|(owner, range)| (owner, unknown - range.start))
     }
 
-    /// The cofactors of such a block.
     pub fn cofactors_of_block<'a>(&self, all: &'a Cofactors, block: usize) -> &'a [f64] {
         &all.retained[self.blocks.squares[block]..self.blocks.squares[block + 1]]
     }
 
-    /// The cofactors of a common unknown; none where it is known.
+    /// Returns the cofactors of a shared parameter; empty if it is fixed.
     pub fn cofactors_of_common(&self, all: &Cofactors, common: usize) -> DMatrix<f64> {
         self.cofactors_in_block(all, common, common)
     }
 
-    /// The cofactors of a common unknown with another of its block; none where it is known.
+    /// Returns the cofactors of a shared parameter with another one of its block; empty if one is fixed.
     pub fn cofactors_in_block(&self, all: &Cofactors, common: usize, other: usize) -> DMatrix<f64> {
         let (Some(own), Some(to)) = (self.blocks.of_common[common], self.blocks.of_common[other]) else {
             return DMatrix::zeros(0, 0);
@@ -343,7 +334,7 @@ impl Bundle {
         DMatrix::from_fn(rows, columns, |i, j| square[own.width * (own.first + i) + to.first + j])
     }
 
-    /// The common unknown before another in their block.
+    /// Returns the preceding shared parameter of the same block.
     pub fn former_in_block(&self, common: usize) -> Option<usize> {
         let InBlock { block, .. } = self.blocks.of_common[common]?;
         let own = self.blocks.commons_of(block);
@@ -351,7 +342,7 @@ impl Bundle {
         Some(own[place.checked_sub(1)?])
     }
 
-    /// The orientation of a photo, its pose given, with the columns of its unknowns.
+    /// Returns the orientation of a photo at a given pose, with the partials by its parameters.
     pub fn orientation(&self, photo: usize, pose: &[f64; POSE]) -> Orientation {
         let [x, y, z, omega, phi, kappa] = *pose;
         match self.turning_sense(photo) {
@@ -363,7 +354,7 @@ impl Bundle {
         }
     }
 
-    /// The verticals at the photos; `unknowns` are those of all stations.
+    /// Returns the verticals at the photos; `unknowns` contains the parameters of [`Bundle::of_stations`].
     fn verticals_at_photos(
         &self,
         refraction: &Refraction,
@@ -381,7 +372,7 @@ impl Bundle {
         places.map(|place: [f64; 3]| refraction.vertical(self.space, place)).collect()
     }
 
-    /// The sense of the angles of a photo that steps by a rotation vector; None for all others.
+    /// Returns the sense of the angles of a photo that steps by a rotation vector; None for all others.
     pub fn turning_sense(&self, photo: usize) -> Option<RotationSense> {
         match self.poses {
             PoseNumbers::Angles(sense) if self.turning[photo] => Some(sense),
@@ -389,14 +380,13 @@ impl Bundle {
         }
     }
 
-    /// The images of a point.
     pub fn images_of(&self, point: usize) -> &[Image] {
         &self.images[self.point_images.start[point]..self.point_images.start[point + 1]]
     }
 }
 
 impl Bundle {
-    /// Everything at given values of the unknowns.
+    /// Evaluates photos, points and shared parameters at given parameter values.
     pub fn evaluated(&self, unknowns: &[f64]) -> Stations {
         let photos = &unknowns[self.of_stations()];
         let (local, tied) = (&unknowns[..3 * self.locals], &unknowns[self.of_stations().end..]);
@@ -427,7 +417,7 @@ impl Bundle {
     }
 }
 
-/// The verticals at positions, the first three unknowns of each.
+/// Returns the verticals at positions, the first three parameters of each.
 fn verticals<'a>(
     refraction: &Refraction,
     space: ObjectSpace,

@@ -1,5 +1,4 @@
-//! What an undetermined combination of unknowns is, in the terms of photogrammetry: which parameters of cameras take part in it, and
-//! which parts of the poses.
+//! Description of undetermined parameter combinations in terms of photogrammetry: camera parameters and parts of poses.
 
 use std::ops::ControlFlow;
 
@@ -11,11 +10,11 @@ use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized};
 use crate::geometry::{PoseNumbers, Vector3};
 
-/// What takes part by less than this share of all, of n_ii x_i^2 summed up, is not named.
+/// Minimum share of the sum of n_ii x_i^2 for parameters that are named.
 const NOTABLE: f64 = 0.01;
 
 impl NetworkError {
-    /// What stopped the adjustment, in terms of the network.
+    /// Converts an error of the adjustment to terms of the network.
     pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
         match error {
             AdjustError::UndeterminedLocals(locals) => {
@@ -31,7 +30,7 @@ impl NetworkError {
         }
     }
 
-    /// Combinations of retained blocks: those that move photos and cameras by these, else the points that they move.
+    /// Converts combinations of retained blocks: photos, cameras and shared parameters if any, else the points.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
         let stations = model.stations();
@@ -61,8 +60,8 @@ impl NetworkError {
 }
 
 impl Network {
-    /// Adds to undetermined combinations which parameters of cameras and parts of poses they move. Nothing where cameras are known, or
-    /// where the normal equations of these values cannot be had again.
+    /// Adds camera parameters and pose parts to undetermined combinations. Nothing is added if all cameras are fixed, or if the normal
+    /// equations cannot be formed again.
     pub(super) fn name(
         &self,
         mut error: NetworkError,
@@ -90,7 +89,7 @@ impl Network {
         error
     }
 
-    /// Sums up the shares n x^2 of the unknowns, given with x and n, by parameters of cameras and parts of poses.
+    /// Sums up the shares n x^2 of parameters, given with x and n, by camera parameters and pose parts.
     fn describe(
         &self,
         combination: &mut Combination,

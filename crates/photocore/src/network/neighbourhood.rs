@@ -1,6 +1,6 @@
-//! Points in an order in which neighbours on the ground are neighbours in memory.
+//! Spatial order of points: neighbours on the ground are neighbours in memory.
 //!
-//! The engine walks through a block region by region; points whose data lie scattered would have to be fetched one by one.
+//! The engine processes a block region by region; scattered points would cause cache misses.
 
 use rayon::prelude::*;
 
@@ -9,12 +9,12 @@ use super::selection::{PointImages, TOGETHER};
 use crate::geometry::Vector3;
 use crate::parallel;
 
-/// Cells of the curve along each axis.
+/// Number of cells of the curve along each axis.
 const CELLS: f64 = (1_u32 << 20) as f64;
 
 impl Network {
-    /// The points along a Morton curve through the mean positions of the photos that show them; `images_of` are the images
-    /// of each point. Points of equal place stay in their order.
+    /// Returns the points along a Morton curve through the mean positions of their photos; `images_of` lists the images of each point.
+    /// Points with equal positions remain in their order.
     pub(super) fn along_curve(&self, images_of: &PointImages) -> Vec<usize> {
         let centres: Vec<Vector3> = self.photos.iter().map(|photo| self.centre(&photo.pose)).collect();
         let lowest = centres.iter().fold(Vector3::repeat(f64::INFINITY), |low, centre| low.inf(centre));
@@ -23,7 +23,7 @@ impl Network {
             let images = images_of.of(point);
             let count = images.len().max(1) as f64;
             let mean: Vector3 = images.iter().map(|&image| centres[self.images[image].photo] / count).sum();
-            // What is not finite comes first.
+            // Nonfinite positions are first.
             interleaved(std::array::from_fn(|k| ((mean[k] - lowest[k]) / extent * (CELLS - 1.0)) as u32))
         };
         let mut keyed = parallel::map(self.points.len(), TOGETHER, |point| (key(point), point));
@@ -32,9 +32,9 @@ impl Network {
     }
 }
 
-/// The bits of three numbers of twenty bits in turn (Morton 1966).
+/// Interleaves the bits of three numbers of twenty bits (Morton 1966).
 fn interleaved(cell: [u32; 3]) -> u64 {
-    // Halves move apart, then quarters, until each bit stands alone.
+    // Separates halves, then quarters, until single bits are separated.
     let steps = [
         (32, 0x1f_0000_0000_ffff),
         (16, 0x1f_0000_ff00_00ff),

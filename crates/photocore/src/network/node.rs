@@ -1,8 +1,8 @@
-//! A node of the elimination tree of a network that is adjusted in parts: Helmert blocking (Helmert 1880; Wolf 1978).
+//! Node of the elimination tree of a network that is adjusted in parts: Helmert blocking (Helmert 1880; Wolf 1978).
 //!
-//! A node is a network of its own: the photos at home in it and those that other nodes eliminate after it, the points whose first photo in
-//! the order of elimination is at home here, all their images, and the observations at home likewise. See
-//! [`crate::adjustment::Linearized::of_part`] for what is done with it.
+//! A node is a network with its own photos and the photos that later nodes eliminate. Its points are those whose first photo in the
+//! elimination order is its own, with all their images. Additional observations are assigned likewise. See
+//! [`crate::adjustment::Linearized::of_part`] for the algorithm.
 
 use super::problem::Assembled;
 use super::solution::{observations, of_photo, sums_of_squares};
@@ -12,7 +12,7 @@ use crate::Threads;
 use crate::adjustment::{Adjustment, Counts, DatumOfPart, Linearized, Model, PartError, PartOptions, Watch};
 use crate::normals::{Contribution, Operations, ReducedRights, packed};
 
-/// A node, its blocks ordered; it has no values.
+/// A node with ordered blocks; parameter values are separate.
 #[derive(Debug)]
 pub struct Node {
     network: Network,
@@ -20,53 +20,53 @@ pub struct Node {
     assembled: Assembled,
     outer: Vec<usize>,
     below: Vec<Vec<usize>>,
-    /// Unknowns held for the datum of the larger network, outer ones among them.
+    /// Parameters fixed for the datum of the larger network, including outer ones.
     held: Vec<usize>,
 }
 
-/// A node at given values, what is at home in it eliminated.
+/// A node linearized at given values, with its own parameters eliminated.
 #[derive(Debug)]
 pub struct FormedNode {
     pub(super) part: Linearized,
-    /// Right-hand sides for a datum of the larger network, on their way.
+    /// Reduced right-hand sides for a datum of the larger network, until they are solved.
     pub(super) reduced: Option<ReducedRights>,
-    /// The right-hand side of a chord, on its way.
+    /// Reduced right-hand side of a chord step, until it is solved.
     pub(super) chord: Option<ReducedRights<1>>,
 }
 
-/// What a node takes, from its pattern alone.
+/// Predicted cost of a node, computed from its sparsity pattern.
 #[derive(Debug, Clone, Copy)]
 pub struct NodePrediction {
-    /// Unknowns of points that only images touch.
+    /// Number of coordinates of points without additional observations.
     pub points: usize,
-    /// Unknowns of blocks that are eliminated here, and of outer ones.
+    /// Number of parameters of blocks that are eliminated in this node.
     pub interior: usize,
-    /// Unknowns of outer blocks.
+    /// Number of parameters of outer blocks.
     pub outer: usize,
-    /// Image points, and equations in all.
+    /// Number of image observations.
     pub images: usize,
-    /// Equations in all, weighted unknowns not counted.
+    /// Number of observation equations, without weighted parameters.
     pub observations: usize,
     /// Multiply-adds of each phase.
     pub operations: Operations,
-    /// Bytes that the node keeps by itself.
+    /// Bytes of the node itself.
     pub node: usize,
-    /// Bytes that it keeps beside while it is formed: the factor, what the points have left, and where that is.
+    /// Additional bytes while it is formed: the factor, the reduced points and their indices.
     pub factor: usize,
-    /// Bytes that forming, inverting or writing takes at the most, what it is given and the node itself counted.
+    /// Peak bytes of forming, inverting or writing, including the input and the node itself.
     pub memory: usize,
 }
 
-/// Numbers that are found of an equation and its share of the unknowns: residual, redundancy number, test value, as they are found and as
-/// they are written.
+/// Numbers stored per equation and its share of the parameters: residual, redundancy number and test value, in the results and in their
+/// output.
 const FOUND: usize = 7;
 
 impl Network {
-    /// The unknowns that an adjustment of the whole network holds because nothing gives it a datum: photos, each with the number of one of
-    /// its pose unknowns (see [`Surroundings::held`]); none where there is a datum.
+    /// Returns the parameters that an adjustment of the whole network fixes as its datum: photo and number of the pose parameter (see
+    /// [`Surroundings::held`]). The list is empty if the network defines a datum.
     ///
     /// # Errors
-    /// Those of [`Network::adjust`] before its first iteration.
+    /// Errors of [`Network::adjust`] before its first iteration.
     pub fn held_for_datum(
         &self,
         options: &Options,
@@ -85,10 +85,10 @@ impl Network {
         ))
     }
 
-    /// Takes the network as a node of a larger one.
+    /// Converts the network to a node of a larger one.
     ///
     /// # Errors
-    /// A network that contradicts itself, blocks that are not there or have no unknowns, more memory than the options give.
+    /// An inconsistent network, missing blocks or blocks without free parameters, insufficient memory.
     pub fn node(
         &self,
         options: &Options,
@@ -114,7 +114,7 @@ impl Network {
         Ok(Node { network, options: *options, assembled, outer, below, held })
     }
 
-    /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
+    /// Removes the weights of outer blocks, because they count in the node that eliminates them. Fixed parameters remain fixed.
     pub(super) fn release(&mut self, surroundings: &Surroundings) {
         let outer = &surroundings.outer;
         let (films, _) = self.commons_by_block(&surroundings.commons());
@@ -143,48 +143,48 @@ impl Network {
     }
 }
 
-/// Makes weighted unknowns free.
+/// Makes weighted parameters free.
 fn free(sd: &mut [f64]) {
     sd.iter_mut().filter(|sd| **sd > 0.0).for_each(|sd| *sd = f64::INFINITY);
 }
 
 impl Node {
-    /// Unknowns of a state: of points that only images touch, then of photos, shared cameras, common unknowns and other points.
+    /// Returns the number of parameters of a state: local points, then photos, shared cameras, shared parameters and other points.
     pub fn size(&self) -> usize {
         self.assembled.problem.initial.len()
     }
 
-    /// Image points.
+    /// Returns the number of image observations.
     pub fn images(&self) -> usize {
         self.network.images.len()
     }
 
-    /// Where the outer unknowns stand in a state.
+    /// Returns the indices of the outer parameters in a state.
     pub fn outer(&self) -> &[usize] {
         &self.outer
     }
 
-    /// Where the unknowns stand that each node below leaves something for.
+    /// Returns, for each child node, the indices of the parameters of its contribution.
     pub fn below(&self) -> &[Vec<usize>] {
         &self.below
     }
 
-    /// Observations and unknowns at home here.
+    /// Returns the numbers of observations and parameters that are assigned to this node.
     pub fn counts(&self) -> Counts {
         self.assembled.problem.counts(&self.held)
     }
 
-    /// Points that do not take part.
+    /// Returns the excluded points.
     pub fn dropped(&self) -> &[Dropped] {
         &self.assembled.dropped
     }
 
-    /// The state to begin with: photos as they are given, points where their rays meet.
+    /// Returns the initial state: given photos, points from the intersection of their rays.
     pub fn initial(&self) -> &[f64] {
         &self.assembled.problem.initial
     }
 
-    /// What it takes, from its pattern alone.
+    /// Returns the predicted cost, computed from the sparsity pattern.
     pub fn prediction(&self) -> NodePrediction {
         let system = &self.assembled.problem.system;
         let (layout, symbolic) = (system.layout(), system.symbolic());
@@ -205,7 +205,7 @@ impl Node {
         }
     }
 
-    /// Bytes of images and points, as they were given and as they were ordered, and of the pattern.
+    /// Returns the bytes of images and points, in input and in model order, and of the sparsity pattern.
     fn bytes(&self) -> usize {
         let (numbers, indices) = (size_of::<f64>(), size_of::<u32>());
         let (network, problem) = (&self.network, &self.assembled.problem);
@@ -218,10 +218,10 @@ impl Node {
             + 3 * numbers * problem.initial.len()
     }
 
-    /// The state after a step: attitudes step by rotation vectors.
+    /// Returns the state after a step: attitudes step by rotation vectors.
     ///
     /// # Errors
-    /// A state or step of another length.
+    /// The state or step has a wrong length.
     pub fn advance(&self, state: &[f64], step: &[f64]) -> Result<Vec<f64>, NetworkError> {
         self.check(&[state, step])?;
         let mut state = state.to_vec();
@@ -229,10 +229,10 @@ impl Node {
         Ok(state)
     }
 
-    /// The state with points that only images touch where their rays meet; as it is where some do not.
+    /// Returns the state with local points at the intersection of their rays; unchanged if an intersection fails.
     ///
     /// # Errors
-    /// A state of another length.
+    /// The state has a wrong length.
     pub fn relocate(&self, state: &[f64], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         self.check(&[state])?;
         let (model, mut moved) = (&self.assembled.problem.model, state.to_vec());
@@ -243,10 +243,10 @@ impl Node {
         Ok(moved)
     }
 
-    /// Weighted sums of squares of what is at home here, weights as a loss has changed them, and what is minimised: their sum, without one.
-    ///
+    /// Returns the weighted sums of squares of this node (weights as modified by the loss) and the objective. Without a loss, the objective
+    /// is their sum.
     /// # Errors
-    /// A state of another length.
+    /// The state has a wrong length.
     pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<(SumsOfSquares, f64), NetworkError> {
         self.check(&[state])?;
         let (problem, loss) = (&self.assembled.problem, self.options.adjustment.loss);
@@ -256,13 +256,13 @@ impl Node {
         Ok((sums, problem.any().objective(state, &reached.residuals, loss)))
     }
 
-    /// Forms the normal equations at a state, with what the nodes below leave, and eliminates what is at home here.
+    /// Forms the normal equations at a state, adds the contributions of child nodes and eliminates the parameters of this node.
     ///
-    /// * `damping`: a fraction of the diagonal that is added to it;
-    /// * `curved`: whether the second-order term of a loss is taken in.
+    /// * `damping`: fraction of the diagonal that is added to it;
+    /// * `curved`: whether the second-order term of the loss is included.
     ///
     /// # Errors
-    /// A state of another length, contributions over other unknowns, an interruption, no memory.
+    /// A state of wrong length, contributions for other parameters, an interruption, insufficient memory.
     pub fn form(
         &self,
         state: &[f64],
@@ -279,15 +279,15 @@ impl Node {
         Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None, chord: None })
     }
 
-    /// What the observations leave undetermined of what is at home here.
+    /// Returns the undetermined parameters of this node as an error; None if all are determined.
     pub fn undetermined(&self, formed: &FormedNode) -> Option<NetworkError> {
         formed.part.undetermined().map(|error| NetworkError::new(error, &self.assembled))
     }
 
-    /// The step of all unknowns, given that of the outer ones.
+    /// Returns the step of all parameters for a given step of the outer ones.
     ///
     /// # Errors
-    /// Another number of outer unknowns, an interruption, no memory.
+    /// A wrong number of outer parameters, an interruption, insufficient memory.
     pub fn solve(
         &self,
         formed: &FormedNode,
@@ -301,14 +301,14 @@ impl Node {
             .map_err(|error| self.named(error))
     }
 
-    /// What is adjusted here, with its cofactors, and the cofactors that each node below needs for its own: lower triangles, column by column.
+    /// Returns the solution with cofactors, and the cofactors for each child node: lower triangles, column by column.
     ///
-    /// * `outer`: those of the outer unknowns;
-    /// * `state`: where the adjustment has ended;
-    /// * `datum`: what takes the cofactors of this node to a datum of the larger network.
+    /// * `outer`: cofactors of the outer parameters;
+    /// * `state`: final state of the adjustment;
+    /// * `datum`: transformation of the cofactors of this node to a datum of the larger network.
     ///
     /// # Errors
-    /// Other numbers of unknowns, what is not determined, an interruption, no memory.
+    /// Wrong numbers of parameters, undetermined parameters, an interruption, insufficient memory.
     pub fn invert(
         &self,
         formed: FormedNode,
@@ -336,10 +336,10 @@ impl Node {
         Ok((solution, below))
     }
 
-    /// What is adjusted here, without cofactors; `before` is the state before the last step.
+    /// Returns the solution without cofactors; `before` is the state before the last step.
     ///
     /// # Errors
-    /// States of another length.
+    /// A state has a wrong length.
     pub fn solution(
         &self,
         state: &[f64],
@@ -363,7 +363,7 @@ impl Node {
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }
 
-    /// Solves where right-hand sides were reduced, solutions for the outer unknowns being given.
+    /// Solves for reduced right-hand sides, with given solutions of the outer parameters.
     pub(super) fn solved<const C: usize>(
         &self,
         formed: &FormedNode,
@@ -393,17 +393,17 @@ impl Node {
 }
 
 impl FormedNode {
-    /// What it leaves for the outer unknowns; empty the second time.
+    /// Returns the contribution to the outer parameters; empty at the second call.
     pub fn take_contribution(&mut self) -> Contribution<'static> {
         self.part.take_contribution()
     }
 
-    /// Weighted sum of squares of what is at home in the node.
+    /// Returns the weighted sum of squares of this node.
     pub fn sum_of_squares(&self) -> f64 {
         self.part.sum_of_squares()
     }
 
-    /// The share of the node in the decrease of the sum of squares that a full step predicts.
+    /// Returns the node's share of the decrease of the sum of squares predicted for a full step.
     pub fn decrease(&self) -> f64 {
         self.part.decrease()
     }

@@ -1,4 +1,4 @@
-//! A chord of a network that is adjusted in parts: a second step with the factors that its nodes have
+//! Chord steps of a network that is adjusted in parts: a second step with the existing factors of its nodes
 //! ([`crate::adjustment::Linearized::reduce_chord`]).
 
 use super::NetworkError;
@@ -7,16 +7,16 @@ use crate::Threads;
 use crate::adjustment::{Model, Watch};
 
 impl Node {
-    /// Whether the last steps of the larger network may fall slowly, so that a chord pays.
+    /// Returns true if the last steps may converge slowly, so that a chord step pays.
     pub fn ends_slowly(&self) -> bool {
         self.assembled().problem.model.ends_slowly()
     }
 
-    /// Reduces the right-hand side that the equations have at a state, with what each node below has left. What is left for the outer
-    /// unknowns, and by how much the node lowers the sum of squares there; None where the factor has not cached what that takes.
+    /// Reduces the right-hand side at a state with the contributions of the child nodes. Returns the contribution to outer parameters, and
+    /// the decrease of the sum of squares by this node; None if the factor lacks the required cache.
     ///
     /// # Errors
-    /// Other numbers of unknowns, an interruption, no memory.
+    /// Wrong numbers of parameters, an interruption, insufficient memory.
     pub fn reduce_chord(
         &self,
         formed: &mut FormedNode,
@@ -40,10 +40,10 @@ impl Node {
         Ok(formed.chord.as_ref().map(|reduced| (reduced.left(), reduced.products[0])))
     }
 
-    /// The chord of all unknowns where its right-hand side was reduced, that of the outer ones being given; once.
+    /// Solves the reduced chord step of all parameters, given the step of the outer ones; only once.
     ///
     /// # Errors
-    /// Another number of unknowns, nothing that was reduced, an interruption, no memory.
+    /// A wrong number of parameters, a missing reduction, an interruption, insufficient memory.
     pub fn solve_chord(
         &self,
         formed: &mut FormedNode,
@@ -57,7 +57,7 @@ impl Node {
 }
 
 impl FormedNode {
-    /// Whether the right-hand side of a chord was reduced, and is not solved for.
+    /// Returns true if a reduced chord step is still to be solved.
     pub fn has_chord(&self) -> bool {
         self.chord.is_some()
     }

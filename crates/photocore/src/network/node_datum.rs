@@ -1,7 +1,7 @@
-//! The datum of a network that is adjusted in parts: found of the whole, taken to by each node.
+//! Datum of a network that is adjusted in parts: defined for the whole network, applied by each node.
 //!
-//! The network is moved as a whole, and has B and T there ([`crate::adjustment::DatumColumns`]). Its nodes reduce B on the way up, and
-//! are given W = Q B of the outer unknowns with the cofactors of these on the way down: each takes its own cofactors over.
+//! The whole network is transformed and yields B and T ([`crate::adjustment::DatumColumns`]). Its nodes reduce B from children to parents.
+//! Then W = Q B and the cofactors of outer parameters are passed from parents to children, and each node transforms its own cofactors.
 
 use super::model::Owner;
 use super::node::{FormedNode, Node};
@@ -13,28 +13,28 @@ use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
 use crate::sorting::order;
 
-/// What an unknown belongs to (0: a photo, 1: a camera that photos share, 2: a common unknown, 3: a point), its index in the network, and
-/// the number of the unknown there.
+/// Owner of a parameter (0: photo, 1: shared camera, 2: shared parameter, 3: point), its index in the network, and the number of the
+/// parameter there.
 pub type UnknownName = [usize; 3];
 
-/// A network that was adjusted in parts.
+/// Results of a network that was adjusted in parts.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedInParts<'a> {
-    /// The middle that all nodes were given ([`Surroundings::middle`]).
+    /// Centre that was passed to all nodes ([`Surroundings::middle`]).
     pub middle: Option<[f64; 3]>,
-    /// Photos with the numbers of their unknowns that were held.
+    /// Photos with the numbers of their fixed parameters.
     pub held: &'a [(usize, usize)],
-    /// All unknowns; those of several nodes may stand here several times.
+    /// Names of all parameters; parameters of several nodes may be repeated.
     pub names: &'a [UnknownName],
-    /// Where they have been adjusted to.
+    /// Adjusted values.
     pub values: &'a [f64],
 }
 
 impl Network {
-    /// Moves a network that was adjusted in parts to the datum of inner constraints: values, B and T of the unknowns as they are named.
+    /// Transforms a network that was adjusted in parts to inner constraints; returns values, B and T in the order of the names.
     ///
     /// # Errors
-    /// Those of [`super::NetworkAdjustment::run`] with such a datum; names that are not those of all unknowns.
+    /// Errors of [`super::NetworkAdjustment::run`] with such a datum; names that do not cover all parameters.
     pub fn parts_in_datum(
         &self,
         options: &Options,
@@ -68,7 +68,7 @@ impl Network {
         Ok((named(&moved), DatumColumns { b, t, ..columns }))
     }
 
-    /// What takes part of the whole network.
+    /// Returns the active parts of the whole network.
     pub(super) fn select_whole(
         &self,
         middle: Option<[f64; 3]>,
@@ -82,7 +82,7 @@ impl Network {
 }
 
 impl Assembled {
-    /// What each unknown belongs to.
+    /// Returns the name of each parameter.
     fn names(&self) -> Vec<UnknownName> {
         let model = &self.problem.model;
         let mut names = vec![[0; 3]; self.problem.initial.len()];
@@ -100,7 +100,7 @@ impl Assembled {
         names
     }
 
-    /// Where named unknowns stand; None where one is not there.
+    /// Returns the indices of named parameters; None if one is missing.
     fn places_of(&self, names: &[UnknownName]) -> Option<Vec<usize>> {
         let own = self.names();
         let order = order(own.len(), &|a, b| own[a].cmp(&own[b]));
@@ -110,16 +110,16 @@ impl Assembled {
 }
 
 impl Node {
-    /// What each unknown of a state belongs to.
+    /// Returns the name of each parameter of a state.
     pub fn names(&self) -> Vec<UnknownName> {
         self.assembled().names()
     }
 
-    /// Reduces right-hand sides over the unknowns of a state, one after the other: B of what is at home here, with what nodes below have
-    /// left. What is left for the outer unknowns, one right-hand side after the other, and the share of the node in B^T Q B, row by row.
+    /// Reduces right-hand sides over a state (B of this node), with the contributions of child nodes. Returns the right-hand sides of outer
+    /// parameters, and the node's share of B^T Q B, row by row.
     ///
     /// # Errors
-    /// Another number of unknowns, an interruption, no memory.
+    /// A wrong number of parameters, an interruption, insufficient memory.
     pub fn reduce_rights(
         &self,
         formed: &mut FormedNode,
@@ -136,10 +136,10 @@ impl Node {
         Ok((reduced.left(), reduced.products.clone()))
     }
 
-    /// Solves for all unknowns where right-hand sides were reduced, W of the outer ones being given; once.
+    /// Solves the reduced right-hand sides for all parameters, given W of the outer ones; only once.
     ///
     /// # Errors
-    /// Another number of unknowns, nothing that was reduced, an interruption, no memory.
+    /// A wrong number of parameters, a missing reduction, an interruption, insufficient memory.
     pub fn solve_reduced_rights(
         &self,
         formed: &mut FormedNode,

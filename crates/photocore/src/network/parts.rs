@@ -1,14 +1,14 @@
-//! What of a network hangs together.
+//! Connected components of a network.
 
-/// Photos that hang together by points and observations; a shared camera does not join them.
+/// Photos connected by points and observations; a shared camera does not connect them.
 #[derive(Debug)]
 pub(super) struct Part {
     pub photos: Vec<usize>,
-    /// The one to hold: what the user says or has placed, else that with most images.
+    /// Photo of the preferred datum: chosen by the user or by fixed positions, else the one with most images.
     pub central: usize,
 }
 
-/// The parts of a network that have photos with images, the largest first, and the part of each photo, point and common unknown.
+/// Components of a network that contain images, the largest first, and the component of each photo, point and shared parameter.
 #[derive(Debug)]
 pub(super) struct Parts {
     pub all: Vec<Part>,
@@ -17,13 +17,13 @@ pub(super) struct Parts {
     pub of_common: Vec<Option<usize>>,
 }
 
-/// Shifts along, rotations about the axes of cartesian space, and scale.
+/// Number of datum parameters: translations, rotations about Cartesian axes, and scale.
 pub(super) const MOTIONS: usize = 7;
 
-/// Parts that are given a datum at the most: a network in more of them is a mistake.
+/// Maximum number of components with a datum: a network with more of them is assumed to be a mistake.
 pub(super) const MOST_PARTS: usize = 8;
 
-/// Joins what hangs together.
+/// Disjoint sets of nodes (union-find).
 pub(super) struct Joined(pub Vec<usize>);
 
 impl Joined {

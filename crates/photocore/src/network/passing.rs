@@ -1,4 +1,4 @@
-//! Images that pass more than pose and camera: their blocks, and the equations there.
+//! Equations of images with corrections after projection, and their blocks.
 
 use std::ops::Range;
 
@@ -18,34 +18,34 @@ use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
 use crate::parallel;
 
-/// How far an image may move, in distances of knots, before it depends on others than those that it may step with.
+/// Distance, in knot spacings, that an image may move before other knots become active.
 const MARGIN: f64 = 0.5;
-/// Leads rows to themselves.
+/// Identity transformation of rows.
 const UNIT: Matrix2 = [[1.0, 0.0], [0.0, 1.0]];
-/// An image amid the frame: what is observed minus computed of it is the place that is computed, taken off.
+/// Image at zero: its residual is the negative computed position.
 const NOWHERE: Image = Image { photo: 0, point: 0, xy: [0.0; 2], sd: [1.0; 2] };
 
-/// Where the columns of a block are among those that an image has in common with others; None of the main block.
+/// First column of a block among the shared columns of an image; None for the main block.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     block: usize,
     first: Option<usize>,
 }
 
-/// Where the columns of an image that passes something stand: in the main block those of pose and camera first; beside it those of other
-/// blocks of the pose, of what it passes, of the camera.
+/// Column layout of an image with corrections. The main block begins with pose and camera. The shared columns are other blocks of the pose,
+/// blocks of the corrections, and the camera.
 pub(super) struct Columns {
     slots: SmallVec<[Slot; 32]>,
-    /// How many pose and camera have in the main block.
+    /// Number of columns of pose and camera in the main block.
     main: usize,
-    /// How many other blocks of the pose have, where those of the camera begin, and how many there are.
+    /// Number of columns of other pose blocks, first column of the camera, and total number.
     poses: usize,
     camera: usize,
     all: usize,
 }
 
 impl Columns {
-    /// Adds the partials of the computed position by one of the unknowns at a place.
+    /// Adds the partials of the computed position by one parameter.
     #[inline]
     fn add(&self, rows: &mut GroupRows<'_>, place: InBlock, k: usize, by: [f64; 2]) {
         if let Some(slot) = self.slot(place.block, 0) {
@@ -53,7 +53,7 @@ impl Columns {
         }
     }
 
-    /// The slot of a block, looked for from some slot on.
+    /// Returns the slot of a block, searching from slot `from` on.
     #[inline]
     fn slot(&self, block: usize, from: usize) -> Option<usize> {
         let is_it = |slot: &Slot| slot.block == block;
@@ -61,7 +61,7 @@ impl Columns {
         after.iter().position(is_it).map(|place| from + place).or_else(|| before.iter().position(is_it))
     }
 
-    /// Adds the partials of the computed position by an unknown of the block of a slot.
+    /// Adds the partials of the computed position by a parameter of the block of a slot.
     #[inline]
     fn add_at(&self, rows: &mut GroupRows<'_>, slot: usize, k: usize, by: [f64; 2]) {
         let (to, start) = match self.slots[slot].first {
@@ -72,7 +72,7 @@ impl Columns {
         (0..2).for_each(|row| to[width * row + start + k] += by[row]);
     }
 
-    /// Makes room for the equations of pose, point and camera alone of so many images.
+    /// Allocates equations of pose, point and camera for `count` images.
     fn with_plain(&self, count: usize, take: impl FnOnce(&mut GroupRows<'_>)) {
         let beside = self.poses + self.all - self.camera;
         let ends = [1, 3, self.main, beside].map(|width| 2 * count * width);
@@ -83,7 +83,7 @@ impl Columns {
         take(&mut GroupRows { constant, local, retained, shared });
     }
 
-    /// Puts the equations of pose, point and camera where they belong, their rows led by `by`; all others are zero.
+    /// Copies the equations of pose, point and camera to their columns, multiplied by `by`; all others are zero.
     fn spread(&self, plain: &GroupRows<'_>, by: &Matrix2, rows: &mut GroupRows<'_>) {
         let beside = plain.shared.len() / 2;
         lead(by, (&*plain.local, 0..3), (&mut *rows.local, 0));
@@ -95,7 +95,7 @@ impl Columns {
     }
 }
 
-/// Two rows of columns, led by a matrix, to columns from another one on.
+/// Multiplies two rows of columns by a matrix and writes them from column `first` on.
 #[inline(always)]
 fn lead(by: &Matrix2, (from, columns): (&[f64], Range<usize>), (to, first): (&mut [f64], usize)) {
     let ((x, y), width) = (from.split_at(from.len() / 2), to.len() / 2);
@@ -107,15 +107,14 @@ fn lead(by: &Matrix2, (from, columns): (&[f64], Range<usize>), (to, first): (&mu
 }
 
 impl Bundle {
-    /// The common unknowns that an image steps with by what it passes.
+    /// Returns the shared parameters of the corrections of an image.
     fn passed_by(&self, image: usize) -> Own {
         let photo = self.images[image].photo;
         let columns = splined(&self.cameras[photo]).map_or(0, SplinedStereographic::columns);
         self.passages.commons((image, photo, self.point_of(image)), columns)
     }
 
-    /// Finds the knots that images may step with, from where points and photos stand at given values of the unknowns, and counts which common
-    /// unknowns they step with by what they pass.
+    /// Determines the active knots of all images at given parameter values, and counts the images that depend on each shared parameter.
     pub(super) fn open_windows(&mut self, unknowns: &[f64]) {
         if !self.passages.lenses().is_empty() {
             let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
@@ -124,7 +123,7 @@ impl Bundle {
         if self.passages.is_empty() {
             return;
         }
-        // How many images of each photo pass the same, and one of them.
+        // Number of images with equal corrections by photo, and one of them.
         let mut alike = vec![(0, 0); self.cameras.len()];
         let mut passing = vec![];
         for (index, image) in self.images.iter().enumerate() {
@@ -139,14 +138,14 @@ impl Bundle {
         }
     }
 
-    /// Whether all images of a photo have the same retained blocks, whatever the point and where they are.
+    /// Returns true if all images of a photo have the same retained blocks, independent of point and position.
     pub(super) fn pass_alike(&self, photo: usize) -> bool {
         let cells = || self.passages.film(photo).is_some_and(FilmOf::has_cells);
         let apart = || self.passages.have_figures() || self.passages.lens(photo).is_some() || cells();
         !self.mounts.are_timed(photo) && (self.passages.is_empty() || !apart())
     }
 
-    /// How many images there are of which the knots are others than those that they may step with.
+    /// Returns the number of images whose knots are outside their active knots.
     pub(super) fn beyond_windows(&self, unknowns: &[f64]) -> usize {
         if self.passages.lenses().is_empty() {
             return 0;
@@ -159,7 +158,7 @@ impl Bundle {
         patches.iter().enumerate().filter(is_beyond).count()
     }
 
-    /// Takes something of each image with a lens of knots, by its camera and by what that sees of the point.
+    /// Evaluates `take` for each image with a spline lens, given its camera and the point in camera axes.
     fn of_seen<T: Send>(
         &self,
         unknowns: &[f64],
@@ -180,7 +179,7 @@ impl Bundle {
         parallel::map(self.points.len(), 64, of_point).into_iter().flatten().collect()
     }
 
-    /// The retained blocks of these, each once, without the main one.
+    /// Returns the distinct retained blocks of the corrections of an image, without the main one.
     pub(super) fn blocks_of_passages(&self, image: usize) -> SmallVec<[usize; 32]> {
         let mut blocks = SmallVec::new();
         if self.passages.is_empty() {
@@ -198,7 +197,7 @@ impl Bundle {
         blocks
     }
 
-    /// Where the columns of an image that passes something stand; it has so many in common with others.
+    /// Returns the column layout of an image with `all` shared columns.
     fn columns(&self, image: usize, all: usize) -> Columns {
         let (photo, block) = (self.images[image].photo, self.main_block(image));
         let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block, first: None }];
@@ -215,7 +214,7 @@ impl Bundle {
         Columns { slots, main, poses, camera, all }
     }
 
-    /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
+    /// Writes the equations of an image with corrections, starting from the equations of pose, point and camera.
     pub(super) fn observe_passing(
         &self,
         at: (&Stations, &Bent),
@@ -232,7 +231,7 @@ impl Bundle {
         });
     }
 
-    /// Writes the equations of images of one photo side by side, all of which touch the same blocks; false where there is no such way.
+    /// Writes the equations of images of one photo with equal blocks in one batch; returns false if this is impossible.
     pub(super) fn observe_all_passing(
         &self,
         at: (&Stations, &Bent),
@@ -262,7 +261,7 @@ impl Bundle {
         true
     }
 
-    /// Writes the equations of pose, point and camera alone of images of one photo, in lanes; false where that cannot be.
+    /// Writes the equations of pose, point and camera of images of one photo by SIMD; returns false if this is impossible.
     fn place_in_lanes(
         &self,
         (stations, bent): (&Stations, &Bent),
@@ -284,7 +283,7 @@ impl Bundle {
             })
     }
 
-    /// Writes the equations of an image from those of pose, point and camera alone.
+    /// Writes the equations of an image, given the equations of pose, point and camera.
     fn pass(
         &self,
         (stations, bent): (&Stations, &Bent),
@@ -316,7 +315,7 @@ impl Bundle {
         });
     }
 
-    /// Finds in which cells of patterns images are, at the values that are given.
+    /// Determines the pattern cells of all images at the given values.
     pub(super) fn find_cells(&mut self) {
         let grid = |photo| self.passages.film(photo).is_some_and(FilmOf::has_cells);
         if !(0..self.cameras.len()).any(grid) {
@@ -330,7 +329,7 @@ impl Bundle {
         self.passages.cells = self.images.iter().map(cell).collect();
     }
 
-    /// The partials by the knots of a lens.
+    /// Adds the partials by the knots of a lens.
     fn step_knots(
         &self,
         (stations, bent): (&Stations, &Bent),
@@ -357,7 +356,7 @@ impl Bundle {
         }
     }
 
-    /// The partials by the numbers of a figure: by the point, times how that is shifted.
+    /// Adds the partials by the parameters of a figure: the partials by the point times its displacement vectors.
     fn step_figure(&self, local: usize, columns: &Columns, rows: &mut GroupRows<'_>) {
         let Some((figure, k)) = self.passages.figure(local) else { return };
         let Some(place) = self.blocks.of_common[figure.common] else { return };
@@ -368,8 +367,8 @@ impl Bundle {
         }
     }
 
-    /// The coordinates of a point that a figure shifts, and the cofactors that it has by it; None of all others. `unknowns` are those of all
-    /// stations.
+    /// Returns coordinates and cofactors of a point that a figure displaces; None for others. `unknowns` contains the parameters of
+    /// [`Bundle::of_stations`].
     pub(super) fn shifted(
         &self,
         point: usize,
@@ -382,7 +381,7 @@ impl Bundle {
         let own = cofactors.map(|all| self.cofactors_of_common(all, figure.common));
         let found = match own {
             None => Matrix3::repeat(f64::NAN),
-            // Of numbers that are known.
+            // Fixed parameters of the figure.
             Some(own) if own.is_empty() => Matrix3::zeros(),
             Some(own) => shifts * own.fixed_view::<2, 2>(0, 0) * shifts.transpose(),
         };
@@ -390,12 +389,12 @@ impl Bundle {
     }
 }
 
-/// Whether a camera has a place in its frame for what it sees, nothing being measured.
+/// Returns true if a camera projects without a measured image.
 fn is_forward<C: CameraModel>(_: &C) -> bool {
     C::LENS == LensDirection::Forward
 }
 
-/// A camera as one with a spline; None of all others.
+/// Returns a camera with a spline; None for others.
 fn splined(camera: &Camera) -> Option<&SplinedStereographic> {
     match camera {
         Camera::SplinedStereographic(own) => Some(own),

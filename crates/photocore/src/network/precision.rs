@@ -1,4 +1,4 @@
-//! Values that double precision holds too coarsely.
+//! Values too large for double precision.
 
 use super::error::Coarse;
 use super::median::median;
@@ -9,41 +9,41 @@ use super::{Network, Start};
 use crate::geometry::PoseNumbers;
 use crate::parallel;
 
-/// The square of a larger coordinate, or the product of its partials, is not a number.
+/// Maximum coordinate for which its square, or the product of its partials, is finite.
 const LARGEST: f64 = 1e100;
-/// The weight that belongs to a smaller standard deviation is not one either.
+/// Minimum standard deviation for which its weight is finite.
 const SMALLEST: f64 = 1e-100;
 
-/// Refuses photos, ascending, and points that are too coarse.
+/// Returns an error with the given photos (ascending) and points, if there are any.
 ///
 /// # Errors
-/// There are any.
+/// At least one photo or point is given.
 fn refuse(photos: impl Iterator<Item = usize>, points: impl Iterator<Item = usize>) -> Result<(), Coarse> {
     let (photos, mut points): (Vec<usize>, Vec<usize>) = (photos.collect(), points.collect());
     points.sort_unstable();
     if photos.is_empty() && points.is_empty() { Ok(()) } else { Err(Coarse { photos, points }) }
 }
 
-/// By how much rounding may have changed a number: half its distance from the next one, and more than would give no weight.
+/// Returns the rounding error of a number: half the distance to the next one, but at least [`SMALLEST`].
 fn rounding(value: f64) -> f64 {
     ((value.abs().next_up() - value.abs()) / 2.0).max(SMALLEST)
 }
 
-/// Whether a value cannot be computed with; or counts as an observation, and is rounded by more than its standard deviation.
+/// Returns true if a value is too large, or is an observation with a rounding error above its standard deviation.
 fn is_coarse(value: f64, sd: f64) -> bool {
     value.abs() > LARGEST || sd > 0.0 && sd.is_finite() && rounding(value) > sd
 }
 
-/// Whether rounding has changed a value by more than what shows; `shown` may be infinite or NaN where that is not known.
+/// Returns true if the rounding error of a value exceeds `shown`, which may be infinite or NaN if it is undefined.
 fn is_coarser(value: f64, shown: f64) -> bool {
     shown < rounding(value)
 }
 
 impl Network {
-    /// Refuses photos and points whose values rounding has changed by more than their standard deviations; of those that take part.
+    /// Returns an error for active photos and points whose rounding errors exceed their standard deviations.
     ///
     /// # Errors
-    /// There are any.
+    /// At least one rounding error is too large.
     pub(super) fn check_rounding(
         &self,
         selected: &Selected,
@@ -64,11 +64,11 @@ impl Network {
         refuse(photos.filter(photo), points.into_iter())
     }
 
-    /// Refuses photos and points whose values rounding has changed by more than image coordinates show: their standard deviation
-    /// as an angle, and that at the distance of the points from the photos. `model` has the images that take part.
+    /// Returns an error for photos and points whose rounding errors are visible in image coordinates. The limits are the image precision as
+    /// an angle, and its length at the distance of the points. `model` has the active images.
     ///
     /// # Errors
-    /// There are any.
+    /// At least one rounding error is too large.
     pub(super) fn check_resolution(
         &self,
         selected: &Selected,
@@ -80,12 +80,12 @@ impl Network {
         for image in &model.images {
             smallest[image.photo] = smallest[image.photo].min(image.sd[0]).min(image.sd[1]);
         }
-        // Principal distances may be unknowns, and as wrong as anything: each says of its photo only, the median of the points.
+        // Principal distances may be wrong parameters: each affects only its own photo, their median the points.
         let angle = |photo: usize| smallest[photo] / self.cameras[self.photos[photo].camera].camera.scale();
         let used = (0..self.photos.len()).filter(|&photo| smallest[photo].is_finite());
         let middle_angle = median(used.map(angle).collect()).unwrap_or(f64::INFINITY);
         let distance = distance.unwrap_or(f64::INFINITY);
-        // Coordinates in the units of a length: those of geographic space stand on the ground at their distance from its centre.
+        // Coordinates are compared in units of length; geographic ones are converted to Cartesian ones.
         let too_far = |coordinates: [f64; 3], angle: f64| {
             self.space.cartesian(coordinates).iter().any(|&value| is_coarser(value, angle * distance))
         };
@@ -106,8 +106,8 @@ impl Network {
 }
 
 impl Bundle {
-    /// Median distance of the points from their first photos, at the given coordinates; of the photos from the origin where there
-    /// are none.
+    /// Returns the median distance of the points from their first photos at given coordinates; of the photos from the origin without
+    /// coordinates.
     pub(super) fn middle_distance(
         &self,
         photos: &[Station],

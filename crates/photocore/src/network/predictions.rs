@@ -1,4 +1,4 @@
-//! What is out of a network that is tried against what the rest predicts of it, and R of all observations of a point.
+//! Comparison of excluded observations with their prediction by the others, and residual cofactors of points.
 
 use std::collections::HashMap;
 
@@ -12,42 +12,42 @@ use crate::Threads;
 use crate::adjustment::{Leverages, Terms, TieCofactors, weighted};
 use crate::normals::{LocalCofactors, dot};
 
-/// What is out against what the rest predicts of it.
+/// Excluded rows of an observation compared with their prediction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// d^T C^-1 d: chi-square with as many degrees of freedom as there are rows out.
+    /// d^T C^-1 d: chi-square distributed, with one degree of freedom per excluded row.
     pub statistic: f64,
-    /// Rows that are out.
+    /// Excluded rows.
     pub rows: Vec<usize>,
-    /// Observed minus predicted of each, and its standard deviation (a priori unit weight), in the unit of the observation.
+    /// Observed minus predicted values and their standard deviations (a priori unit weight), in the unit of the observation.
     pub error: Vec<f64>,
     /// See [`Prediction::error`].
     pub error_sd: Vec<f64>,
 }
 
-/// The observations of one point, that of its coordinates and all its images.
+/// Observations of one point: its coordinates and all its images.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OnPoint {
-    /// The suspects, each with its number of rows.
+    /// Test groups, with their rows in this order.
     pub suspects: Vec<usize>,
-    /// Residuals of unit weight.
+    /// Whitened residuals.
     pub residual: Vec<f64>,
-    /// R: their cofactors, square, row by row.
+    /// Cofactors R of the residuals, square, row by row.
     pub cofactors: Vec<f64>,
 }
 
-/// Cofactors about some suspects: of the observations of local points, of ties.
+/// Cofactors near some groups: observations of local points, and ties.
 pub(super) struct Around {
     pub(super) points: HashMap<usize, LocalCofactors>,
     pub(super) ties: HashMap<usize, TieCofactors>,
 }
 
 impl Trial {
-    /// Tests what is out of some suspects against what the rest predicts (Cook and Weisberg 1982): with d observed minus predicted and
-    /// C = S + a Q a^T its cofactors, d^T C^-1 d. None where nothing is out, or its unknowns are.
+    /// Tests excluded rows against their prediction by the others (Cook and Weisberg 1982): d^T C^-1 d, with d observed minus predicted and
+    /// its cofactors C = S + a Q a^T. None without excluded rows, or if the parameters of the group are excluded.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Predictions before any adjustment.
     pub fn predictions(
         &self,
         suspects: &[usize],
@@ -83,7 +83,7 @@ impl Trial {
         Ok(suspects.iter().map(predict).collect())
     }
 
-    /// Cofactors of all that some suspects touch.
+    /// Returns the cofactors of all objects of some groups.
     pub(super) fn around(
         &self,
         suspects: &[usize],
@@ -133,7 +133,7 @@ impl Trial {
         Some(Prediction { statistic, rows: out.to_vec(), error, error_sd })
     }
 
-    /// Whether the unknowns of a suspect are out with it: held where they were not given so.
+    /// Returns true if the parameters of a group are excluded with it: fixed now, but not in the input.
     fn is_gone(&self, suspect: &Suspect) -> bool {
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
         let gone = |unknowns: std::ops::Range<usize>| {
@@ -150,15 +150,15 @@ impl Trial {
         }
     }
 
-    /// R of all observations of some points together; empty for points that observations beside images touch.
+    /// Returns R of all observations of some points; empty for points with additional observations.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Predictions before any adjustment.
     pub fn on_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         self.on_points_above(points, 0.0, threads)
     }
 
-    /// The same where correlations by more than a limit are asked for: what cannot be correlated as much with anything may be NaN with others.
+    /// Returns R if only correlations above a limit are required: elements of weaker pairs may be NaN.
     pub(super) fn on_points_above(
         &self,
         points: &[usize],
@@ -187,11 +187,11 @@ impl Trial {
         Ok(points.iter().map(of).collect())
     }
 
-    /// The same of points that are out with all that was observed of them, as if they took part: each by itself against the photos as
-    /// the others determine them. Empty also for points that their rays do not determine.
+    /// Returns R of excluded points, as if they were active: each one alone, given photos determined by the others. It is empty also for
+    /// points that their rays do not determine.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Predictions before any adjustment.
     pub fn on_gone_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let given = (&self.observation_sd[..], &self.sd[..]);
@@ -213,12 +213,12 @@ impl Trial {
         Ok(points.iter().map(of).collect())
     }
 
-    /// The place of a point in the model, where no observation beside images touches it.
+    /// Returns the index of a point in the model, unless it has additional observations.
     fn local(&self, point: usize) -> Option<usize> {
         self.place.get(point).copied().flatten().filter(|&place| place < self.assembled.problem.model.locals)
     }
 
-    /// The equations of the coordinates of a local point that are observations themselves.
+    /// Returns the equations of observed coordinates of a local point.
     fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<f64> {
         let mut own = self.on_place[place].iter().map(|&index| &self.suspects.all[index]);
         let Some(suspect) = own.find(|suspect| matches!(suspect.home, Home::Point(_))) else { return vec![] };
@@ -226,7 +226,7 @@ impl Trial {
         self.term_rows(suspect, &all, terms).transpose().as_slice().to_vec()
     }
 
-    /// The place of each row of the suspects at a local point among its equations, and how much each is off, of unit weight.
+    /// Returns the equation index of each row of the groups at a local point, and its whitened misclosure.
     fn rows_at(
         &self,
         place: usize,

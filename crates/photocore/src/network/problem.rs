@@ -1,5 +1,5 @@
-//! The least-squares problem of a network: points are local blocks of three, photos retained blocks of six and their own cameras', cameras
-//! that several photos share and common unknowns blocks of their own; points that observations touch are retained blocks of three.
+//! Least-squares problem of a network. Points are local blocks of three. Retained blocks are photos with their own cameras, shared cameras,
+//! shared parameters, and points with additional observations.
 
 use super::layout::layout;
 use super::median::median;
@@ -15,40 +15,40 @@ use crate::geometry::{POSE, PoseNumbers};
 use crate::normals::{System, TieRows};
 use crate::{Threads, parallel};
 
-/// A problem, and what its parts are in the network.
+/// A problem, and the indices of its parts in the network.
 #[derive(Debug)]
 pub(super) struct Assembled {
     pub problem: Problem<Bundle>,
-    /// The points that take part, in the order of the model.
+    /// Active points, in the order of the model.
     pub points: Vec<usize>,
-    /// Those that do not.
+    /// Excluded points and photos, with reasons.
     pub dropped: Vec<Dropped>,
-    /// The photos that stay where they are because their images do not determine them.
+    /// Photos that are fixed because their images do not determine them.
     pub loose: Vec<usize>,
 }
 
-/// Values from which an adjustment goes on: of all points, and of the unknowns of photos and shared cameras.
+/// Adjusted values of all points and retained blocks, to continue an adjustment.
 pub(super) struct Reached {
     points: Vec<[f64; 3]>,
     stations: Vec<f64>,
 }
 
 impl Assembled {
-    /// The place in the model of each of so many points, where it takes part.
+    /// Returns, for each of `points` points, its index in the model; None if it is excluded.
     pub fn places(&self, points: usize) -> Vec<Option<usize>> {
         let mut place = vec![None; points];
         self.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
         place
     }
 
-    /// Those of some points that take part, each with its place in the model.
+    /// Returns the active ones of some points, each with its index in the model.
     pub fn taking_part(&self, points: &[usize]) -> Vec<(usize, usize)> {
         let count = self.points.iter().chain(points).max().map_or(0, |last| last + 1);
         let place = self.places(count);
         points.iter().filter_map(|&point| Some((point, place[point]?))).collect()
     }
 
-    /// Refuses what takes more memory than it may.
+    /// Returns an error if the problem needs more memory than the options allow.
     pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
         let needed = options.reserved + self.problem.system.memory();
         match options.memory {
@@ -57,20 +57,20 @@ impl Assembled {
         }
     }
 
-    /// Whether there is room for what tests of groups need besides.
+    /// Returns true if the memory also suffices for group tests.
     pub fn may_keep(&self, options: &Options) -> bool {
         let system = &self.problem.system;
         let needed = options.reserved + system.memory() + system.memory_of_groups();
         options.memory.is_none_or(|available| needed <= available)
     }
 
-    /// Squares of the distances of all points from the nearest station that sees them, at the first values, and their median.
+    /// Returns the squared distance of each point from its nearest station at the initial values, and the median.
     pub fn first_distances(&self) -> Option<(Vec<f64>, f64)> {
         let squares = self.nearest_stations(&self.problem.initial);
         median(squares.clone()).map(|middle| (squares, middle))
     }
 
-    /// The same at given values.
+    /// Returns the squared distance of each point from its nearest station at given values.
     pub fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
         let model = &self.problem.model;
         let photos = model.photos(&unknowns[model.of_stations()]);
@@ -83,7 +83,7 @@ impl Assembled {
         model.coordinates(unknowns).zip(model.point_images.start.windows(2)).map(of_point).collect()
     }
 
-    /// Begins where an adjustment has ended.
+    /// Replaces the initial values by an adjusted state.
     pub fn go_on_from(&mut self, state: &State) -> Result<(), NetworkError> {
         if state.unknowns.len() != self.problem.initial.len() {
             return Err(NetworkError::State);
@@ -92,7 +92,7 @@ impl Assembled {
         Ok(())
     }
 
-    /// Takes over adjusted unknowns; `count` is the number of all points.
+    /// Returns the adjusted values for a continued adjustment; `count` is the number of all points.
     pub fn reached(&self, unknowns: &[f64], count: usize) -> Reached {
         let model = &self.problem.model;
         let mut all = vec![[f64::NAN; 3]; count];
@@ -102,10 +102,10 @@ impl Assembled {
 }
 
 impl Network {
-    /// The problem of the network without what is left out, from the initial values on or from those reached.
+    /// Returns the problem without excluded points, at the initial or the reached values.
     ///
     /// # Errors
-    /// Those of [`Network::assemble`]; nothing is left, or it takes more memory than it may.
+    /// Errors of [`Network::assemble`]; no point remains; memory is insufficient.
     pub(super) fn assembled(
         &self,
         options: &Options,
@@ -122,7 +122,7 @@ impl Network {
         Ok(assembled)
     }
 
-    /// The problem whose solution a state is, at its initial values.
+    /// Returns the problem of an adjusted state, at its initial values.
     pub(super) fn assembled_again(
         &self,
         options: &Options,
@@ -144,10 +144,10 @@ impl Network {
         Ok(assembled)
     }
 
-    /// The problem of the points that take part, from the initial values on or from those reached.
+    /// Returns the problem of the selected points, at the initial or the reached values.
     ///
     /// # Errors
-    /// Values that double precision holds too coarsely, points that have no start, more than can be numbered.
+    /// Values too large for double precision, points without intersection, too many parameters.
     pub(super) fn assemble(
         &self,
         options: &Options,
@@ -170,7 +170,7 @@ impl Network {
         let mut model = self.bundle(&mut selected, images, images_on, middle)?;
         model.datum.minimum = options.minimum;
         model.screens = options.screens;
-        // The programs of their time stepped in angles.
+        // The classic methods step in angles.
         if !matches!(options.adjustment.method, Method::Full(_)) {
             let turns = |photo: usize| self.turns(photo) && !unused(photo) && !model.is_carried(photo);
             model.turning = (0..self.photos.len()).map(turns).collect();
@@ -190,7 +190,7 @@ impl Network {
             Some(reached) => selected.points.iter().map(|&point| reached.points[point]).collect(),
             None => self.start(options.start, &selected, &model, &placed)?,
         };
-        // Local points, photos and shared cameras, points that observations touch.
+        // Order: local points, photos and shared cameras, points with additional observations.
         let locals = model.locals;
         let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
             let (local, tied) = points.split_at(locals);
@@ -227,7 +227,7 @@ impl Network {
         Ok(Assembled { problem, points: selected.points, dropped: selected.dropped, loose: selected.loose })
     }
 
-    /// Which photos take part: a frame does when a photo on it does.
+    /// Returns which photos are active; a frame is active if a photo on it is.
     fn used(&self, images_on: &[usize]) -> Vec<bool> {
         let mut used: Vec<bool> = images_on.iter().map(|&images| images > 0).collect();
         let on_frames = self.mounts.iter().filter_map(|mount| Some((mount.frame()?, mount.photo())));
@@ -235,7 +235,7 @@ impl Network {
         used
     }
 
-    /// Where the retained blocks are, for an ordering by place; `tied` are the points that are not local.
+    /// Returns the positions of the retained blocks for an ordering by position; `tied` are the points that are not local.
     fn places(&self, model: &Bundle, stations: &[Station], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let centres: Vec<[f64; 3]> =
             stations.iter().map(|station| station.orientation.centre().into()).collect();
@@ -245,7 +245,7 @@ impl Network {
         [centres, cameras, commons, tied].concat()
     }
 
-    /// Refuses observations that cannot be computed from the initial values.
+    /// Returns an error for observations without finite values at the initial values.
     fn check_observations(&self, problem: &Problem<Bundle>) -> Result<(), NetworkError> {
         let model = &problem.model;
         if model.observations.is_empty() {
@@ -266,7 +266,7 @@ impl Network {
         Ok(())
     }
 
-    /// Where points start from.
+    /// Returns the initial coordinates of the points.
     fn start(
         &self,
         start: Start,
@@ -293,7 +293,7 @@ impl Network {
     }
 }
 
-/// Standard deviations of all observations; rows of those beside images are weighted already.
+/// Returns the standard deviations of all observations; rows of additional observations are whitened (1).
 fn observation_sd(model: &Bundle) -> Vec<f64> {
     let mut of_images = vec![[0.0; 2]; model.images.len()];
     parallel::each_chunk(&mut of_images, TOGETHER, &|part, own| {

@@ -1,7 +1,7 @@
-//! What single observations have to do with everything else: columns of R, effects on chosen unknowns, the unknown that an error moves most.
-//! Each takes a solution of the normal equations.
+//! Effects of single observations: columns of R, effects on chosen parameters, and the parameter that an error changes most. Each requires
+//! a solution of the normal equations.
 //!
-//! What errors of single observations do to their own points and photos, and which of them cannot be told apart.
+//! Effects of errors of single observations on their own points and photos, and inseparable observations.
 
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
@@ -20,49 +20,49 @@ use crate::adjustment::{
 use crate::geometry::{AttitudeNumbers, Matrix3};
 use crate::{Threads, parallel};
 
-/// Right-hand sides at a time.
+/// Number of right-hand sides per batch.
 const TOGETHER: usize = 16;
 
-/// What an unknown belongs to.
+/// Owner of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UnknownOf {
-    /// One of the six numbers of a photo's pose, or a parameter of its own camera after these.
+    /// Photo: one of its six pose parameters, then a parameter of its own camera.
     Photo(usize),
-    /// A parameter of a camera that several photos share.
+    /// Shared camera.
     Camera(usize),
-    /// A component of a common unknown.
+    /// Shared parameter.
     Common(usize),
-    /// A coordinate of a point.
+    /// Point: one of its coordinates.
     Point(usize),
 }
 
-/// The unknown that an error moves most, in its standard deviations.
+/// Parameter that an error changes most, in its standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moved {
-    /// What it belongs to.
+    /// Owner of the parameter.
     pub of: UnknownOf,
-    /// Its number there.
+    /// Number of the parameter there.
     pub component: usize,
-    /// By how much an error of one standard deviation moves it, in its unit.
+    /// Change by an error of one standard deviation, in the unit of the parameter.
     pub effect: f64,
-    /// The same in its standard deviations (a priori unit weight).
+    /// Change in standard deviations of the parameter (a priori unit weight).
     pub in_sd: f64,
 }
 
 impl Covariances {
-    /// The groups of observations of the network, in the order of all tests.
+    /// Returns the test groups of the network, in the order of all tests.
     pub fn suspects(&self) -> &Arc<Suspects> {
         let new = || Suspects::new(&self.assembled, self.images, &|photo| self.camera_of_photo[photo]);
         self.suspects.get_or_init(|| Arc::new(new()))
     }
 
-    /// What errors of one standard deviation in every row of [`Covariances::suspects`] do to functions of the unknowns: for each function
-    /// a number for each row.
+    /// Returns the effects of errors of one standard deviation in every row of [`Covariances::suspects`] on functions of the parameters:
+    /// one number per function and row.
     ///
-    /// `partials`: of each function by the unknowns of what `of` names, as in [`Covariances::propagate`].
+    /// `partials`: partials of each function by the parameters of `of`, as in [`Covariances::propagate`].
     ///
     /// # Errors
-    /// Those of [`Covariances::propagate`].
+    /// Errors of [`Covariances::propagate`].
     pub fn influences(
         &self,
         partials: &[f64],
@@ -83,11 +83,11 @@ impl Covariances {
 }
 
 impl Trial {
-    /// The columns of R that belong to the rows of some suspects: for each of these rows the cofactors of its residual with those of all
-    /// rows of all suspects, one after the other.
+    /// Returns the columns of R for the rows of some groups: the cofactors of their residuals with the residuals of all rows of all groups,
+    /// column by column.
     ///
     /// # Errors
-    /// Nothing was adjusted before; an interruption, no memory.
+    /// Responses before any adjustment; an interruption, insufficient memory.
     pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         let all = self.rows_of(0..self.suspects.all.len());
         let starts = self.suspects.row_starts();
@@ -102,10 +102,10 @@ impl Trial {
         Ok(columns)
     }
 
-    /// For each row of some suspects the unknown that an error in it moves most.
+    /// Returns, for each row of some groups, the parameter that an error in this row changes most.
     ///
     /// # Errors
-    /// Those of [`Trial::responses`].
+    /// Errors of [`Trial::responses`].
     pub fn most_moved(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<Moved>, NetworkError> {
         let rows: Vec<usize> = suspects.iter().flat_map(|&index| self.rows_of(index..index + 1)).collect();
         let turns = self.turns()?;
@@ -125,7 +125,7 @@ impl Trial {
         Ok(found)
     }
 
-    /// Hands out Q a^T of some rows a, one after the other, with all rows.
+    /// Calls `take` with Q a^T of each of some rows a, and with all rows.
     fn solutions(
         &self,
         of: &[usize],
@@ -149,12 +149,12 @@ impl Trial {
         Ok(())
     }
 
-    /// The rows of some suspects among those of [`ObservationRows`].
+    /// Returns the rows of some groups among the rows of [`ObservationRows`].
     fn rows_of(&self, suspects: Range<usize>) -> Vec<usize> {
         self.suspects.rows_of(suspects, self.assembled.problem.layout().equations()).collect()
     }
 
-    /// For each photo that steps by a rotation vector where its angles stand, and what makes steps of these of it.
+    /// Returns, for each photo that steps by a rotation vector, the index of its angles and the matrix from steps to angles.
     fn turns(&self) -> Result<Vec<(usize, Matrix3)>, NetworkError> {
         let (values, model) = (&self.found()?.values, &self.assembled.problem.model);
         let turn = |photo: usize| {
@@ -165,7 +165,7 @@ impl Trial {
         Ok((0..model.cameras.len()).filter_map(turn).collect())
     }
 
-    /// Standard deviations of all unknowns (a priori unit weight), those of angles where photos step by a rotation vector.
+    /// Returns the standard deviations of all parameters (a priori unit weight), with angles for photos that step by a rotation vector.
     fn unknown_sd(&self, turns: &[(usize, Matrix3)]) -> Result<Vec<f64>, NetworkError> {
         let (found, model) = (self.found()?, &self.assembled.problem.model);
         let mut sd = vec![0.0; found.values.len()];
@@ -187,7 +187,7 @@ impl Trial {
         Ok(sd)
     }
 
-    /// What an unknown belongs to, and its number there.
+    /// Returns the owner of a parameter, and its number there.
     fn unknown(&self, unknown: usize) -> (UnknownOf, usize) {
         let (model, points) = (&self.assembled.problem.model, &self.assembled.points);
         let stations = model.of_stations();
@@ -209,15 +209,15 @@ fn turned(step: &mut [f64], turn: &Matrix3) {
     step.copy_from_slice(angles.as_slice());
 }
 
-/// Points that a thread takes at least.
+/// Minimum number of points per thread.
 const AT_LEAST: usize = 16;
 
 impl Trial {
-    /// How an error of one standard deviation in each row of some suspects moves its own point and its own photo: for each row the three
-    /// coordinates, then the six numbers of the pose; NaN where it has none.
+    /// Returns the effects of errors of one standard deviation in each row of some groups on their own point and photo. Each row has three
+    /// coordinates and six pose parameters; NaN without point or photo.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Effects before any adjustment.
     pub fn effects(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<[f64; 9]>, NetworkError> {
         let found = self.found()?;
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
@@ -280,7 +280,7 @@ impl Trial {
         Ok(all)
     }
 
-    /// Turns steps by a rotation vector into those of the angles of a photo.
+    /// Converts rotation vector steps to changes of the angles of a photo.
     fn to_angles(&self, suspects: &[usize], values: &[f64], effects: &mut [[f64; 9]]) {
         let model = &self.assembled.problem.model;
         let mut rest = effects;
@@ -307,11 +307,10 @@ impl Trial {
         }
     }
 
-    /// Pairs of observations of one point whose tests are correlated by more than `limit`, with their correlation: errors of them cannot
-    /// be told apart.
+    /// Returns pairs of observations of one point with a correlation of their tests above `limit`: their errors are inseparable.
     ///
     /// # Errors
-    /// Nothing was adjusted before.
+    /// Tests before any adjustment.
     pub fn inseparable(
         &self,
         points: &[usize],
@@ -356,14 +355,14 @@ impl Trial {
     }
 }
 
-/// I - R of the cofactors R of some residuals.
+/// Returns the elements of I - R for cofactors R of some residuals.
 fn from_identity(cofactors: &[f64]) -> impl Iterator<Item = f64> {
     let next = cofactors.len().isqrt() + 1;
     cofactors.iter().enumerate().map(move |(k, value)| f64::from(u8::from(k % next == 0)) - value)
 }
 
 impl Bundle {
-    /// The first photo whose block a tie touches.
+    /// Returns the first photo whose block is part of a tie.
     fn photo_of_tie(&self, tie: usize) -> Option<usize> {
         let is_photo = |&block: &usize| block < self.cameras.len();
         match tie.checked_sub(self.tied_images()) {

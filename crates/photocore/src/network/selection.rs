@@ -1,4 +1,4 @@
-//! Which points take part in the adjustment.
+//! Selection of the points that take part in the adjustment.
 
 use super::state::State;
 use super::surroundings::Surroundings;
@@ -6,41 +6,41 @@ use super::{Network, NetworkError};
 use crate::parallel;
 use crate::sorting::sort_by;
 
-/// Points that a thread takes at least.
+/// Minimum number of points per thread.
 pub(super) const TOGETHER: usize = 1024;
 
-/// A point that was left out.
+/// An excluded point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dropped {
     /// Index of the point.
     pub point: usize,
-    /// Why.
+    /// Reason of the exclusion.
     pub reason: Reason,
 }
 
-/// Why a point was left out: the first three before the adjustment (GIANT guide, sections 6 and 11), the others because of it.
+/// Reason of the exclusion of a point: the first three before the adjustment (GIANT guide, sections 6 and 11), the others because of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// It has no image.
+    /// A point without images.
     NotPhotographed,
     /// A pass point on one photo only.
     PassPointOnOnePhoto,
-    /// A control point on one photo only, with more than one component not held.
+    /// A control point on one photo only, with more than one free coordinate.
     ControlPointOnOnePhoto,
-    /// The iterations have led it to the station of a photo that sees it, where it would harm all others.
+    /// The iterations have moved the point to the station of a photo that observes it, and it would harm all others.
     RanIntoStation,
-    /// Its rays do not determine it: they are parallel, or one and the same.
+    /// The rays do not determine the point: they are parallel or identical.
     NotDetermined,
-    /// Its rays do not meet before the cameras: iterations that have not converged have led it out of the network.
+    /// The rays do not intersect before the cameras: iterations without convergence have moved the point out of the network.
     RanOff,
-    /// It was given at the place of a station that sees it: no ray leads there.
+    /// The given position of the point is a station that observes it: the ray is undefined.
     AtStation,
-    /// It is held beside a station that sees it, and one of its images is wrong: the adjustment goes wrong with it, and not without.
+    /// The point is fixed or weighted near a station that observes it, and an image is wrong: the adjustment fails only with this point.
     NearStation,
 }
 
 impl Reason {
-    /// The name under which results know it.
+    /// Returns the name of the reason in results.
     pub fn name(self) -> &'static str {
         match self {
             Reason::NotPhotographed => "not photographed",
@@ -55,7 +55,6 @@ impl Reason {
     }
 }
 
-/// What an adjustment does without, by point and by photo.
 #[derive(Debug, Clone)]
 pub(super) struct LeftOut {
     pub points: Vec<bool>,
@@ -63,10 +62,10 @@ pub(super) struct LeftOut {
 }
 
 impl Network {
-    /// What does not take part: photos, and all that an adjustment has gone on without.
+    /// Returns the exclusions: the given photos, and the exclusions of an adjusted state.
     ///
     /// # Errors
-    /// A state that is not of this network.
+    /// A state of another network.
     pub(super) fn left_out(&self, photos: Vec<bool>, state: Option<&State>) -> Result<LeftOut, NetworkError> {
         let mut all = LeftOut { points: vec![false; self.points.len()], photos };
         if let Some(state) = state {
@@ -79,13 +78,12 @@ impl Network {
         Ok(all)
     }
 
-    /// Leaves out points that their images and held components cannot determine, and those that are `left_out` already.
+    /// Excludes points that their images and given coordinates cannot determine, and the points and photos of `left_out`.
     ///
-    /// A point on one photo stays when at most one of its components is not held: then there are at least four equations for
-    /// three unknowns (specification, open point 21). Points that other nodes of a larger network have unknowns of stay whatever is
-    /// seen of them here.
+    /// A point on one photo remains if at most one of its coordinates is free: then there are at least four equations for three parameters
+    /// (specification, open point 21). Points with parameters in other nodes of a larger network always remain.
     ///
-    /// Points that observations touch stand behind all others. Images on photos that are left out do not take part.
+    /// Points with additional observations are the last ones. Images on excluded photos are ignored.
     pub(super) fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
         let loose = &left_out.photos;
         let named = surroundings.points();
@@ -120,7 +118,7 @@ impl Network {
         Selected { points, locals, images, observations, dropped, loose, surroundings }
     }
 
-    /// Why a point with the given images does not take part; None where it does.
+    /// Returns the reason to exclude a point with the given images; None if it remains.
     fn reason(&self, point: usize, images: &[usize]) -> Option<Reason> {
         let first_photo = images.first().map(|&image| self.images[image].photo);
         let one_photo = images.iter().all(|&image| Some(self.images[image].photo) == first_photo);
@@ -133,7 +131,7 @@ impl Network {
         }
     }
 
-    /// Photos with unknowns that nothing touches, no image and no observation: there is nothing to find of them.
+    /// Returns the photos with free parameters that appear in neither an image nor an observation.
     pub(super) fn untouched_photos(&self) -> Vec<bool> {
         let mut untouched: Vec<bool> =
             self.photos.iter().map(|photo| photo.sd.iter().any(|sd| sd.is_infinite())).collect();
@@ -147,7 +145,7 @@ impl Network {
         untouched
     }
 
-    /// The observations whose points are all among the given ones.
+    /// Returns the observations whose points are all among the given ones.
     fn observations_of(&self, points: &[usize]) -> Vec<usize> {
         if self.observations.is_empty() {
             return vec![];
@@ -159,7 +157,7 @@ impl Network {
         (0..self.observations.len()).filter(all_there).collect()
     }
 
-    /// The images of every point, but for those on loose photos.
+    /// Returns the images of every point, without images on excluded photos.
     fn point_images(&self, loose: &[bool]) -> PointImages {
         let mut start = vec![0; self.points.len() + 1];
         let taken = |image: &super::Image| !loose[image.photo];
@@ -177,27 +175,26 @@ impl Network {
 }
 
 impl PointImages {
-    /// The images of the i-th point.
     pub fn of(&self, i: usize) -> &[usize] {
         &self.order[self.start[i]..self.start[i + 1]]
     }
 }
 
-/// What takes part, points neighbours together, and what was left out.
+/// Active objects, with neighbouring points in sequence, and exclusions.
 pub(super) struct Selected {
     pub points: Vec<usize>,
-    /// How many of them, the first, no observation touches.
+    /// Number of points without additional observations, which are the first ones.
     pub locals: usize,
     pub images: PointImages,
     pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
-    /// The photos whose images do not take part, ascending: they stay where they are.
+    /// Photos whose images are excluded, ascending: they are fixed.
     pub loose: Vec<usize>,
-    /// Where the network stands in a larger one.
+    /// Interface of the network to a larger one.
     pub surroundings: Surroundings,
 }
 
-/// The images of the points that take part, point by point: those of the i-th are `order[start[i]..start[i + 1]]`.
+/// Images of the active points, sorted by point: `order[start[i]..start[i + 1]]` lists the images of point i.
 #[derive(Debug, Default)]
 pub(super) struct PointImages {
     pub start: Vec<usize>,

@@ -1,4 +1,4 @@
-//! The adjusted network.
+//! Adjusted network.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,163 +15,162 @@ use super::{
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
 
-/// A redundancy of less is rounding.
+/// Smallest redundancy that is not attributed to rounding.
 pub const LEAST_REDUNDANCY: f64 = 1e-9;
 
-/// Weighted sums of squares, weights as the loss has changed them.
+/// Weighted sums of squares, weights as modified by the loss.
 #[derive(Debug, Clone, Copy)]
 pub struct SumsOfSquares {
-    /// Of the weighted poses and cameras of the photos.
+    /// Weighted poses, cameras and shared parameters.
     pub camera: f64,
-    /// Of the held components of control.
+    /// Weighted coordinates of control points.
     pub ground: f64,
-    /// Of the image coordinates.
+    /// Image coordinates.
     pub plates: f64,
-    /// Of the observations beside these.
+    /// Additional observations.
     pub observations: f64,
 }
 
 impl SumsOfSquares {
-    /// Of all but photos and cameras.
+    /// Returns the sum without `camera`.
     pub fn measured(&self) -> f64 {
         self.ground + self.plates + self.observations
     }
 
-    /// All together.
+    /// Returns the total.
     pub fn total(&self) -> f64 {
         self.camera + self.ground + self.plates + self.observations
     }
 }
 
-/// Sums of redundancy numbers, of what [`SumsOfSquares`] are sums of squares of.
+/// Sums of redundancy numbers, by the same groups as [`SumsOfSquares`].
 #[derive(Debug, Clone, Copy)]
 pub struct Redundancies {
-    /// Of the weighted poses, cameras and common unknowns.
+    /// Weighted poses, cameras and shared parameters.
     pub camera: f64,
-    /// Of the held components of control.
+    /// Weighted coordinates of control points.
     pub ground: f64,
-    /// Of the image coordinates.
+    /// Image coordinates.
     pub plates: f64,
-    /// Of the observations beside these.
+    /// Additional observations.
     pub observations: f64,
 }
 
 impl Redundancies {
-    /// Of all but photos and cameras.
+    /// Returns the sum without `camera`.
     pub fn measured(&self) -> f64 {
         self.ground + self.plates + self.observations
     }
 }
 
-/// Images that no camera can have taken, ascending.
+/// Physically impossible images, ascending.
 #[derive(Debug, Default)]
 pub struct Unseen {
-    /// Those whose point stands behind the camera.
+    /// Images of points behind the camera.
     pub behind: Vec<usize>,
-    /// Those beyond where the lens of their camera is one-to-one: they may belong to another direction.
+    /// Images outside the invertible area of the lens model: they may belong to another direction.
     pub folded: Vec<usize>,
 }
 
-/// What is determined weakly: what a combination of unknowns moves that no step could follow to its end, and points.
+/// Weakly determined points, and the parameters of combinations along which the iteration did not converge.
 #[derive(Debug, Default)]
 pub struct Weak {
-    /// Photo and unknown (0 to 5: pose, then camera); none where the adjustment ended otherwise, as in the next two.
+    /// Photo and parameter (0 to 5: pose, then camera); like the next two, empty unless the iteration failed in this way.
     pub photos: Vec<(usize, usize)>,
-    /// The same for cameras that several photos share, camera and parameter.
+    /// Shared camera and parameter.
     pub cameras: Vec<(usize, usize)>,
-    /// The same for common unknowns, common unknown and its number.
+    /// Shared parameter and number of its component.
     pub commons: Vec<(usize, usize)>,
-    /// The points on nearly parallel rays, or at a station's own place.
+    /// Points with nearly parallel rays, or at the position of a station.
     pub points: Vec<WeakPoint>,
 }
 
-/// The datum that an adjusted network is in.
+/// Datum of an adjusted network.
 #[derive(Debug, Default)]
 pub struct DatumInForce {
-    /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
-    /// taken from.
+    /// Parameters fixed as a minimal datum: photo and parameter. With inner constraints, the datum before the transformation.
     pub held: Vec<(usize, usize)>,
-    /// The same of coefficients of trajectories: common unknown and its number.
+    /// Fixed coefficients of trajectories: shared parameter and number of its component.
     pub held_commons: Vec<(usize, usize)>,
-    /// Relative error, by rounding, of the variances in a datum that they were taken to, about; zero otherwise.
+    /// Approximate relative rounding error of variances after a datum transformation; zero otherwise.
     pub relative_error: f64,
-    /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
+    /// Whether control and weights of poses are a minimal datum: they check nothing, and another datum may be chosen.
     pub minimal_control: bool,
 }
 
-/// Cofactors of some points with each other.
+/// Joint cofactors of several points.
 #[derive(Debug)]
 pub struct Joint {
-    /// Those that take part.
+    /// Active points.
     pub points: Vec<usize>,
-    /// (3k, 3k) of their coordinates, a priori unit weight.
+    /// Cofactors of their coordinates (3k x 3k), a priori unit weight.
     pub cofactors: DMatrix<f64>,
 }
 
-/// An adjusted network, photo by photo, point by point, image by image, as in the input.
+/// Adjusted network: results in the order of the input.
 #[derive(Debug)]
 pub struct Solution {
-    /// The photos.
+    /// Adjusted photos.
     pub photos: Vec<AdjustedPhoto>,
-    /// The cameras.
+    /// Adjusted cameras.
     pub cameras: Vec<AdjustedCamera>,
-    /// The common unknowns.
+    /// Adjusted shared parameters.
     pub commons: Vec<AdjustedCommon>,
-    /// For every iteration, the corrections of the unknowns of all photos, one photo after the other.
+    /// Corrections of the parameters of all photos in every iteration, photo by photo.
     pub photo_corrections: Vec<Vec<f64>>,
-    /// The points; None for those that were left out.
+    /// Adjusted points; None for excluded ones.
     pub points: Vec<Option<AdjustedPoint>>,
-    /// The images; None for those of points that were left out.
+    /// Adjusted images; None for images of excluded points.
     pub images: Vec<Option<Observed<2>>>,
-    /// The other observations; None for those of points that were left out.
+    /// Adjusted additional observations; None for observations of excluded points.
     pub observations: Vec<Option<AdjustedObservation>>,
-    /// The images that no camera can have taken.
+    /// Physically impossible images.
     pub unseen: Unseen,
-    /// Why there are no cofactors although they were asked for: what the adjusted values leave undetermined.
+    /// Parameters that are undetermined at the adjusted values, if cofactors were requested but do not exist.
     pub undetermined: Option<NetworkError>,
-    /// What is determined weakly.
+    /// Weakly determined parameters and points.
     pub weak: Weak,
-    /// The datum that it is in.
+    /// Datum of the solution.
     pub datum: DatumInForce,
-    /// The points that were left out, at first or because of the adjustment.
+    /// Points and photos excluded before or during the adjustment.
     pub dropped: Vec<Dropped>,
     /// Weighted sums of squares.
     pub sums_of_squares: SumsOfSquares,
-    /// Sums of redundancy numbers; None where there are no cofactors.
+    /// Sums of redundancy numbers; None without cofactors.
     pub redundancies: Option<Redundancies>,
-    /// Degrees of freedom of the chosen unit variance; not positive where there is no redundancy. Those of all observations where it is
-    /// based on redundancy numbers.
+    /// Degrees of freedom of the chosen variance of unit weight; not positive without redundancy. With [`UnitVariance::Redundancy`], all
+    /// observations count.
     pub degrees_of_freedom: i64,
-    /// Variance of unit weight; None where there are no degrees of freedom.
+    /// Variance of unit weight; None without degrees of freedom.
     pub variance_of_unit_weight: Option<f64>,
-    /// Where the adjustment has ended: what covariances are computed from, and other datums.
+    /// Final state of the adjustment, from which covariances and other datums are computed.
     pub state: State,
-    /// Cofactors of the points that were to be asked together (see [`super::NetworkAdjustment::kept`]).
+    /// Joint cofactors of the requested points (see [`super::NetworkAdjustment::kept`]).
     pub joint: Option<Arc<Joint>>,
-    /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
+    /// Converged problem with its cofactors, from which tests are computed without a new linearization.
     pub converged: Option<Box<Converged>>,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
 }
 
 impl Solution {
-    /// The covariance matrix of a point's coordinates: its cofactors times the variance of unit weight. None where it was left out, or where
-    /// there are no degrees of freedom.
+    /// Returns the covariance matrix of the coordinates of a point: cofactors times variance of unit weight. None if the point is excluded
+    /// or without degrees of freedom.
     pub fn covariance_of_point(&self, point: usize) -> Option<Matrix3> {
         Some(self.points.get(point)?.as_ref()?.cofactors * self.variance_of_unit_weight?)
     }
 
-    /// The same of the unknowns of a photo: its pose and, unless it is held or shared, its camera.
+    /// Returns the covariance matrix of the parameters of a photo: its pose and its own free camera.
     pub fn covariance_of_photo(&self, photo: usize) -> Option<DMatrix<f64>> {
         Some(&self.photos.get(photo)?.cofactors * self.variance_of_unit_weight?)
     }
 
-    /// The observations beside images by kind; `network` is the one that was adjusted.
+    /// Returns the additional observations by type; `network` is the network that was adjusted.
     pub fn kinds(&self, network: &Network) -> Vec<KindSums> {
         KindSums::all(&network.observations, &self.observations)
     }
 
-    /// Puts the pieces of an adjustment back into the order of the network. Called on a thread of the threads.
+    /// Returns the results of an adjustment in the order of the network. Called from a worker thread.
     pub(super) fn new(
         network: &Network,
         options: &Options,
@@ -182,7 +181,7 @@ impl Solution {
         Self::with_leverages(network, options, assembled, adjustment, collapsed).0
     }
 
-    /// The same, with what tests of groups need where the adjustment has kept that.
+    /// Returns the solution, and the leverages for group tests if the adjustment stores them.
     pub(super) fn with_leverages(
         network: &Network,
         options: &Options,
@@ -265,12 +264,12 @@ impl Solution {
     }
 }
 
-/// A sum of squares over the degrees of freedom, where there are any.
+/// Returns a sum of squares over the degrees of freedom, None if these are not positive.
 fn over(sum: f64, degrees_of_freedom: i64) -> Option<f64> {
     (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64)
 }
 
-/// The photo and the number of one of its unknowns; None for unknowns of anything else.
+/// Returns the photo of a parameter and the number there; None for other parameters.
 pub(super) fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
     match of_block(problem, unknown)? {
         (Owner::Photo(photo), number) => Some((photo, number)),
@@ -278,7 +277,7 @@ pub(super) fn of_photo(problem: &Problem<Bundle>, unknown: usize) -> Option<(usi
     }
 }
 
-/// The shared camera and the number of one of its parameters; None for unknowns of anything else.
+/// Returns the shared camera of a parameter and the number there; None for other parameters.
 fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
     match of_block(problem, unknown)? {
         (Owner::Camera(camera), parameter) => Some((camera, parameter)),
@@ -286,7 +285,7 @@ fn of_camera(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
     }
 }
 
-/// The common unknown and the number of one of its unknowns; None for unknowns of anything else.
+/// Returns the shared parameter of an unknown and the number there; None for other unknowns.
 fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)> {
     match of_block(problem, unknown)? {
         (Owner::Common(common), number) => Some((common, number)),
@@ -294,12 +293,11 @@ fn of_common(problem: &Problem<Bundle>, unknown: usize) -> Option<(usize, usize)
     }
 }
 
-/// What an unknown belongs to, and its number there; None for unknowns of points.
+/// Returns the owner of a parameter and the number there; None for points.
 fn of_block(Problem { model, .. }: &Problem<Bundle>, unknown: usize) -> Option<(Owner, usize)> {
     model.owner(unknown)
 }
 
-/// The observations beside images.
 pub(super) fn observations(
     network: &Network,
     problem: &Problem<Bundle>,
@@ -319,7 +317,7 @@ pub(super) fn observations(
     all
 }
 
-/// Sums of squares by group (GIANT guide, Appendix E).
+/// Returns the sums of squares by group (GIANT guide, Appendix E).
 pub(super) fn sums_of_squares(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
@@ -339,7 +337,7 @@ pub(super) fn sums_of_squares(
     }
 }
 
-/// Sums of redundancy numbers by group; None where there are none.
+/// Returns the sums of redundancy numbers by group; None without redundancy numbers.
 fn redundancies(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
@@ -358,8 +356,8 @@ fn redundancies(
     })
 }
 
-/// Degrees of freedom (GIANT guide, Appendix E): observations are the image coordinates and what was observed beside them, the
-/// held components of control and, but for free photos, every other weighted unknown: of photos, cameras, lever arms.
+/// Returns the degrees of freedom (GIANT guide, Appendix E). Observations are image coordinates, additional observations, control
+/// components and, except for free photos, every other weighted parameter.
 fn degrees_of_freedom(
     unit_variance: UnitVariance,
     problem: &Problem<Bundle>,

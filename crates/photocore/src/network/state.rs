@@ -1,50 +1,50 @@
-//! Where an adjustment of a network has ended, and what its coordinates refer to.
+//! Final state of an adjustment, and the datum of its coordinates.
 
 use crate::normals::Ordering;
 
-/// Where an adjustment of a network has ended: all that is needed to come back to it.
+/// Final state of an adjustment, sufficient to restore it.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// The adjusted unknowns, in the order of the adjustment.
+    /// Adjusted parameters, in the order of the adjustment.
     pub unknowns: Vec<f64>,
-    /// Those of them that were held for a datum.
+    /// Indices of the parameters that were fixed as a minimal datum.
     pub held: Vec<usize>,
-    /// Points that were left out because they ran into a station, or their rays do not determine them, ascending.
+    /// Points excluded because they ran into a station or their rays do not determine them, ascending.
     pub collapsed: Vec<usize>,
-    /// Photos that were left out because their images do not determine them, ascending.
+    /// Photos excluded because their images do not determine them, ascending.
     pub loose: Vec<usize>,
-    /// The ordering in force.
+    /// Elimination order.
     pub ordering: Ordering,
-    /// The datum that it was taken to since; None for that of what was held, or of the observations.
+    /// Datum of a later transformation; None for the minimal datum or the datum of the observations.
     pub datum: Option<NetworkDatum>,
-    /// Whether control and weights of poses, which were exactly what a datum takes, were given up for it.
+    /// Whether minimal control and weights of poses were removed for this datum.
     pub released: bool,
 }
 
-/// What coordinates and their cofactors refer to.
+/// Datum of coordinates and their cofactors.
 #[derive(Debug, Clone)]
 pub enum NetworkDatum {
-    /// Chosen points and photos are, together, as near to their given places as they come: of networks that are free.
+    /// Inner constraints of chosen points and photos in free networks.
     Inner(InnerConstraints),
-    /// Cofactors are relative to a photo (of one on a frame: to the frame), as if its pose were held where it has been adjusted to. Nothing is moved, scale stays as it is
-    /// given or held, and the network need not be free.
+    /// Cofactors relative to a photo (or its rig frame), as if its adjusted pose were fixed. Values and scale are unchanged, and the
+    /// network need not be free.
     RelativeToPhoto(usize),
-    /// The same with points, whose mean position and orientation count.
+    /// Cofactors relative to the mean position and orientation of points.
     RelativeToPoints(Vec<usize>),
 }
 
-/// Inner constraints: the datum in which chosen points and photos, taken together, are as near as they come to their given places
-/// (where a point has none, to where it started from).
+/// Inner constraints: the datum with the least sum of squared distances of chosen points and photos from their given positions (or else
+/// their initial positions).
 #[derive(Debug, Clone, Default)]
 pub struct InnerConstraints {
     /// Indices of points.
     pub points: Vec<usize>,
-    /// Indices of photos, whose positions count.
+    /// Indices of photos with constrained positions.
     pub photos: Vec<usize>,
-    /// Indices of photos, whose attitudes count: a turn of one about its own axes, times `radius`.
+    /// Indices of photos with constrained attitudes: rotations about their own axes, times `radius`.
     pub attitudes: Vec<usize>,
-    /// What makes turns comparable with shifts; None for the root mean square distance of all points and photos from their middle.
+    /// Length that converts rotations to displacements; None for the root mean square distance of all points and photos from their centre.
     pub radius: Option<f64>,
-    /// Whether scale is taken from them, too; otherwise it stays as it is held.
+    /// Whether they also define the scale; otherwise the scale remains unchanged.
     pub scale: bool,
 }

@@ -1,4 +1,4 @@
-//! The unknowns of photos, shared cameras and common unknowns before the adjustment: values, observed values, standard deviations.
+//! Parameters of photos, shared cameras and shared parameters before the adjustment: values, observed values, standard deviations.
 
 use super::median::median;
 use super::model::Bundle;
@@ -7,7 +7,7 @@ use super::{Camera, Network, Photo};
 use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
 
 impl Network {
-    /// The projection centre of given six unknowns.
+    /// Returns the projection centre for six pose parameters.
     pub(super) fn centre(&self, pose: &[f64; POSE]) -> Vector3 {
         match self.poses {
             PoseNumbers::Angles(_) => self.space.cartesian([pose[0], pose[1], pose[2]]),
@@ -15,10 +15,9 @@ impl Network {
         }
     }
 
-    /// A point near the photos: coordinates are counted from it while the network is adjusted, so that no digits are lost in
-    /// large ones. Medians, so that a single photo with a wrong position does not move it. Geographic coordinates stay as they
-    /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation, and
-    /// coordinates on a body that turns under inertial tables, which are counted from its centre.
+    /// Returns the origin of coordinates in the adjustment: a point near the photos, which avoids rounding errors of large coordinates.
+    /// Medians are robust against single wrong positions. The origin is zero for geographic space, because differences are geocentric. It
+    /// is zero for poses in vectors, whose translations rotate, and for rotating bodies with inertial tables.
     pub(super) fn origin(&self, middle: [f64; 3]) -> [f64; 3] {
         let turns = self.trajectories.iter().any(|own| own.course.body.is_some());
         match (self.space, self.poses) {
@@ -27,7 +26,7 @@ impl Network {
         }
     }
 
-    /// The medians of the coordinates of the photos.
+    /// Returns the medians of the coordinates of the photos.
     pub(super) fn middle(&self) -> [f64; 3] {
         let middle = |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect());
         std::array::from_fn(|k| middle(k).unwrap_or_default())
@@ -37,8 +36,8 @@ impl Network {
         &self.cameras[photo.camera]
     }
 
-    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of carried photos, of
-    /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
+    /// Returns the standard deviations of photos, shared cameras and shared parameters; zero for `unused` and carried photos, for cameras
+    /// of such photos only, and for shared parameters without active observations.
     pub(super) fn station_sd(
         &self,
         model: &Bundle,
@@ -70,7 +69,7 @@ impl Network {
         all
     }
 
-    /// The values of the unknowns of photos, with the given poses, of shared cameras and common unknowns.
+    /// Returns the values of photos at given poses, shared cameras and shared parameters.
     pub(super) fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; POSE]) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, photo) in self.photos.iter().enumerate() {
@@ -78,7 +77,7 @@ impl Network {
             if model.has_own_camera(index) {
                 all.extend(self.camera(photo).camera.parameters());
             }
-            // Common unknowns count from what is given.
+            // Shared parameters are relative to their given values.
             all.resize(all.len() + model.of_block(index).len() - model.of_photo(index).len(), 0.0);
         }
         all.extend(model.blocks.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
@@ -86,7 +85,7 @@ impl Network {
         all
     }
 
-    /// The observed pose of a photo, as near to the initial one as whole turns bring it.
+    /// Returns the observed pose of a photo, with angles shifted by full circles to the initial ones.
     pub(super) fn observed_pose(&self, photo: &Photo) -> [f64; POSE] {
         let near = nearest_turns(photo.observed, photo.pose);
         let turning = |k: usize| match self.poses {
@@ -96,7 +95,7 @@ impl Network {
         std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
     }
 
-    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
+    /// Returns true if the attitude of a photo steps by a rotation vector: a fixed angle must remain exact.
     pub(super) fn turns(&self, photo: usize) -> bool {
         let fixed = self.photos[photo].sd[3..].contains(&0.0);
         !fixed && matches!(self.poses, PoseNumbers::Angles(_))

@@ -1,4 +1,4 @@
-//! Photos and points at given values of the unknowns, and the equations of images there.
+//! Photos and points at given parameter values, and the equations of images.
 
 use super::Image;
 use super::commons::CommonState;
@@ -10,61 +10,59 @@ use crate::geometry::{
 };
 use crate::normals::GroupRows;
 
-/// Photos and points at given values of the unknowns.
+/// Photos and points at given parameter values.
 #[derive(Debug)]
 pub struct Stations {
     pub photos: Vec<Station>,
     pub points: Vec<geometry::Point>,
-    /// The coordinates of the points that are not local.
+    /// Coordinates of the points that are not local.
     pub tied: Vec<[f64; 3]>,
     pub commons: Vec<CommonState>,
     pub bent: Option<Bent>,
 }
 
 impl Stations {
-    /// The standard deviations of an image in the unit of its camera, about.
+    /// Returns the approximate standard deviations of an image in the unit of its camera.
     pub fn sd_in_camera(&self, image: &Image) -> [f64; 2] {
         let film = self.bent.as_ref().and_then(|bent| bent.film(image.photo));
         image.sd.map(|sd| film.map_or(sd, |film| sd / film.units()))
     }
 }
 
-/// What images need besides where they are not plain.
+/// Effects that only some images have: refraction, rig or trajectory pose, film.
 #[derive(Debug)]
 pub struct Bent {
     pub refracted: Option<Refracted>,
     pub mounted: Option<Mounted>,
-    /// By photo, of those that are scanned; nothing at all where none is.
+    /// Film of each photo, None without a scan; empty without scans.
     pub films: Vec<Option<FilmAt>>,
 }
 
-/// Photos that are mounted.
 #[derive(Debug)]
 pub struct Mounted {
-    /// All photos as their own six unknowns have them.
+    /// Orientations of all photos from their own six parameters.
     pub own: Vec<Orientation>,
-    /// By photo, at its time; None of photos that are not mounted.
+    /// Composed pose of each photo at its time; None for photos without mounts.
     pub composed: Vec<Option<Composed>>,
 }
 
-/// Photos and common unknowns at given values.
 pub struct Placed {
     pub photos: Vec<Station>,
     pub commons: Vec<CommonState>,
-    /// None where no photo is.
+    /// None without mounts.
     pub mounted: Option<Mounted>,
     /// See [`Bent::films`].
     pub films: Vec<Option<FilmAt>>,
 }
 
-/// A photo at given values of its unknowns.
+/// A photo at given parameter values.
 #[derive(Debug, Clone)]
 pub struct Station {
     pub orientation: Orientation,
     pub camera: Camera,
 }
 
-/// What refraction needs besides.
+/// Refraction, with the verticals that it requires.
 #[derive(Debug)]
 pub struct Refracted {
     pub refraction: Refraction,
@@ -73,19 +71,18 @@ pub struct Refracted {
 }
 
 impl Mounted {
-    /// The pose of a photo that is mounted.
+    /// Returns the pose of a mounted photo.
     pub fn of(&self, photo: usize) -> Option<&Composed> {
         self.composed[photo].as_ref()
     }
 }
 
 impl Bent {
-    /// The film of a photo.
     pub fn film(&self, photo: usize) -> Option<&FilmAt> {
         self.films.get(photo)?.as_ref()
     }
 
-    /// Writes an image, with its pose where it is not that of the photo at its time; where the photo is scanned, its place in the camera.
+    /// Writes an image, with its own pose if it is timed; for a scanned photo, writes its position in the camera.
     pub fn write(
         &self,
         space: ObjectSpace,
@@ -99,7 +96,7 @@ impl Bent {
         let camera = &stations.photos[image.photo].camera;
         let timed = timed.map(|own| &own.orientation);
         self.seen(space, stations, timed, image.photo, local, |orientation, point| {
-            // Nothing is observed of the place in the camera itself.
+            // The position in the camera is not observed for scans.
             let measured = self.film(image.photo).is_none().then_some(image.xy);
             let write = |rows: &mut GroupRows<'_>| {
                 each_camera!(camera, camera => write(orientation, camera, point, measured, rows));
@@ -111,7 +108,7 @@ impl Bent {
         });
     }
 
-    /// Hands over what a photo sees of a point, and from where; `timed` is its pose where that is not the one at its time.
+    /// Calls `take` with the orientation and the refracted point; `timed` is the pose of the image if it differs from the photo.
     pub fn seen<T>(
         &self,
         space: ObjectSpace,
@@ -134,8 +131,8 @@ impl Bent {
     }
 }
 
-/// The two equations of an image: observed minus computed, and the partials of the computed. Where nothing is measured, those of its
-/// place in the camera, compared with zero.
+/// Writes the two equations of an image: observed minus computed, and the partials of the computed. Without a measurement, the position in
+/// the camera is compared with zero.
 #[inline(never)]
 pub fn write<C: CameraModel>(
     orientation: &Orientation,
@@ -169,7 +166,7 @@ fn put<P: AsRef<[f64]> + Copy>(
         rows.constant[row] = residual[row];
         rows.local[3 * row..][..3].copy_from_slice(&projection.point[row]);
         rows.retained[width * row..][..POSE].copy_from_slice(&projection.photo[row]);
-        // As many as the camera has, which is known where this is compiled.
+        // The number of camera parameters is known at compile time.
         let camera = projection.camera[row].as_ref();
         if width > POSE {
             rows.retained[width * row + POSE..][..camera.len()].copy_from_slice(camera);

@@ -1,33 +1,33 @@
-//! Where a network stands in a larger one that is adjusted in nodes (Helmert blocking).
+//! Interface of a network to the larger one, which is adjusted in nodes (Helmert blocking).
 
 use std::collections::BTreeSet;
 
 use super::{Network, Trajectory};
 
-/// What a block of unknowns that several nodes touch belongs to: indices into the network of the node.
+/// Owner of a parameter block that several nodes share: indices into the network of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockOf {
-    /// The pose of a photo, with a camera that is its alone, and with its film; all coefficients of the trajectory that it is on.
+    /// Pose of a photo, with its own camera and film; all coefficients of its trajectory.
     Photo(usize),
-    /// A camera that several photos of the larger network share.
+    /// Camera that several photos of the larger network share.
     Camera(usize),
-    /// A common unknown.
+    /// Shared parameter.
     Common(usize),
-    /// A point that observations beside images touch.
+    /// Point with additional observations.
     Point(usize),
 }
 
-/// What a node has in common with others.
+/// Interface of a node to the other nodes.
 #[derive(Debug, Clone, Default)]
 pub struct Surroundings {
-    /// The blocks that a node above eliminates.
+    /// Blocks that a parent node eliminates.
     pub outer: Vec<BlockOf>,
-    /// The blocks that each node below leaves something for.
+    /// Blocks to which each child node contributes.
     pub below: Vec<Vec<BlockOf>>,
-    /// The median of the positions of all photos of the larger network; None for those of this one.
+    /// Median position of all photos of the larger network; None for the median of this network.
     pub middle: Option<[f64; 3]>,
-    /// Photos with the numbers of those of their pose unknowns that are held for the datum of the larger network
-    /// ([`super::Network::held_for_datum`]), here and above.
+    /// Photos with the numbers of the pose parameters that are fixed for the datum of the larger network
+    /// ([`super::Network::held_for_datum`]), in this node and its parents.
     pub held: Vec<(usize, usize)>,
 }
 
@@ -36,28 +36,28 @@ impl Surroundings {
         self.outer.iter().chain(self.below.iter().flatten()).copied()
     }
 
-    /// The points that have unknowns in other nodes.
+    /// Returns the points with parameters in other nodes.
     pub(super) fn points(&self) -> BTreeSet<usize> {
         self.all()
             .filter_map(|block| if let BlockOf::Point(point) = block { Some(point) } else { None })
             .collect()
     }
 
-    /// The photos that have unknowns in other nodes.
+    /// Returns the photos with parameters in other nodes.
     pub(super) fn photos(&self) -> BTreeSet<usize> {
         self.all()
             .filter_map(|block| if let BlockOf::Photo(photo) = block { Some(photo) } else { None })
             .collect()
     }
 
-    /// The cameras that photos of other nodes share.
+    /// Returns the cameras shared with photos of other nodes.
     pub(super) fn cameras(&self) -> BTreeSet<usize> {
         self.all()
             .filter_map(|block| if let BlockOf::Camera(own) = block { Some(own) } else { None })
             .collect()
     }
 
-    /// The common unknowns that other nodes touch.
+    /// Returns the shared parameters of other nodes.
     pub(super) fn commons(&self) -> BTreeSet<usize> {
         self.all()
             .filter_map(|block| if let BlockOf::Common(own) = block { Some(own) } else { None })
@@ -66,7 +66,7 @@ impl Surroundings {
 }
 
 impl Network {
-    /// With the coefficients of trajectories in the place of photos on them, which have no unknowns of their own.
+    /// Replaces photos on trajectories, whose own parameters are fixed, by the coefficients of their trajectories.
     pub(super) fn told_by_coefficients(&self, given: Surroundings) -> Surroundings {
         let mut flown = vec![None; self.photos.len()];
         let of_photos = self.mounts.iter().map(|mount| (mount.photo(), mount.trajectory()));

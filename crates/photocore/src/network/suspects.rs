@@ -1,5 +1,5 @@
-//! The groups of observations of a network that are tested together for a gross error: an image, the control of a point, the position or
-//! the attitude of a photo, an observation beside images.
+//! Groups of observations that are tested together for a gross error: an image, control of a point, position or attitude of a photo, an
+//! additional observation.
 
 use smallvec::SmallVec;
 
@@ -10,58 +10,58 @@ use super::problem::Assembled;
 use crate::geometry::PoseNumbers;
 use crate::sorting::sort_by;
 
-/// What a group of observations is of: indices into the network.
+/// Object of a test group: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Subject {
     /// Both coordinates of an image.
     Image(usize),
-    /// The weighted components of a point.
+    /// The weighted coordinates of a point.
     Control(usize),
     /// The weighted components of a photo's position.
     Position(usize),
-    /// The same of its attitude.
+    /// The weighted components of a photo's attitude.
     Attitude(usize),
-    /// An observation beside images.
+    /// An additional observation.
     Observation(usize),
     /// The weighted parameters of a camera.
     Camera(usize),
-    /// The weighted components of a common unknown.
+    /// The weighted components of a shared parameter.
     Common(usize),
 }
 
-/// One observation of a group.
+/// One component of a test group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Row {
     /// An equation, in the order of groups and rows, then of ties and rows.
     Equation(usize),
-    /// An unknown as an observation of itself.
+    /// A parameter as its own observation.
     Unknown(usize),
 }
 
-/// Where the unknowns of a group stand.
+/// Location of the parameters of a test group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Home {
-    /// A group of equations, of a local block.
+    /// An image of a local point, as a group of equations.
     Group { group: usize, point: usize },
-    /// A tie.
+    /// A tie, by its index among the ties.
     Tie(usize),
-    /// The unknowns of a point, as the model numbers them.
+    /// A point, numbered as in the model.
     Point(usize),
-    /// Those of a photo, camera or common unknown: its retained block.
+    /// The retained block of a photo, camera or shared parameter.
     Block(usize),
 }
 
-/// Observations that are tested together.
+/// A test group.
 #[derive(Debug, Clone)]
 pub(super) struct Suspect {
     pub subject: Subject,
     pub home: Home,
-    /// Each with the component that it is.
+    /// Rows, each with its component.
     pub rows: SmallVec<[(Row, usize); 3]>,
 }
 
-/// The groups of observations that take part: images in their order, then control, positions, attitudes, observations beside images,
-/// cameras, common unknowns. Their rows are counted one after the other.
+/// Active test groups: images in their order, then control, positions, attitudes, additional observations, cameras, shared parameters.
+/// Their rows are numbered consecutively.
 #[derive(Debug)]
 pub struct Suspects {
     pub(super) all: Vec<Suspect>,
@@ -70,7 +70,7 @@ pub struct Suspects {
 }
 
 impl Suspects {
-    /// Those of a network of so many images, and of these cameras of its photos.
+    /// Returns the test groups of a network with `count` images and the given cameras of its photos.
     pub(super) fn new(assembled: &Assembled, count: usize, camera_of_photo: &dyn Fn(usize) -> usize) -> Self {
         let mut all = images(assembled, count);
         all.extend(of_points(assembled));
@@ -91,27 +91,27 @@ impl Suspects {
         Self { all, row_starts, deviations }
     }
 
-    /// What each group is of.
+    /// Returns the object of each group.
     pub fn subjects(&self) -> impl Iterator<Item = Subject> {
         self.all.iter().map(|suspect| suspect.subject)
     }
 
-    /// Where the rows of each start among all rows; one more at the end.
+    /// Returns the first row of each group among all rows, and the number of rows at the end.
     pub fn row_starts(&self) -> &[usize] {
         &self.row_starts
     }
 
-    /// The component that each row is.
+    /// Returns the component of each row.
     pub fn components(&self) -> impl Iterator<Item = usize> {
         self.all.iter().flat_map(|suspect| suspect.rows.iter().map(|&(_, component)| component))
     }
 
-    /// Standard deviation of each row as it is given, in its unit; of unit weight where the components of an observation are correlated.
+    /// Returns the given standard deviation of each row, in its unit.
     pub fn deviations(&self) -> &[f64] {
         &self.deviations
     }
 
-    /// The rows of some of them, as [`crate::adjustment::ObservationRows`] counts: equations, then unknowns.
+    /// Returns the rows of some groups as numbered in [`crate::adjustment::ObservationRows`]: equations, then parameters.
     pub(super) fn rows_of(&self, some: Range<usize>, equations: usize) -> impl Iterator<Item = usize> {
         let number = move |&(row, _): &(Row, usize)| match row {
             Row::Equation(equation) => equation,
@@ -121,7 +121,7 @@ impl Suspects {
     }
 }
 
-/// Standard deviation of a row of a suspect, from those of equations and of unknowns.
+/// Returns the standard deviation of a row of a group, given the standard deviations of equations and parameters.
 pub(super) fn deviation(
     model: &Bundle,
     suspect: &Suspect,
@@ -153,7 +153,7 @@ fn of_photos(assembled: &Assembled) -> Vec<Suspect> {
     subjects.into_iter().zip(halves).flat_map(half).collect()
 }
 
-/// The weighted parameters of cameras and components of common unknowns.
+/// Returns groups of the weighted parameters of cameras and shared parameters.
 fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) -> Vec<Suspect> {
     let model = &assembled.problem.model;
     let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
@@ -176,7 +176,7 @@ fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) ->
     own.chain(shared).collect()
 }
 
-/// Those of so many images that take part, in their order.
+/// Returns groups of the active ones among `count` images, in their order.
 fn images(assembled: &Assembled, count: usize) -> Vec<Suspect> {
     let (model, layout) = (&assembled.problem.model, assembled.problem.layout());
     let groups = layout.groups();
@@ -219,7 +219,7 @@ fn observations(assembled: &Assembled) -> Vec<Suspect> {
     model.observations.iter().enumerate().map(of).collect()
 }
 
-/// The weighted ones of some unknowns as observations of themselves; None where none is.
+/// Returns a group of the weighted ones among some parameters; None if there are none.
 fn weighted(assembled: &Assembled, subject: Subject, home: Home, unknowns: Range<usize>) -> Option<Suspect> {
     let of = |(k, unknown): (usize, usize)| {
         assembled.problem.is_weighted(unknown).then_some((Row::Unknown(unknown), k))

@@ -1,8 +1,7 @@
-//! How trajectories move with a network as a whole.
+//! Effect of similarity transformations of the network on trajectories.
 //!
-//! A motion displaces C(t) and turns A(t). The coefficients follow it as far as the functions of their bases do, by least squares over the
-//! times of images and records. What a basis does not contain is left over, and tells the motion from those that observations leave open
-//! ([`crate::adjustment::Motions`]).
+//! A transformation displaces C(t) and rotates A(t). The coefficients follow by least squares over the times of images and records, as far
+//! as their basis functions allow. The remainder distinguishes the transformation from datum defects ([`crate::adjustment::Motions`]).
 
 use super::commons::CommonState;
 use super::model::Bundle;
@@ -13,28 +12,28 @@ use crate::geometry::trajectory::{Active, Flight};
 use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::sorting::sort_by;
 
-/// Times that are looked at for each function of a basis, at the most: those in between say the same.
+/// Maximum number of sampled times per basis function; further times add no information.
 const TIMES: usize = 8;
-/// The weight of times at which nothing is observed: they tell where the functions go that nothing shows, without a part in the others.
+/// Weight of times without observations: it defines coefficients that no observation determines, and hardly affects the others.
 const UNSEEN: f64 = 1e-8;
-/// A function is not told by so small a part of its square.
+/// Relative pivot below which a function is not determined.
 const SEPARABLE: f64 = 1e-13;
-/// Turns that need not be small are followed by so many small ones, which converge quadratically, at the most;
+/// Maximum number of small rotations, which converge quadratically, to follow a finite one.
 const MOST_TURNS: usize = 20;
-/// until none is larger, in radians.
+/// Convergence limit of these rotations, in radians.
 const TURNED: f64 = 1e-13;
 
-/// How coefficients change: those of positions, those of rotations.
+/// Changes of the coefficients of positions, and of rotations.
 pub(super) type Changes = [Vec<Vector3>; 2];
 
-/// The normal matrix of functions of time, a few of which are not zero at any time, factored: the rows of L as far as its band reaches.
+/// Factored band normal matrix of functions with local support: rows of L within the band.
 struct Band {
     width: usize,
     rows: Vec<f64>,
 }
 
 impl Band {
-    /// Of so many functions at times with weights.
+    /// Returns the factored matrix of `count` functions at weighted times.
     fn new<'a>(count: usize, at: impl Iterator<Item = (f64, &'a Active)> + Clone) -> Self {
         let width = at.clone().map(|(_, own)| own.values.len()).max().unwrap_or(0);
         let mut own = Self { width, rows: vec![0.0; count * width] };
@@ -56,7 +55,7 @@ impl Band {
         (first..=i).zip(self.rows[(i + 1) * self.width - (i + 1 - first)..].iter().copied())
     }
 
-    /// Cholesky. What is not told gets an infinite pivot: it stays zero.
+    /// Cholesky factorization. Undetermined coefficients have an infinite pivot and remain zero.
     fn factor(&mut self, count: usize) {
         for i in 0..count {
             let first = (i + 1).saturating_sub(self.width);
@@ -95,7 +94,7 @@ impl Band {
         right
     }
 
-    /// The coefficients with which functions come nearest to what is wanted at each time; once more for what rounding has left.
+    /// Returns the least-squares coefficients for wanted values at each time, with one iterative refinement.
     fn nearest<'a>(
         &self,
         count: usize,
@@ -115,12 +114,12 @@ impl Band {
     }
 }
 
-/// A trajectory at given coefficients, to find how these follow motions.
+/// A trajectory linearized at given coefficients, to follow transformations.
 pub(super) struct Following<'a> {
     own: &'a Trajectory,
-    /// At the times that are looked at, with their weights.
+    /// Poses at the sampled times, with their weights.
     flights: Vec<(f64, Flight)>,
-    /// The inverse of what corrections of the attitude turn the photo by.
+    /// Inverse partials of the rotation of the photo by corrections of the attitude.
     to_corrections: Vec<Matrix3>,
     position: Band,
     rotation: Band,
@@ -140,7 +139,7 @@ impl<'a> Following<'a> {
         }
     }
 
-    /// The coefficients that follow what displaces the pose of each time, and turns it about its own axes, by a small amount.
+    /// Returns the changes of the coefficients for small displacements and rotations (about the own axes) at each time.
     pub fn changes(&self, motion: &dyn Fn(usize, &Pose) -> [Vector3; 2]) -> Changes {
         let moved = |(k, (_, flight)): (usize, &(f64, Flight))| motion(k, &flight.motion.pose);
         let moved: Vec<[Vector3; 2]> = self.flights.iter().enumerate().map(moved).collect();
@@ -157,7 +156,7 @@ impl<'a> Following<'a> {
 }
 
 impl Bundle {
-    /// The trajectories, each with the part of the network that it is in.
+    /// Returns the trajectories, each with its connected component.
     fn trajectories_in<'a>(
         &'a self,
         parts: &'a Parts,
@@ -169,7 +168,7 @@ impl Bundle {
         self.mounts.trajectories().iter().enumerate().filter_map(of)
     }
 
-    /// Of each trajectory that takes part: that part, and how its coefficients follow motions from their values on.
+    /// Returns the component of each active trajectory, and its linearization at the current coefficients.
     pub(super) fn following<'a>(
         &'a self,
         parts: &'a Parts,
@@ -182,7 +181,7 @@ impl Bundle {
         self.trajectories_in(parts).map(own).collect()
     }
 
-    /// Writes what becomes of its coefficients, where these are unknown.
+    /// Writes the changes of the free coefficients.
     pub(super) fn put_changes(&self, following: &Following<'_>, changes: &Changes, unknowns: &mut [f64]) {
         for (common, change) in following.own.coefficients().zip(changes.iter().flatten()) {
             if let Some(range) = self.of_common(common) {
@@ -191,7 +190,7 @@ impl Bundle {
         }
     }
 
-    /// Moves the trajectories of a part by a motion that need not be small.
+    /// Transforms the trajectories of a component by a finite transformation.
     pub(super) fn move_trajectories(
         &self,
         (parts, part): (&Parts, usize),
@@ -227,7 +226,7 @@ impl Bundle {
         }
     }
 
-    /// For each trajectory the times that are looked at, each after its weight.
+    /// Returns the weights and sampled times of each trajectory.
     fn times_of_trajectories(&self) -> Vec<Vec<(f64, f64)>> {
         let mut seen = vec![vec![]; self.mounts.trajectories().len()];
         let images = self.images.iter().enumerate().map(|(k, image)| (image.photo, self.time_of(k)));
@@ -250,7 +249,7 @@ impl Bundle {
         self.mounts.trajectories().iter().zip(seen).map(times).collect()
     }
 
-    /// The unknowns that hold the pose of a photo: its six or, on a trajectory, those of the coefficients that are about its time.
+    /// Returns the parameters that define the pose of a photo: its six or, on a trajectory, the coefficients nearest to its time.
     pub(super) fn holding(&self, photo: usize) -> Vec<usize> {
         let Some((trajectory, time)) = self.mounts.flight(photo, AT_PHOTO) else {
             return self.of_block(self.carrier(photo)).take(6).collect();
@@ -264,7 +263,7 @@ impl Bundle {
         nearest.into_iter().flatten().flatten().collect()
     }
 
-    /// The unknown coefficients of positions in a part.
+    /// Returns the free coefficients of positions in a component.
     pub(super) fn position_coefficients(&self, parts: &Parts, part: usize) -> Vec<usize> {
         let all = self.mounts.trajectories().iter().flat_map(|own| &own.position);
         let own = all.filter(|&&common| parts.of_common[common] == Some(part));
@@ -272,7 +271,7 @@ impl Bundle {
     }
 }
 
-/// The values of the coefficients of a trajectory.
+/// Returns the values of the coefficients of a trajectory.
 fn coefficients(own: &Trajectory, commons: &[CommonState]) -> Changes {
     [&own.position, &own.rotation].map(|all| all.iter().map(|&common| commons[common].vector()).collect())
 }

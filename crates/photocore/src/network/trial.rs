@@ -1,4 +1,4 @@
-//! A network tried without some of its observations: adjusted again and again, the symbolic analysis done once.
+//! Outlier detection: repeated adjustments without some observations, with a single symbolic analysis.
 
 use std::sync::Arc;
 
@@ -12,35 +12,33 @@ use crate::Threads;
 use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Status, Stop, Terms, Watch};
 use crate::geometry::PoseNumbers;
 
-/// A network tried without some of its observations.
+/// Repeated adjustments of a network without some of its observations.
 #[derive(Debug)]
 pub struct Trial {
     pub(super) assembled: Assembled,
     options: adjustment::Options,
     pub(super) suspects: Arc<Suspects>,
-    /// Where the square block of each suspect starts; one more at the end.
+    /// Start of the square block of each test group, and the end of the last one.
     pub(super) block_starts: Vec<usize>,
-    /// Standard deviations as given: of the equations, of the unknowns.
+    /// Given standard deviations of the equations and parameters.
     pub(super) observation_sd: Vec<f64>,
     pub(super) sd: Vec<f64>,
-    /// The place in the model of each point that takes part.
+    /// Index of each active point in the model.
     pub(super) place: Vec<Option<usize>>,
-    /// The suspects at each local point, by its place.
+    /// Test groups of each local point.
     pub(super) on_place: Vec<Vec<usize>>,
-    /// The camera of each photo.
     pub(super) camera_of_photo: Vec<usize>,
-    /// What was held for a datum where the adjustment has ended.
+    /// Parameters fixed as a minimal datum at the end of the adjustment.
     pub(super) held: Vec<usize>,
     found: Option<Leverages>,
-    /// Whether that is the network as its adjustment has ended, with everything in it.
+    /// Whether `found` is the complete network at the end of its adjustment.
     stands: bool,
 }
 
-/// A network where its adjustment has converged, kept with its cofactors: tests of it, and trials without some observations, begin there
-/// without forming, factoring and inverting once more.
+/// Converged network with its cofactors. Tests, and trials without some observations, start here without forming, factoring and inverting
+/// again.
 ///
-/// Its cofactors are those of the adjustment: before the last step, which has moved no unknown by more than a thousandth of its standard
-/// deviation.
+/// Its cofactors were computed before the last step, which changed no parameter by more than a thousandth of its standard deviation.
 #[derive(Debug)]
 pub struct Converged {
     assembled: Assembled,
@@ -48,29 +46,29 @@ pub struct Converged {
     found: Leverages,
 }
 
-/// What is out.
+/// Excluded observations, points and photos.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Out<'a> {
-    /// Of each row of the suspects, one suspect after the other, whether it is out.
+    /// Whether each row is excluded, with the rows of all test groups concatenated.
     pub rows: &'a [bool],
-    /// Points that are out with all their images and components.
+    /// Points excluded with all their images and observed coordinates.
     pub points: &'a [usize],
-    /// Photos that are out with all their images and components.
+    /// Photos excluded with all their images and observed pose components.
     pub photos: &'a [usize],
 }
 
-/// How a trial has ended.
+/// Result of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// How the iterations have.
+    /// Status of the iterations.
     pub status: Status,
-    /// How many there were.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Weighted sum of squares of what takes part.
+    /// Weighted sum of squares of the active observations.
     pub sum_of_squares: f64,
-    /// Observations that take part minus unknowns.
+    /// Number of active observations minus parameters.
     pub degrees_of_freedom: i64,
-    /// Points that have run into a station.
+    /// Points that ran into a station.
     pub collapsed: Vec<usize>,
 }
 
@@ -80,7 +78,7 @@ impl Converged {
         Self { assembled, options, found }
     }
 
-    /// Prepares for trials of the network, which is the one that was adjusted; [`Trial::stand`] is done already.
+    /// Returns a trial of the network that was adjusted; [`Trial::stand`] needs no computation.
     pub fn trial(self, network: &Network) -> Trial {
         let Self { mut assembled, options, found } = self;
         assembled.problem.initial.clone_from(&found.values);
@@ -90,11 +88,11 @@ impl Converged {
 }
 
 impl Network {
-    /// Prepares for trials of a network: from its initial values on, or from where an adjustment with these options has ended
+    /// Prepares trials of a network, from its initial values or from the final state of an adjustment with these options
     /// ([`super::Solution::state`]).
     ///
     /// # Errors
-    /// Those of [`Network::adjust`] before its first iteration; a state that is not of this network.
+    /// Errors of [`Network::adjust`] before its first iteration; a state of another network.
     pub fn trial(
         &self,
         options: &Options,
@@ -118,7 +116,7 @@ impl Network {
 }
 
 impl Trial {
-    /// Of an assembled network at its initial values, or as it was found there with everything in it.
+    /// Returns a trial of an assembled network at its initial values, or with the results of the complete network.
     pub(super) fn new(
         network: &Network,
         assembled: Assembled,
@@ -162,15 +160,15 @@ impl Trial {
         }
     }
 
-    /// The groups of observations, in the order of all tests.
+    /// Returns the test groups, in the order of all tests.
     pub fn suspects(&self) -> &Arc<Suspects> {
         &self.suspects
     }
 
-    /// Takes the network as it stands where its adjustment has ended, with everything in it.
+    /// Linearizes the complete network at the end of its adjustment.
     ///
     /// # Errors
-    /// Values that leave unknowns undetermined; an interruption, no memory.
+    /// Undetermined parameters; an interruption, insufficient memory.
     pub fn stand(&mut self, threads: &Threads, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
         let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
@@ -184,12 +182,12 @@ impl Trial {
         Ok(self.keep(found, Status::Converged, 0, vec![]))
     }
 
-    /// Adjusts without what is out, from where the last trial has ended.
+    /// Adjusts without the excluded observations, starting from the last trial.
     ///
-    /// * `tolerance`: see [`Stop`]; that of the options where it is None.
+    /// * `tolerance`: see [`Stop`]; with None, the tolerance of the options.
     ///
     /// # Errors
-    /// Unknowns that are not determined without; an interruption, no memory. The last values stay.
+    /// Parameters that are undetermined without them; an interruption, insufficient memory. The last values remain.
     pub fn adjust(
         &mut self,
         out: Out<'_>,
@@ -212,12 +210,11 @@ impl Trial {
         Ok(self.keep(found, adjusted.status, adjusted.iterations.len(), adjusted.collapsed))
     }
 
-    /// Adjusts with a robust loss from where the last trial has ended, and stays there: the factors by which it has changed the weights
-    /// of each image and observation that takes part, in the order of all tests; 1 for others. None where it diverges: then its weights
-    /// say nothing, and the next trial begins where this one has.
+    /// Adjusts with a robust loss, starting from the last trial, and stores the values. Returns the weight factors of each active image and
+    /// observation, in the order of all tests; 1 for others. None if it diverges: then the start of the next trial is unchanged.
     ///
     /// # Errors
-    /// Those of [`Trial::adjust`].
+    /// Errors of [`Trial::adjust`].
     pub fn resist(
         &mut self,
         loss: Loss,
@@ -249,7 +246,7 @@ impl Trial {
         Ok(Some(weights))
     }
 
-    /// Where all points of the network are; NaN for those that do not take part.
+    /// Returns the positions of all points of the network; NaN for excluded ones.
     pub fn points(&self) -> Vec<[f64; 3]> {
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
         let mut all = vec![[f64::NAN; 3]; self.place.len()];
@@ -259,7 +256,7 @@ impl Trial {
         all
     }
 
-    /// The values of the unknowns of all photos as they are given: pose, and camera where it is the photo's own.
+    /// Returns the parameters of all photos: pose and own camera.
     pub fn photos(&self) -> Vec<Vec<f64>> {
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
         let positions = if let PoseNumbers::Angles(_) = model.poses { 3 } else { 0 };
@@ -301,7 +298,7 @@ impl Trial {
         outcome
     }
 
-    /// Weights of zero for what is out; points and photos that are out stay where they are.
+    /// Sets the weights of excluded rows to zero; excluded points and photos are fixed.
     fn take_out(&mut self, out: Out<'_>) {
         let Assembled { problem, .. } = &mut self.assembled;
         problem.observation_sd.clone_from(&self.observation_sd);
@@ -332,13 +329,13 @@ impl Trial {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 
-    /// What was known beforehand of the unknowns, with the given standard deviations.
+    /// Returns the prior terms of the parameters, with given standard deviations.
     pub(super) fn terms<'a>(&'a self, sd: &'a [f64], values: &'a [f64]) -> Terms<'a> {
         let problem = &self.assembled.problem;
         Terms::new(&problem.model, values, &problem.prior, sd)
     }
 
-    /// Whether a row takes part.
+    /// Returns true if a row is active.
     pub(super) fn is_in(&self, row: Row) -> bool {
         match row {
             Row::Equation(equation) => self.assembled.problem.observation_sd[equation].is_finite(),
@@ -350,7 +347,7 @@ impl Trial {
         suspects::deviation(&self.assembled.problem.model, suspect, row, (&self.observation_sd, &self.sd))
     }
 
-    /// What leads from errors of unit weight of some rows of a suspect to their units.
+    /// Returns the matrix from whitened errors of some rows of a group to their units.
     pub(super) fn units(&self, suspect: &Suspect, rows: &[(Row, usize)]) -> DMatrix<f64> {
         let model = &self.assembled.problem.model;
         if let (Subject::Observation(_), Home::Tie(tie)) = (suspect.subject, suspect.home) {

@@ -1,4 +1,4 @@
-//! Images that no camera can have taken: of points behind it, or beyond where its lens is one-to-one.
+//! Physically impossible images: points behind the camera, or outside the invertible area of its lens model.
 
 use super::problem::Assembled;
 use super::selection::TOGETHER;
@@ -8,7 +8,7 @@ use super::{Image, Solution};
 use crate::parallel;
 
 impl Solution {
-    /// Finds the images whose point stands behind the camera, or beyond where its lens ends; returns the squares of the distances of the
+    /// Finds the images of points behind the camera, or outside the invertible area of the lens model. Returns the squared distances of the
     /// points from the nearest station.
     pub(super) fn find_behind(
         &mut self,
@@ -62,7 +62,7 @@ impl Solution {
 }
 
 impl Unseen {
-    /// None where there are none, as of nearly all points.
+    /// Returns None if both lists are empty, as for nearly all points.
     fn boxed(self) -> Option<Box<Self>> {
         (!(self.behind.is_empty() && self.folded.is_empty())).then(|| Box::new(self))
     }

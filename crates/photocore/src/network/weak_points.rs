@@ -1,4 +1,4 @@
-//! Points that harm what hangs on them: on rays that are nearly parallel, or much nearer to a station than all others.
+//! Ill-conditioned points: on nearly parallel rays, or much nearer to a station than all others.
 
 use super::median::median;
 use super::model::Bundle;
@@ -7,25 +7,25 @@ use super::{AdjustedPoint, Network};
 use crate::geometry::{self, Matrix3};
 use crate::parallel;
 
-/// The largest standard deviation of a point over its smallest, from which on its rays are nearly parallel.
+/// Ratio of largest to smallest standard deviation of a point above which its rays count as nearly parallel.
 const RATIO: f64 = 1e4;
-/// The distance of a point from a station, in the median of all, below which it is at the station's own place.
+/// Ratio of own to median station distance below which a point counts as at the station.
 const NEAR: f64 = 1e-3;
 
-/// A point that is hardly determined, or makes others so.
+/// A weakly determined point, or a point that makes others weak.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeakPoint {
     /// Index of the point.
     pub point: usize,
-    /// The largest standard deviation over the smallest, in any directions; infinite where rounding has taken the smallest, NaN where
-    /// there are no cofactors.
+    /// Ratio of largest to smallest standard deviation over all directions; infinite if the smallest is lost by rounding, NaN without
+    /// cofactors.
     pub ratio: f64,
-    /// Its distance from the nearest station that sees it, in the median of these distances.
+    /// Ratio of its distance from the nearest observing station to the median of these distances.
     pub distance: f64,
 }
 
 impl Network {
-    /// The points that are worse than they should be; `squares` are the squares of their distances from the nearest station.
+    /// Returns the weak points; `squares` contains their squared distances from the nearest station.
     pub(super) fn weak_points(
         &self,
         model: &Bundle,
@@ -49,7 +49,7 @@ impl Network {
         parallel::by_parts(points.len(), TOGETHER, &|some| some.filter_map(&weak).collect())
     }
 
-    /// The cofactors of a point in the length unit, whatever its coordinates are.
+    /// Returns the Cartesian cofactors of a point in units of length.
     fn cartesian_cofactors(&self, point: &AdjustedPoint) -> Matrix3 {
         let own = point.cofactors;
         if self.space == geometry::ObjectSpace::Rectangular {
@@ -60,22 +60,22 @@ impl Network {
     }
 }
 
-/// Whether the ratio may be too large: with the trace t and the determinant d of a positive matrix, largest over smallest eigenvalue is no
-/// more than t^3 / 4 d.
+/// Returns true if the ratio may be too large. For trace t and determinant d of a positive matrix, the ratio of largest to smallest
+/// eigenvalue is at most t^3 / 4 d.
 fn is_flat(cofactors: &Matrix3) -> bool {
     let bound = 4.0 * RATIO * RATIO * cofactors.determinant();
     let cube = cofactors.trace().powi(3);
-    // Written so that cofactors that are not there are none.
+    // With this comparison, undefined cofactors are not flat.
     cube > bound && ratio(cofactors) > RATIO
 }
 
-/// The largest standard deviation over the smallest.
+/// Returns the ratio of largest to smallest standard deviation.
 fn ratio(cofactors: &Matrix3) -> f64 {
     if !cofactors.iter().all(|value| value.is_finite()) {
         return f64::NAN;
     }
     let eigenvalues = cofactors.symmetric_eigenvalues();
     let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
-    // The smallest of a matrix is known to its largest's rounding.
+    // The smallest eigenvalue has the rounding error of the largest.
     if smallest > f64::EPSILON * largest { (largest / smallest).sqrt() } else { f64::INFINITY }
 }

@@ -1,4 +1,4 @@
-//! Angles of photos that are weighted, while the attitude steps by a rotation vector.
+//! Weighted angles of photos, if the attitude steps by a rotation vector.
 
 use smallvec::SmallVec;
 
@@ -7,24 +7,24 @@ use super::observations::misalignment;
 use crate::adjustment::Term;
 use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 
-/// Angles are the observation of a rotation where their phi may well be 90 degrees: by so many of their standard deviations, or
+/// Distance of phi from 90 degrees, in standard deviations, below which angles are treated as an observed rotation.
 const REACH: f64 = 3.0;
-/// within 5 degrees (cosine of phi). Omega and kappa turn about nearly the same axis there, and the sum of their squares is so far from a
-/// quadratic one that steps would not follow it.
+/// Cosine of phi at 5 degrees from 90, with the same treatment. There omega and kappa rotate about nearly the same axis. Their sum of
+/// squares is too nonlinear for the steps.
 const STEEP: f64 = 0.087;
 
 impl Bundle {
-    /// The equations of weighted angles of photos that step by a rotation vector, at given values of the unknowns.
+    /// Returns the equations of weighted angles of photos that step by a rotation vector, at given parameter values.
     ///
-    /// With rho = K d(angles) the row of an angle a, observed as a0 with the standard deviation s, is that of K^-1, and its constant
-    /// a0 - a, both divided by s: the sum of squares is that of a program whose unknowns are the angles.
+    /// With rho = K d(angles), an angle a, observed as a0 with standard deviation s, has its row of K^-1 / s and the constant (a0 - a) / s.
+    /// The sum of squares equals the one for angles as parameters.
     pub(super) fn weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
         let of_photo = |photo: usize| {
             let sense = self.turning_sense(photo)?;
             let first = self.of_block(photo).start + 3;
             let three = |all: &[f64]| -> [f64; 3] { std::array::from_fn(|k| all[first + k]) };
             let (angles, observed, sd) = (three(values), three(prior), Vector3::from(three(sd)));
-            // An attitude that is held, of a photo that is tried without for one, is no observation.
+            // A fixed attitude of an excluded photo is not an observation.
             if sd.iter().all(|sd| sd.is_infinite()) || sd.iter().any(|&sd| sd == 0.0) {
                 return None;
             }
@@ -44,7 +44,7 @@ impl Bundle {
     }
 }
 
-/// Of the angles themselves; those that are free have a row of zeros.
+/// Returns the equations of the angles; rows of free angles are zero.
 fn angle_equations(
     sense: RotationSense,
     angles: [f64; 3],
@@ -55,13 +55,13 @@ fn angle_equations(
     let (root, weighted) = (sd.map(f64::recip), sd.map(f64::is_finite));
     let apart = |k: usize| if weighted[k] { observed[k] - angles[k] } else { 0.0 };
     let constant = Vector3::from_fn(|k, _| apart(k)).component_mul(&root);
-    // An attitude on the way may be singular: there the angles say nothing of the step.
+    // At a singular attitude, the angles do not restrict the step.
     (constant, Matrix3::from_diagonal(&root) * numbers.by_step(angles).unwrap_or_else(Matrix3::zeros))
 }
 
-/// Of v = Log(A^T A0), the rotation that is left to the observed attitude, about the photo's axes: its partials are those of an observed
-/// attitude. Its covariance matrix is K0 S K0^T, S being that of the angles. Where that leaves nearly nothing about an axis, since omega and
-/// kappa turn about another, the least of the standard deviations stands.
+/// Returns the equations of v = Log(A^T A0), the rotation to the observed attitude about the photo's axes, with its partials. The
+/// covariance matrix is K0 S K0^T with the covariance S of the angles. If a variance is nearly zero because omega and kappa rotate about
+/// the same axis, the least standard deviation replaces it.
 fn rotation_equations(
     sense: RotationSense,
     angles: [f64; 3],

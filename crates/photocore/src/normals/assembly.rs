@@ -1,6 +1,6 @@
-//! What goes into the front of a supernode: the local blocks assembled there, ties, what systems below have left, priors.
+//! Assembly of the front of a supernode: local blocks, ties, contributions of child systems, and priors.
 //!
-//! The equations of a tie in the front that it goes to.
+//! Equations of a tie, sorted by the columns of their front.
 
 use super::batch::Batch;
 use super::equations::{Equations, Prior, TieRows};
@@ -13,34 +13,34 @@ use super::watch::Control;
 use super::workspace::reserved;
 use crate::parallel;
 
-/// What is formed.
+/// Input of a formation.
 pub(super) struct Formation<'a> {
     pub system: &'a System,
     pub equations: &'a dyn Equations,
     pub prior: &'a Prior,
     pub damping: f64,
-    /// Whether to cache what [`System::solve`] needs of the local blocks.
+    /// Whether to cache the local eliminations for [`System::solve`].
     pub caches: bool,
     pub control: &'a Control,
 }
 
-/// What the formation at one supernode adds up.
+/// Sums of the formation at one supernode.
 #[derive(Default)]
 pub(super) struct Sums {
     pub sum_of_squares: f64,
     pub decrease: f64,
     pub deficient: Vec<usize>,
-    /// What is cached of the local blocks.
+    /// Cached local eliminations.
     pub cached: Vec<f64>,
 }
 
-/// Local blocks at one supernode from which on several threads work at them.
+/// Minimum number of local blocks at a supernode for several threads.
 const MANY: usize = 256;
-/// Batches gathered by several threads before they are added to the front.
+/// Number of batches that are gathered in parallel before they are added to the front.
 const WAVE: usize = 64;
 
 impl Formation<'_> {
-    /// Adds what the local blocks assembled in a supernode leave, in their order; None without memory.
+    /// Adds the contributions of the local blocks of a supernode, in order; None if memory is insufficient.
     pub(super) fn assemble(
         &self,
         front: &mut Front<'_>,
@@ -83,12 +83,12 @@ impl Formation<'_> {
             }
         }
         filled.into_iter().for_each(|batch| system.workspace.put_back_batch(batch));
-        // Products read beyond the end.
+        // Vector loads read beyond the end.
         sums.cached.resize(sums.cached.len() + LANES, 0.0);
         Some(sums)
     }
 
-    /// The same batch by batch: what is cached of them is written where it stays.
+    /// Assembles batch by batch on one thread, and writes the cache directly.
     fn assemble_in_turn(&self, front: &mut Front<'_>, batches: Batches<'_>, sums: &mut Sums) {
         let layout = &self.system.layout;
         let mut batch = self.system.workspace.batch();
@@ -116,7 +116,7 @@ impl Formation<'_> {
         self.system.count(run, self.control);
     }
 
-    /// The first columns of the shares of a front that several threads add to, each a few blocks.
+    /// Returns the first columns of the shares of a front for several threads, each a few blocks.
     fn shares(&self, index: usize) -> Vec<usize> {
         let symbolic = &*self.system.symbolic;
         let Some(s) = symbolic.supernodes().get(index) else { return Vec::new() };
@@ -127,7 +127,7 @@ impl Formation<'_> {
         starts.into_iter().step_by(few).collect()
     }
 
-    /// Adds the ties assembled in a supernode; returns the sum of squares of their right-hand sides.
+    /// Adds the ties of a supernode; returns the sum of squares of their right-hand sides.
     pub(super) fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
         let mut sum_of_squares = 0.0;
         let mut tie = TieEquations::default();
@@ -141,7 +141,7 @@ impl Formation<'_> {
         sum_of_squares
     }
 
-    /// Adds what systems below have left, in the order of the layout.
+    /// Adds the contributions of child systems, in the order of the layout.
     pub(super) fn add_contributions(&self, front: &mut Front<'_>, index: usize) {
         for &below in self.system.contributions.at(index) {
             let blocks = &self.system.layout.contributions()[below as usize];
@@ -151,7 +151,7 @@ impl Formation<'_> {
         }
     }
 
-    /// Adds the priors and the damping of the own blocks of a supernode.
+    /// Adds the priors and the damping to the eliminated blocks of a supernode.
     pub(super) fn add_prior(&self, front: &mut Front<'_>, index: usize) {
         let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
         let positions = symbolic.supernodes()[index].blocks.clone();
@@ -179,13 +179,13 @@ impl Sums {
     }
 }
 
-/// The equations of one tie, their columns in the order of the front of its node.
+/// Equations of one tie, with columns in the order of the front of its assembly node.
 #[derive(Debug, Default)]
 pub(super) struct TieEquations {
     constant: Vec<f64>,
     coefficients: Vec<f64>,
     columns: Vec<usize>,
-    /// The coefficients as they are written, and where the column of each stands among `columns`.
+    /// Unsorted coefficients, and the sorted index of each column.
     written: Vec<f64>,
     order: Vec<usize>,
 }
@@ -207,7 +207,7 @@ impl TieEquations {
         }
     }
 
-    /// Finds the columns in the front.
+    /// Determines the columns in the front.
     fn place(&mut self, system: &System, node: usize, tie: usize) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         let each = &layout.ties()[tie];
@@ -223,12 +223,12 @@ impl TieEquations {
         self.order.extend(columns.iter().map(|column| self.columns.partition_point(|other| other < column)));
     }
 
-    /// The columns of the front, ascending.
+    /// Returns the columns of the front, ascending.
     pub fn columns(&self) -> &[usize] {
         &self.columns
     }
 
-    /// Coefficients in the order of the columns, and right-hand side, of each equation.
+    /// Returns coefficients in the order of the columns, and the right-hand side, for each equation.
     pub fn rows(&self) -> impl Iterator<Item = (&[f64], f64)> {
         self.coefficients.chunks_exact(self.columns.len()).zip(self.constant.iter().copied())
     }

@@ -1,6 +1,6 @@
-//! Right-hand sides that go through a system in parts: up, reduced by what each part eliminates, and down again as solutions.
+//! Right-hand sides of partitioned systems: forward reduction in each part, then back-substitution.
 //!
-//! The solution with an older factor for the right-hand sides that the equations have elsewhere.
+//! Chord steps: solutions with an older factor for the right-hand sides at other values.
 
 use super::eliminated::{Elimination, Reduced};
 use super::equations::{Equations, Prior, TieRows};
@@ -12,44 +12,44 @@ use super::vectorised::{LANES, dot};
 use super::watch::{Between, Control, watched};
 use crate::{Threads, parallel};
 
-/// Right-hand sides of a part, reduced by the unknowns that it eliminates, C at a time: y = L^-1 r.
+/// Right-hand sides of a part, C per pass, after forward substitution of its eliminated unknowns: y = L^-1 r.
 #[derive(Debug)]
 pub struct ReducedRights<const C: usize = LANES> {
-    /// Those of the local blocks, as [`Elimination::reduce`] has them.
+    /// Rows of the local blocks, as returned by [`Elimination::reduce`].
     pub(super) own: Vec<Vec<[f64; C]>>,
-    /// Those of the others in the order of elimination, one right-hand side after the other; of outer unknowns what is left for them.
+    /// Rows of the retained unknowns in elimination order, one right-hand side after the other; reduced right-hand sides of outer unknowns.
     pub(super) others: Vec<f64>,
-    /// y^T y of every two of them, outer unknowns not counted: over all parts that is r^T N^-1 r.
+    /// Products y^T y of all pairs, without outer unknowns; their sum over all parts is r^T N^-1 r.
     pub products: Vec<f64>,
-    /// How many unknowns are not local, and how many of them are outer ones.
+    /// Numbers of retained unknowns and of outer unknowns.
     pub(super) counts: (usize, usize),
 }
 
-/// A step with an older factor N = L L^T.
+/// Modified Newton step with an older factor N = L L^T.
 #[derive(Debug)]
 pub struct Chord {
-    /// About N^-1 A^T l over all unknowns, in the order of the layout.
+    /// Approximate solution N^-1 A^T l over all unknowns, in the order of the layout.
     pub step: Vec<f64>,
     /// y = L^-1 A^T l.
     pub reduced: Vec<f64>,
-    /// y^T y: by how much it lowers the sum of squares of the equations.
+    /// y^T y, the predicted decrease of the sum of squares.
     pub decrease: f64,
 }
 
 impl<const C: usize> ReducedRights<C> {
-    /// What is left for the outer unknowns, one right-hand side after the other.
+    /// Returns the reduced right-hand sides of the outer unknowns, one after the other.
     pub fn left(&self) -> Vec<f64> {
         let (all, outer) = self.counts;
         self.others.chunks_exact(all.max(1)).flat_map(|column| &column[all - outer..]).copied().collect()
     }
 
-    /// y, all of it.
+    /// Returns all elements of y.
     pub fn reduced(&self) -> Vec<f64> {
         let own = self.own.iter().flat_map(|own| own.as_flattened());
         own.chain(&self.others).copied().collect()
     }
 
-    /// Puts solutions for the outer unknowns in the place of what is left for them.
+    /// Replaces the reduced right-hand sides of the outer unknowns with their solutions.
     fn put(&mut self, solutions: &[f64]) {
         let (all, outer) = self.counts;
         let columns = self.others.chunks_exact_mut(all.max(1));
@@ -60,10 +60,10 @@ impl<const C: usize> ReducedRights<C> {
 }
 
 impl System {
-    /// Reduces right-hand sides over all unknowns of a part, one after the other. What its factor comes from is as in [`System::solve`].
+    /// Reduces right-hand sides over all unknowns of a part, one after the other, with the arguments as in [`System::solve`].
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce_rights(
         &self,
         threads: &Threads,
@@ -89,10 +89,10 @@ impl System {
         Ok(reduced?)
     }
 
-    /// Solves for all unknowns of a part where right-hand sides were reduced, solutions for the outer ones being given.
+    /// Solves for all unknowns of a part, from reduced right-hand sides and the solutions of the outer unknowns.
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn solve_reduced_rights<const C: usize>(
         &self,
         threads: &Threads,
@@ -117,7 +117,7 @@ impl System {
 }
 
 impl Elimination<'_> {
-    /// y^T y of so many right-hand sides, row by row.
+    /// Returns the products y^T y of all right-hand sides, row by row.
     fn products(&self, reduced: &ReducedRights, columns: usize) -> Vec<f64> {
         let (mut sums, (all, outer)) = (vec![0.0; columns * columns], reduced.counts);
         let mut add = |y: &dyn Fn(usize) -> f64| {
@@ -140,12 +140,12 @@ impl Elimination<'_> {
 }
 
 impl System {
-    /// The chord step to equations and priors at other values of the unknowns than those that the factor comes from.
+    /// Computes the chord step for equations and priors at values that differ from the linearization point of the factor.
     ///
-    /// For a whole system, and a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]).
+    /// Requires a whole system and a factor with cached local eliminations ([`Factor::has_cached`]).
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn chord(
         &self,
         threads: &Threads,
@@ -159,14 +159,14 @@ impl System {
         Ok(Chord { step, reduced, decrease })
     }
 
-    /// The right-hand side A^T l of equations and priors at other values than those that the factor comes from, with `rights` over all unknowns,
-    /// reduced. The local blocks are eliminated from it by the equations given, the others by the factor. The same bits for any number of
-    /// threads. For a factor that has cached what the elimination of the local blocks has left.
+    /// Reduces the right-hand side A^T l + `rights` of equations and priors at values that differ from the factor's linearization point.
+    /// Local blocks are eliminated with the given equations, other unknowns with the factor. Bitwise identical for any number of threads.
+    /// Requires a factor with cached local eliminations.
     ///
-    /// `rights`: of a whole system those of priors; of a part also what the parts below it have left, and zero for outer unknowns.
+    /// `rights` contains the priors; for a part also the contributions of child systems, and zeros for outer unknowns.
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce_chord(
         &self,
         threads: &Threads,
@@ -183,7 +183,7 @@ impl System {
             self.add_rights_of_ties(equations, &mut others);
             let at_node = |index: usize| self.rights_at_node(equations, prior, index, control);
             let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
-            // One after the other in a fixed order, whichever thread has found them.
+            // In a fixed order, independent of the threads.
             found.iter().for_each(|found| found.add_to(&mut others, counts.0));
             factor.forward_columns(&mut others);
             let own: Vec<Vec<[f64; 1]>> = found.into_iter().map(|found| found.own).collect();
@@ -195,8 +195,8 @@ impl System {
         Ok(reduced?)
     }
 
-    /// What the local blocks assembled in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
-    /// equations: to form them takes less time than to read what the factor has cached.
+    /// Returns the right-hand sides of the local blocks of a supernode, and their contributions to other unknowns. Normal matrices are
+    /// formed again from the equations, which is faster than reading the cache of the factor.
     fn rights_at_node(
         &self,
         equations: &dyn Equations,
@@ -220,7 +220,7 @@ impl System {
         found
     }
 
-    /// Adds A^T l of ties to a right-hand side in the order of elimination.
+    /// Adds A^T l of ties to a right-hand side in elimination order.
     fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         let (mut constant, mut coefficients) = (Vec::new(), Vec::new());

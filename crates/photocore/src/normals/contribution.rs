@@ -1,7 +1,7 @@
-//! What a part of a larger system leaves for the unknowns that it shares with others (Helmert blocking).
+//! Contribution of a partial system to the unknowns that it shares with other parts (Helmert blocking).
 //!
-//! With i what a part eliminates and s its outer unknowns, U = A_ss - A_si A_ii^-1 A_is and u = b_s - A_si A_ii^-1 b_i: the front of the
-//! outer blocks, assembled and left open.
+//! With eliminated unknowns i and outer unknowns s, U = A_ss - A_si A_ii^-1 A_is and u = b_s - A_si A_ii^-1 b_i. They are the assembled,
+//! unfactored front of the outer blocks.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use super::layout::{Layout, LayoutError};
 use super::panels::SelectedInverse;
 use super::system::System;
 
-/// What the elimination of a part leaves for its outer unknowns, block by block.
+/// Schur complement of a partial system on its outer unknowns, block by block.
 #[derive(Debug, Clone, Default)]
 pub struct Contribution<'a> {
     /// U, lower triangle, column by column.
@@ -22,19 +22,19 @@ pub struct Contribution<'a> {
     pub diagonal: Cow<'a, [f64]>,
 }
 
-/// Numbers in the lower triangle of a symmetric matrix.
+/// Number of elements in the lower triangle of a symmetric matrix.
 pub const fn packed(order: usize) -> usize {
     order * (order + 1) / 2
 }
 
-/// Where column `j` of a packed lower triangle stands, from its diagonal on.
+/// Returns the range of column `j` of a packed lower triangle, from its diagonal.
 pub(super) fn column(order: usize, j: usize) -> Range<usize> {
     let start = j * order - j * j.saturating_sub(1) / 2;
     start..start + order - j
 }
 
 impl Contribution<'_> {
-    /// Whether it is over so many unknowns.
+    /// Whether all arrays fit this number of unknowns.
     pub fn is_over(&self, unknowns: usize) -> bool {
         let Self { matrix, right, diagonal } = self;
         [matrix.len(), right.len(), diagonal.len()] == [packed(unknowns), unknowns, unknowns]
@@ -42,7 +42,7 @@ impl Contribution<'_> {
 }
 
 impl Front<'_> {
-    /// Adds a contribution whose rows and columns are the given ones of the front, lower triangle only.
+    /// Adds a contribution to the given rows and columns of the front, lower triangle only.
     pub fn add_contribution(&mut self, given: &Contribution<'_>, rows: &[usize]) {
         let (width, height) = (self.width, self.height);
         for (j, &at) in rows.iter().enumerate() {
@@ -61,7 +61,7 @@ impl Front<'_> {
 }
 
 impl System {
-    /// The rows of some retained blocks in the front of a supernode; all are in its pattern.
+    /// Returns the rows of some retained blocks in the front of a supernode; all must be in its pattern.
     pub(super) fn rows_of(&self, supernode: usize, blocks: &[u32]) -> Vec<usize> {
         let rows = |&block: &u32| {
             let position = self.symbolic.position(block as usize);
@@ -72,7 +72,7 @@ impl System {
     }
 }
 
-/// Writes both triangles of a symmetric matrix whose lower one is packed.
+/// Expands a packed lower triangle to a full symmetric matrix.
 pub(super) fn unpack(order: usize, triangle: &[f64], square: &mut [f64]) {
     for j in 0..order {
         for (i, &value) in (j..order).zip(&triangle[column(order, j)]) {
@@ -82,10 +82,10 @@ pub(super) fn unpack(order: usize, triangle: &[f64], square: &mut [f64]) {
 }
 
 impl SelectedInverse {
-    /// The inverse over some retained blocks that stand together in its pattern, in their order: a lower triangle, column by column.
+    /// Returns the inverse over retained blocks that are coupled in the pattern, in order: a lower triangle, column by column.
     ///
     /// # Errors
-    /// [`LayoutError::Block`] if two of them are outside the pattern.
+    /// [`LayoutError::Block`] if a pair of the blocks is outside the pattern.
     pub fn triangle(&self, layout: &Layout, blocks: &[u32]) -> Result<Vec<f64>, LayoutError> {
         let starts = blocks.iter().scan(0, |next, &block| {
             let start = *next;

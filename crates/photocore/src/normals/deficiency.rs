@@ -1,30 +1,30 @@
-//! What the equations of a factor leave undetermined.
+//! Rank defect of the normal equations.
 
 use super::factor::Factor;
 use super::layout::Layout;
 use super::symbolic::Symbolic;
 
 impl Factor {
-    /// The combinations of unknowns that the equations do not determine, if any.
+    /// Returns the undetermined combinations of unknowns, if any.
     pub fn deficiency(&self) -> Option<Deficiency<'_>> {
         (!self.lost.is_empty()).then_some(Deficiency { factor: self })
     }
 }
 
-/// Unknowns that the equations do not determine.
+/// Undetermined combinations of unknowns: the null space of the normal equations.
 #[derive(Debug)]
 pub struct Deficiency<'a> {
     factor: &'a Factor,
 }
 
 impl Deficiency<'_> {
-    /// How many combinations of unknowns are not determined.
+    /// Number of undetermined combinations.
     pub fn defect(&self) -> usize {
         self.factor.lost.len()
     }
 
-    /// For each of them the retained blocks it moves, ascending: the blocks that take
-    /// at least a hundredth of the largest share in a null vector, each unknown in units of what its equations alone determine.
+    /// Returns the retained blocks in each null vector, ascending: shares of at least 1 % of the largest. Unknowns are scaled by the
+    /// precision from their own equations alone.
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let symbolic = &*self.factor.panels.symbolic;
         let vectors = self.factor.lost.iter().map(|&pivot| {
@@ -35,14 +35,14 @@ impl Deficiency<'_> {
         vectors.collect()
     }
 
-    /// For each of them the unknowns that it moves, ascending: those that take at least a tenth of the largest share.
+    /// Returns the unknowns in each null vector, ascending: shares of at least one tenth of the largest.
     pub fn unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
         let Factor { lost, .. } = self.factor;
         lost.iter().map(|&pivot| self.factor.taking_part(layout, self.factor.combination(pivot))).collect()
     }
 
-    /// For each of them all unknowns with how it moves them and their diagonal element of the equations: what these alone would make of
-    /// such a move is its square times the element.
+    /// Returns all unknowns of each null vector, as (unknown, component x, diagonal element n of the normal equations). The product x^2 n
+    /// is the sum of squares that the unknown's own equations assign to this change.
     pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
         let Factor { lost, diagonal, .. } = self.factor;
         let combination = |&pivot: &usize| {

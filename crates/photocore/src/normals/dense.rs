@@ -1,5 +1,5 @@
-//! Dense kernels on the fronts of the factorisation: tiles of fixed size, each computed by one thread with `faer`, so that
-//! the bits do not depend on the number of threads.
+//! Dense kernels on the fronts of the factorisation. Each fixed-size tile is computed by one thread with `faer`, so that results are
+//! bitwise independent of the number of threads.
 
 use std::hint::black_box;
 
@@ -16,18 +16,18 @@ use super::watch::Control;
 use super::workspace::Workspace;
 use crate::parallel;
 
-/// Columns factored at a time.
+/// Number of columns per factorisation step.
 const STEP: usize = 48;
-/// Side of the tiles of products and solutions.
+/// Tile size of products and solutions.
 const TILE: usize = 192;
-/// Multiply-adds below which a tile loop stays on one thread.
+/// Minimum number of multiply-adds of a tile loop for several threads.
 const WORTH_SHARING: f64 = 2e6;
 
-/// Side of matrices whose product is large enough for buffers.
+/// Minimum order of matrices whose product allocates buffers.
 const BUFFERED: usize = 32;
 
-/// Takes the buffers of this thread that products of matrices are made in, twice its last cache. The library keeps them; a thread that has
-/// none takes them with its first large product, and ends the process where there is no room.
+/// Allocates the product buffers of the current thread, twice the size of its last cache. The library reuses them. Otherwise the first
+/// large product of a thread would allocate them, and abort the process if memory is insufficient.
 pub fn take_product_buffers() {
     let ones = vec![1.0; BUFFERED * BUFFERED];
     let ones = MatRef::from_column_major_slice(&ones, BUFFERED, BUFFERED);
@@ -37,21 +37,20 @@ pub fn take_product_buffers() {
     black_box(&product);
 }
 
-/// Pivots that need a closer look, as columns of a front, ascending.
+/// Irregular pivots, as columns of a front, ascending.
 #[derive(Debug, Default)]
 pub(super) struct Pivots {
-    /// Lost in rounding: set to one, and nothing below them.
+    /// Pivots that are lost in rounding errors: set to one, with zeros below.
     pub lost: Vec<usize>,
-    /// So small beside the diagonal that they may be nothing but rounding.
+    /// Pivots so small compared with the diagonal that they may be rounding errors.
     pub doubtful: Vec<usize>,
 }
 
-/// A pivot smaller than this fraction of its diagonal element before any elimination is doubtful.
+/// Ratio of a pivot to its initial diagonal element below which it is doubtful.
 const DOUBTFUL: f64 = 1e-8;
 
-/// Factors the leading `width` columns of a symmetric front (lower triangle, `panel` = those columns) in place and
-/// subtracts their product from the `update`, the rest of the front. `diagonal` is that of the columns before any elimination.
-/// The pivots of the columns `given_up` count as lost whatever they are.
+/// Factors the leading `width` columns of a symmetric front (lower triangle, stored in `panel`). Subtracts their product from `update`, the
+/// rest of the front. `diagonal` is the initial diagonal of the columns. Pivots of the columns `given_up` always count as lost.
 pub(super) fn factor_front(
     mut panel: MatMut<'_, f64>,
     mut update: MatMut<'_, f64>,
@@ -66,8 +65,8 @@ pub(super) fn factor_front(
     pivots
 }
 
-/// Eliminates columns, half by half so that most of the work is in large products. They are the columns of the front from `first` on,
-/// and begin with the row of their diagonal.
+/// Eliminates columns by recursive bisection, so that most of the work is in large products. The columns are those of the front from
+/// `first`, and start at their diagonal row.
 fn eliminate(
     columns: MatMut<'_, f64>,
     diagonal: &[f64],
@@ -113,7 +112,7 @@ fn eliminate_step(
     }
 }
 
-/// target -= x x_top^T on and below the diagonal, x_top being the first rows of x, as many as the target has columns.
+/// target -= x x_top^T on and below the diagonal; x_top contains as many leading rows of x as the target has columns.
 fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>, control: &Control) {
     let work = target.nrows() * target.ncols() * x.ncols() / 2;
     for_tiles(control, column_tiles(target), work, &|first, tile| {
@@ -126,8 +125,8 @@ fn subtract_square(target: MatMut<'_, f64>, x: MatRef<'_, f64>, control: &Contro
     });
 }
 
-/// Cholesky factor of the lower triangle of a matrix, column by column, in place. A pivot is compared with the diagonal before any
-/// elimination; columns are counted from `first`.
+/// Cholesky factorisation of the lower triangle of a matrix, column by column, in place. A pivot is compared with the initial diagonal;
+/// column indices are relative to `first`.
 struct Cholesky<'a> {
     a: &'a mut [f64],
     width: usize,
@@ -151,14 +150,14 @@ impl Kernel for Cholesky<'_> {
                     column[i] -= factor * other[i];
                 }
             }
-            // Written so that a NaN counts as lost.
+            // With this comparison a NaN is regarded as lost.
             let given_up = self.given_up.contains(&(self.first + j));
             let regular = column[0] > PIVOT_TOLERANCE * self.diagonal[j] && !given_up;
             let pivot = if regular { column[0].sqrt() } else { 1.0 };
             let scale = if regular { pivot.recip() } else { 0.0 };
             column[0] = pivot;
             for i in 1..width - j {
-                // What is lost may not be finite.
+                // A lost column may not be finite.
                 column[i] = if regular { column[i] * scale } else { 0.0 };
             }
             if !regular {
@@ -170,12 +169,12 @@ impl Kernel for Cholesky<'_> {
     }
 }
 
-/// One step of the selected inversion (Takahashi et al. 1973). From the panel `[L_J; L_R]` of the factor and the inverse
-/// `z` of the coupled rows (full square), replaces the panel by that of the inverse:
+/// Performs one step of the selected inversion (Takahashi et al. 1973). From the panel `[L_J; L_R]` of the factor and the inverse `z` over
+/// the coupled rows (full square), it computes the panel of the inverse in place:
 ///
 /// Y = L_R L_J^-1, Z_RJ = -Z_RR Y, Z_JJ = (L_J L_J^T)^-1 - Y^T Z_RJ.
 ///
-/// None without memory.
+/// None if memory is insufficient.
 pub(super) fn invert_front(
     mut panel: MatMut<'_, f64>,
     z: MatRef<'_, f64>,
@@ -202,7 +201,7 @@ pub(super) fn invert_front(
     let (inverse, below) = (inverse.rb(), below.rb());
     for_tiles(control, column_tiles(own.rb_mut()), width * width * height, &|first, mut tile| {
         let columns = tile.ncols();
-        // Rows of L_J^-1 above its diagonal are zero: the product over them is left out.
+        // Rows of L_J^-1 above its diagonal are zero and are skipped.
         let right = inverse.subcols(first, columns).subrows(first, width - first);
         let left = inverse.subrows(first, width - first).transpose();
         matmul(tile.rb_mut(), Accum::Replace, left, right, 1.0, Par::Seq);
@@ -221,7 +220,7 @@ fn column_tiles(matrix: MatMut<'_, f64>) -> Vec<(usize, MatMut<'_, f64>)> {
     tiles(matrix, MatMut::ncols, MatMut::split_at_col_mut)
 }
 
-/// Cuts a matrix into tiles, each with the index of its first row or column.
+/// Splits a matrix into tiles, each with the index of its first row or column.
 fn tiles<'a>(
     mut rest: MatMut<'a, f64>,
     length: impl Fn(&MatMut<'a, f64>) -> usize,
@@ -238,7 +237,7 @@ fn tiles<'a>(
     tiles
 }
 
-/// Does the work on every tile, on several threads when it is worth it; on none any more once the work is to stop.
+/// Processes every tile, with several threads for large work; skips the remaining tiles after a stop.
 fn for_tiles(
     control: &Control,
     tiles: Vec<(usize, MatMut<'_, f64>)>,

@@ -1,7 +1,7 @@
-//! Nested dissection: a separator cuts the graph in two, the halves are dissected in turn, the separator is eliminated last
-//! (George 1973). The halves do not fill in between each other, and are independent subtrees of the elimination tree.
+//! Nested dissection: a separator divides the graph, both halves are dissected recursively, and the separator is eliminated last (George
+//! 1973). The halves cause no mutual fill and are independent subtrees of the elimination tree.
 //!
-//! Approximate minimum degree (Amestoy, Davis and Duff 1996), as `faer` has it.
+//! Approximate minimum degree (Amestoy, Davis and Duff 1996), as implemented in `faer`.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
@@ -9,13 +9,13 @@ use faer::sparse::linalg::amd;
 
 use super::graph::{Graph, NOWHERE};
 
-/// Parts of at most so many blocks are ordered by minimum degree.
+/// Maximum number of blocks that are ordered by minimum degree without a cut.
 const LEAF: usize = 48;
-/// Where a line of blocks may be cut, in shares of its length.
+/// Possible cuts of a sequence of blocks, as fractions of its length.
 const CUTS: [f64; 5] = [0.5, 0.44, 0.56, 0.38, 0.62];
 
-/// Orders a graph by nested dissection: cut across the positions of the blocks where they are given, else across the levels of
-/// a breadth-first search. None if a part that is not cut is too large for minimum degree.
+/// Orders a graph by nested dissection, across the positions of the blocks or, without positions, the levels of a breadth-first search.
+/// None if an uncut part is too large for minimum degree.
 pub(super) fn nested_dissection(graph: &Graph, places: Option<&[[f64; 3]]>) -> Option<Vec<usize>> {
     let (part, place) = (vec![0; graph.len()], vec![NOWHERE; graph.len()]);
     let mut dissection = Dissection { graph, places, part, place, parts: 0, order: vec![] };
@@ -26,22 +26,22 @@ pub(super) fn nested_dissection(graph: &Graph, places: Option<&[[f64; 3]]>) -> O
 struct Dissection<'a> {
     graph: &'a Graph,
     places: Option<&'a [[f64; 3]]>,
-    /// Number of the part that a block was last put into: numbers are never used again.
+    /// Number of the last part of each block; numbers are not reused.
     part: Vec<usize>,
     parts: usize,
-    /// Room for the places of blocks in a part.
+    /// Scratch memory for the indices of blocks in a part.
     place: Vec<u32>,
     order: Vec<usize>,
 }
 
-/// The blocks on either side of a separator, and its own.
+/// Blocks on both sides of a separator, and the separator.
 struct Cut {
     sides: [Vec<usize>; 2],
     separator: Vec<usize>,
 }
 
 impl Cut {
-    /// Blocks of the separator for each pair of blocks that it parts: what a cut costs for what it brings.
+    /// Returns the ratio of separator blocks to separated pairs of blocks: the cost of a cut relative to its benefit.
     fn cost(&self) -> f64 {
         let [one, other] = self.sides.each_ref().map(|side| side.len() as f64);
         self.separator.len() as f64 / (one * other)
@@ -49,7 +49,7 @@ impl Cut {
 }
 
 impl Dissection<'_> {
-    /// Appends the blocks of a part in the order of their elimination.
+    /// Appends the blocks of a part in their elimination order.
     fn dissect(&mut self, members: Vec<usize>) -> Option<()> {
         let cut = if members.len() > LEAF { self.best_cut(&members) } else { None };
         match cut {
@@ -66,7 +66,7 @@ impl Dissection<'_> {
         Some(())
     }
 
-    /// The cheapest cut; none that leaves blocks on both sides when the part hangs together too closely.
+    /// Returns the cheapest cut; None if the part is too dense to leave blocks on both sides.
     fn best_cut(&mut self, members: &[usize]) -> Option<Cut> {
         let mut best: Option<Cut> = None;
         for line in self.lines(members) {
@@ -82,7 +82,7 @@ impl Dissection<'_> {
         best
     }
 
-    /// Parts a line of blocks at a place; the separator is the smaller of the two shores.
+    /// Cuts a sequence of blocks at an index; the separator is the smaller of the two boundaries.
     fn cut(&mut self, line: &[usize], place: usize) -> Cut {
         let (one, other) = (self.parts + 1, self.parts + 2);
         self.parts += 2;
@@ -101,7 +101,7 @@ impl Dissection<'_> {
         Cut { sides, separator }
     }
 
-    /// The blocks of a part in lines that are worth cutting across.
+    /// Returns the blocks of a part in the sequences to cut.
     fn lines(&mut self, members: &[usize]) -> Vec<Vec<usize>> {
         let Some(places) = self.places else { return vec![self.breadth_first(members)] };
         principal_axes(members, places)
@@ -115,14 +115,14 @@ impl Dissection<'_> {
             .collect()
     }
 
-    /// The blocks of a part by their distance in the graph from one of its ends, component by component.
+    /// Returns the blocks of a part by graph distance from a peripheral block, component by component.
     fn breadth_first(&mut self, members: &[usize]) -> Vec<usize> {
         let part = self.graph.subgraph(members, &mut self.place);
         part.breadth_first_line().into_iter().map(|block| members[block]).collect()
     }
 }
 
-/// The two directions across which the places of some blocks spread most.
+/// Returns the two directions in which the positions of some blocks vary most.
 fn principal_axes(members: &[usize], places: &[[f64; 3]]) -> [[f64; 3]; 2] {
     let count = members.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|k| members.iter().map(|&b| places[b][k]).sum::<f64>() / count);
@@ -141,7 +141,7 @@ fn principal_axes(members: &[usize], places: &[[f64; 3]]) -> [[f64; 3]; 2] {
     }
 }
 
-/// Orders a graph so that each block in turn leaves few couplings behind; None if the graph is too large.
+/// Orders a graph by approximate minimum degree; None if the graph is too large.
 pub(super) fn minimum_degree(graph: &Graph) -> Option<Vec<usize>> {
     let (pointers, neighbours) = graph.compressed()?;
     let count = graph.len();

@@ -1,5 +1,5 @@
-//! What the elimination of local blocks leaves: cached from the formation to the solution, or found from the equations again.
-//! Right-hand sides are reduced by it, and the local blocks are solved from it.
+//! Local eliminations for the solution phase: cached from the formation or computed again. They reduce right-hand sides and solve for the
+//! local blocks.
 
 use std::ops::Range;
 
@@ -18,23 +18,23 @@ use super::watch::Control;
 use super::workspace::Eliminated;
 use crate::parallel;
 
-/// Batches that a thread takes at a time where they are eliminated again.
+/// Number of batches per task if they are eliminated again.
 const CHUNK: usize = 64;
 
 impl Batch {
-    /// Appends what the elimination has left: V, v and L.
+    /// Appends the elimination of the batch: V, v and L.
     pub fn cache(&mut self, layout: &Layout, cached: &mut Vec<f64>) {
         let end = self.end + self.numbers_beside(layout) - self.start;
         cached.extend_from_slice(&self.eliminated(layout)[..end]);
     }
 
-    /// Leaves it in its buffer; the V of the next batch goes behind it.
+    /// Stores the elimination in the buffer of V; the next batch follows it.
     pub fn cache_in_place(&mut self, layout: &Layout) {
         self.eliminated(layout);
         self.start = self.end + self.numbers_beside(layout);
     }
 
-    /// Writes v and L behind V: all that the elimination has left, in front of what no one reads for its value.
+    /// Appends v and L to V. The padding behind them is read by vector loads but not used.
     pub fn eliminated(&mut self, layout: &Layout) -> &[f64] {
         let l = layout.local_dim();
         let (own, rest) = self.coupling[self.end..].split_at_mut(self.reduced.len());
@@ -44,26 +44,26 @@ impl Batch {
         &self.coupling[self.start..]
     }
 
-    /// Numbers in v and L.
+    /// Number of values in v and L.
     pub(super) fn numbers_beside(&self, layout: &Layout) -> usize {
         let l = layout.local_dim();
         self.locals.len() * (l + Triangle::numbers(l))
     }
 }
 
-/// Where the unknowns that batches are tied to stand in the order of elimination.
+/// Ranges of the unknowns coupled to a batch, in elimination order.
 #[derive(Default)]
 pub(super) struct Coupled {
     ranges: SmallVec<[Range<usize>; 16]>,
-    /// How many of them are main blocks, the first.
+    /// Number of main blocks, which are first.
     main: usize,
-    /// The set of what the groups of the last batch had in common with others, and where that stands.
+    /// Set of shared block lists of the last batch, and its ranges.
     set: Option<u32>,
     shared: SmallVec<[Range<usize>; 4]>,
 }
 
 impl Coupled {
-    /// Of the batch that begins with a local block: main blocks, then segments, as [`Batch`] has them.
+    /// Determines the ranges of a batch from its first unit: main blocks, then segments, as in [`Batch`].
     fn find(&mut self, system: &System, first: u32) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         self.ranges.clear();
@@ -81,7 +81,7 @@ impl Coupled {
         self.ranges.extend(self.shared.iter().cloned());
     }
 
-    /// Of a set of what groups have in common with others.
+    /// Determines the ranges of a set of shared block lists.
     fn find_common(&mut self, system: &System, set: u32) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         let numbers = system.incidence.members(set).iter();
@@ -96,51 +96,51 @@ impl Coupled {
         self.shared = spans.into_iter().map(place).collect();
     }
 
-    /// Unknowns in a range: D in a main block, where that is known.
+    /// Returns the number of unknowns in a range: D for a main block, if D is known.
     #[inline(always)]
     fn width<const D: usize>(&self, index: usize) -> usize {
         let width = self.ranges[index].len();
         if index < self.main { size::<D>(width) } else { width }
     }
 
-    /// Numbers in V, v and L of so many local blocks.
+    /// Number of values in V, v and L of `depth` local blocks.
     fn numbers(&self, layout: &Layout, depth: usize) -> usize {
         let l = layout.local_dim();
         depth * (l * (self.all_width() + 1) + Triangle::numbers(l))
     }
 
-    /// Unknowns in all ranges.
+    /// Number of unknowns in all ranges.
     #[inline(always)]
     fn all_width(&self) -> usize {
         self.ranges.iter().map(Range::len).sum()
     }
 
-    /// Unknowns of every main block, where all have the same number.
+    /// Returns the number of unknowns per main block, if equal for all.
     fn main_dim(&self) -> Option<usize> {
         let dim = self.ranges[..self.main].first()?.len();
         self.ranges[..self.main].iter().all(|range| range.len() == dim).then_some(dim)
     }
 }
 
-/// What the elimination of a batch has left.
+/// Elimination of a batch.
 #[derive(Clone, Copy)]
 pub(super) struct EliminatedBatch<'a> {
     coupled: &'a Coupled,
-    /// How many local blocks.
+    /// Number of local blocks.
     depth: usize,
-    /// V, v and L; what follows is read, and not used.
+    /// V, v and L, with padding that is read but not used.
     numbers: &'a [f64],
 }
 
 impl<'a> EliminatedBatch<'a> {
-    /// Of a batch that is eliminated.
+    /// Creates the view of an eliminated batch.
     pub fn new(system: &System, batch: &'a mut Batch, coupled: &'a mut Coupled) -> Self {
         let depth = batch.locals.len();
         batch.locals.iter().take(1).for_each(|&first| coupled.find(system, first));
         Self { coupled, depth, numbers: batch.eliminated(&system.layout) }
     }
 
-    /// V, with what follows it, and the triangles L.
+    /// Returns V with the data behind it, and the triangles L.
     #[inline(always)]
     fn parts<const L: usize>(self) -> (&'a [f64], impl Iterator<Item = Triangle>) {
         let triangles = &self.numbers[L * self.depth * (self.coupled.all_width() + 1)..];
@@ -148,50 +148,50 @@ impl<'a> EliminatedBatch<'a> {
         (self.numbers, triangles.map(|numbers| Triangle::of(L, numbers)))
     }
 
-    /// v, the right-hand side that the equations have.
+    /// Returns v, the reduced right-hand side of the equations.
     fn right(self, layout: &Layout) -> &'a [f64] {
         let count = layout.local_dim() * self.depth;
         &self.numbers[count * self.coupled.all_width()..][..count]
     }
 
-    /// Reduces the right-hand sides that `found` has from `start` on for the local blocks: they become L^-1 r, and -V^T L^-1 r of the
-    /// others is appended as that of some right-hand sides.
+    /// Replaces the local right-hand sides r of `found`, from index `start`, by L^-1 r. Appends -V^T L^-1 r, the change of other right-hand
+    /// sides in `block`.
     pub fn reduce<const C: usize>(self, layout: &Layout, block: usize, start: usize, found: &mut Reduced<C>) {
         run(layout, self.coupled.main_dim(), Reduce { batch: self, block, start, found });
     }
 
-    /// Solves for the local blocks, whose right-hand sides are reduced, with the others in place: x = L^-T (L^-1 r - V x_o). `others` are
-    /// in the order of elimination.
+    /// Solves for the local blocks from their reduced right-hand sides and the solutions of the others: x = L^-T (L^-1 r - V x_o). `others`
+    /// are in elimination order.
     pub fn solve<const C: usize>(self, layout: &Layout, others: &[[f64; C]], own: &mut [[f64; C]]) {
         run(layout, self.coupled.main_dim(), Solve { batch: self, others, own });
     }
 }
 
-/// Right-hand sides, C of them at a time, reduced by some local blocks.
+/// Right-hand sides, C per block, reduced by some local blocks.
 #[derive(Default)]
 pub(super) struct Reduced<const C: usize> {
-    /// Those of the local blocks: batch by batch, of each batch C right-hand sides after the other.
+    /// Rows of the local blocks, batch by batch; per batch one block of C right-hand sides after the other.
     pub own: Vec<[f64; C]>,
-    /// What the others lose, range by range.
+    /// Changes of the other right-hand sides, range by range.
     pub values: Vec<[f64; C]>,
-    /// Which right-hand sides, and where the unknowns stand in the order of elimination.
+    /// Block of right-hand sides, and range of unknowns in elimination order.
     ranges: Vec<(usize, Range<usize>)>,
 }
 
 impl<const C: usize> Reduced<C> {
-    /// Appends zeros for other unknowns of the right-hand sides of a block.
+    /// Appends zeros for other unknowns in the right-hand sides of a block.
     pub fn room(&mut self, block: usize, range: Range<usize>) {
         self.values.resize(self.values.len() + range.len(), [0.0; C]);
         self.ranges.push((block, range));
     }
 
-    /// What the others lose of one right-hand side, with their places in the order of elimination.
+    /// Returns the changes of one right-hand side, with positions in elimination order.
     pub fn entries(&self) -> Vec<(usize, f64)> {
         let places = self.ranges.iter().flat_map(|(_, range)| range.clone());
         places.zip(self.values.as_flattened().iter().copied()).collect()
     }
 
-    /// Adds the part of the others to right-hand sides of so many unknowns in the order of elimination, one after the other.
+    /// Adds the changes to right-hand sides of `count` unknowns in elimination order, one after the other.
     pub fn add_to(&self, others: &mut [f64], count: usize) {
         let mut values = &self.values[..];
         for (block, range) in &self.ranges {
@@ -205,7 +205,7 @@ impl<const C: usize> Reduced<C> {
     }
 }
 
-/// The elimination of all local blocks: cached, or to be done again.
+/// Elimination of all local blocks, cached or repeated.
 pub(super) struct Elimination<'a> {
     pub system: &'a System,
     pub cached: &'a Eliminated,
@@ -215,11 +215,11 @@ pub(super) struct Elimination<'a> {
     pub control: &'a Control,
 }
 
-/// Batches assembled in a supernode that one thread takes.
+/// Batches of a supernode that are processed by one task.
 type Part<'a> = (usize, Batches<'a>);
 
 impl Elimination<'_> {
-    /// All batches in the order of the incidence: what is cached at a supernode is read from its start.
+    /// Returns all batches in the order of the incidence: the cache of a supernode is read from its start.
     pub fn parts(&self) -> Vec<Part<'_>> {
         let at = |node: usize| self.system.incidence.batches_of_locals_at(node);
         let nodes = 0..=self.system.symbolic.supernode_count();
@@ -235,7 +235,7 @@ impl Elimination<'_> {
         Reader { elimination: self, cached: None, batch: Batch::default(), coupled: Coupled::default() }
     }
 
-    /// Reduces right-hand sides over all unknowns, one after the other: part by part.
+    /// Reduces right-hand sides over all unknowns, one after the other; one result per part.
     pub fn reduce<const C: usize>(&self, rights: &[f64]) -> Vec<Reduced<C>> {
         let layout = &self.system.layout;
         let unknowns = layout.unknowns().max(1);
@@ -270,8 +270,8 @@ impl Elimination<'_> {
         parallel::map_each_with(self.parts(), || self.reader(), reduce)
     }
 
-    /// Solves for all local blocks, part by part as they are reduced, with the others in place: `others` are in the order of elimination, C
-    /// solutions after the other. `own` are the right-hand sides reduced; None for the one that the equations have.
+    /// Solves for all local blocks, part by part. `others` contains the solutions of the other unknowns in elimination order, C per block.
+    /// `own` contains the reduced right-hand sides; None for that of the equations.
     pub fn solve<const C: usize>(
         &self,
         own: Option<Vec<Vec<[f64; C]>>>,
@@ -301,7 +301,7 @@ impl Elimination<'_> {
     }
 }
 
-/// What the elimination of batches has left, one after the other.
+/// Sequential reader of the eliminations of batches.
 struct Reader<'a> {
     elimination: &'a Elimination<'a>,
     cached: Option<&'a [f64]>,
@@ -310,12 +310,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Begins with the batches assembled in a supernode, or a part of those that are not cached.
+    /// Starts with the batches of a supernode, or with a part of them if they are not cached.
     fn begin(&mut self, node: usize) {
         self.cached = self.elimination.cached.get(node).map(|cached| &cached[..]);
     }
 
-    /// The next batch: that of these local blocks.
+    /// Returns the elimination of the next batch, with these local blocks.
     fn next(&mut self, locals: &[u32]) -> EliminatedBatch<'_> {
         let Elimination { system, equations, prior, damping, .. } = *self.elimination;
         self.coupled.find(system, locals[0]);
@@ -335,7 +335,7 @@ impl Reader<'_> {
         EliminatedBatch { coupled, depth, numbers }
     }
 
-    /// Passes over it.
+    /// Skips a batch.
     fn pass(&mut self, locals: &[u32]) {
         if self.cached.is_some() {
             self.next(locals);
@@ -391,7 +391,7 @@ impl<const C: usize> Kernel for Solve<'_, C> {
             let subtract = |own: &mut [f64; C], product: [f64; C]| {
                 own.iter_mut().zip(product).for_each(|(value, product)| *value -= product);
             };
-            // The width of a main block is known where this is compiled: its sum needs no loop.
+            // The compiler knows the width of a main block, so that its sum needs no loop.
             if index < coupled.main {
                 rows.for_each(|(own, row)| subtract(own, dot_columns(row, x)));
             } else {

@@ -1,4 +1,4 @@
-//! What the equations of one local block take up together, from the selected inverse.
+//! Joint cofactors of the equations of one local block, from the selected inverse.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,29 +12,29 @@ use super::layout::LayoutError;
 use super::panels::SelectedInverse;
 use super::system::System;
 
-/// The equations of one local block: A x_local + B x_others = l.
+/// Equations of one local block: A x_local + B x_others = l.
 struct Own {
     local: Mat<f64>,
     others: Mat<f64>,
-    /// Each other block with its first column of B.
+    /// First column in B of each other block.
     blocks: BTreeMap<usize, usize>,
 }
 
-/// Cofactors of equations a of one local block, whether or not they take part: with Q the inverse normal matrix.
+/// Cofactors of equations a of one local block, included or excluded, with the inverse normal matrix Q.
 #[derive(Debug, Clone)]
 pub struct LocalCofactors {
-    /// a Q a^T of every two equations: square, row by row; NaN of two groups of a local block that is held ([`System::local_functions`]).
+    /// Leverages a Q a^T of all pairs of equations, square, row by row; NaN between groups of a fixed local block.
     pub equations: Vec<f64>,
-    /// The same with all unknowns known but those of the local block.
+    /// The same with only the unknowns of the local block free.
     pub by_local: Vec<f64>,
-    /// Q a^T of the unknowns of the local block, those of each equation together.
+    /// Q a^T for the unknowns of the local block, one vector per equation.
     pub local: Vec<f64>,
-    /// The same of each retained block that the groups of the local block touch.
+    /// Q a^T for each retained block in the groups of the local block.
     pub others: Vec<(usize, Vec<f64>)>,
 }
 
 impl LocalCofactors {
-    /// How many equations there are.
+    /// Number of equations.
     pub fn rows(&self) -> usize {
         self.equations.len().isqrt()
     }
@@ -47,19 +47,19 @@ impl LocalCofactors {
 }
 
 impl System {
-    /// Cofactors of the equations of a local block, in the order of its groups and rows, and of further ones of its own unknowns alone.
-    /// NaN where the local block is not determined.
+    /// Computes the cofactors of the equations of a local block: its groups and rows, then additional equations of its own unknowns. NaN if
+    /// the local block is undetermined.
     ///
-    /// The diagonal is in [`super::Cofactors::equations`]; besides it stands what x and y of an image, or all images of a point, have to
-    /// do with each other. With Q_oo the inverse over all that the block is tied to, H = N_ll^-1 N_lo and C = B - A H,
-    /// a Q a^T is C Q_oo C^T + A N_ll^-1 A^T, Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
+    /// The diagonal is also in [`super::Cofactors::equations`]; here, cofactors between x and y of an image point, or between all
+    /// observations of a point, are added. Q_oo is the inverse over all coupled blocks, H = N_ll^-1 N_lo and C = B - A H. Then a Q a^T = C
+    /// Q_oo C^T + A N_ll^-1 A^T. Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
     ///
-    /// * `equations`, `prior`: those that the inverse comes from;
-    /// * `asked`: the equations whose cofactors are asked for, which may have another weight;
-    /// * `further`: coefficients of the unknowns of the local block, one equation after the other.
+    /// * `equations`, `prior`: equations and priors of the inverse;
+    /// * `asked`: equations with requested cofactors, possibly with other weights;
+    /// * `terms`: coefficients of additional equations of the local unknowns, one equation after the other.
     ///
     /// # Errors
-    /// [`LayoutError::Block`] if the inverse is of another system, [`LayoutError::Length`] if the priors are.
+    /// [`LayoutError::Block`] or [`LayoutError::Length`] if the inverse or the priors belong to another system.
     pub fn local_cofactors(
         &self,
         selected: &SelectedInverse,
@@ -101,7 +101,7 @@ impl System {
         })
     }
 
-    /// The same of a local block that is held, group by group; further equations of its unknowns, so many numbers, take up nothing.
+    /// Computes the cofactors of a fixed local block, group by group; the cofactors of `terms` additional coefficients are zero.
     fn cofactors_apart(
         &self,
         selected: &SelectedInverse,
@@ -133,7 +133,7 @@ impl System {
         Ok(LocalCofactors { equations, by_local, local, others: others.into_iter().collect() })
     }
 
-    /// The equations of a local block as functions of the unknowns that are not local.
+    /// Returns the equations of a local block as functions of the retained unknowns.
     pub fn local_functions(&self, equations: &dyn Equations, local: usize) -> Vec<Function> {
         let Own { others, blocks, .. } =
             self.own_equations(equations, local, self.layout.groups_of(local), &[]);
@@ -146,7 +146,7 @@ impl System {
         (0..others.nrows()).map(function).collect()
     }
 
-    /// The inverse over some blocks, each from a row and column on.
+    /// Returns the inverse over some blocks, with the given offsets.
     fn inverse_over(
         &self,
         selected: &SelectedInverse,
@@ -164,7 +164,7 @@ impl System {
         Ok(q)
     }
 
-    /// Some groups of a local block, and further equations of its unknowns.
+    /// Gathers the equations of some groups of a local block, and additional equations of its unknowns.
     fn own_equations(
         &self,
         equations: &dyn Equations,

@@ -1,42 +1,42 @@
-//! Where the equations of a system come from.
+//! Observation equations and priors: the input of a formation.
 
 use super::contribution::Contribution;
 use super::layout::{Layout, LayoutError};
 
-/// Where the equations of a system come from.
+/// Source of the equations of a system.
 ///
 /// The equations are `A x = l` with unit weight (each row divided by the standard deviation of its observation).
 pub trait Equations: Sync {
     /// Writes the equations of one group of a local block, every element of `rows`.
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>);
 
-    /// Writes those of one group each of several local blocks, one after the other: `groups` says which. All are alike: they have the same
-    /// main block, and as much in common with others.
+    /// Writes the equations of one group per local block, in sequence; `groups` contains the group numbers. All groups have the same main
+    /// block and the same shared blocks.
     fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
         for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
             self.write(local as usize, group as usize, &mut rows.part(t, locals.len()));
         }
     }
 
-    /// Writes the equations of one tie, every element of `rows`. Not called where the layout has no ties.
+    /// Writes the equations of one tie, every element of `rows`. Only called if the layout has ties.
     fn write_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
 
-    /// What a system below has left, in the order of the layout. Not called where there is none.
+    /// Returns the contribution of a child system, in the order of the layout. Only called if there are child systems.
     fn contribution(&self, _below: usize) -> Option<&Contribution<'_>> {
         None
     }
 }
 
-/// The rows of one tie, to be filled in.
+/// Output rows of one tie.
 #[derive(Debug)]
 pub struct TieRows<'a> {
     /// Right-hand sides l (rows).
     pub constant: &'a mut [f64],
-    /// Coefficients, row by row: those of its retained blocks in their order.
+    /// Coefficients, row by row; columns are the unknowns of the tie's retained blocks, in order.
     pub coefficients: &'a mut [f64],
 }
 
-/// The rows of one group of equations, to be filled in. Matrices are row by row.
+/// Output rows of one group of equations. Matrices are stored row by row.
 #[derive(Debug)]
 pub struct GroupRows<'a> {
     /// Right-hand sides l (rows).
@@ -45,13 +45,12 @@ pub struct GroupRows<'a> {
     pub local: &'a mut [f64],
     /// Coefficients of the main retained block (rows x its unknowns).
     pub retained: &'a mut [f64],
-    /// Coefficients of what the group has in common with others (rows x [`Layout::shared_width`]): those of its shared blocks in
-    /// their order.
+    /// Coefficients of the shared blocks, in order (rows x [`Layout::shared_width`]).
     pub shared: &'a mut [f64],
 }
 
 impl GroupRows<'_> {
-    /// Those of one of so many groups that are alike.
+    /// Returns the rows of group `t` of `count` similar groups.
     #[inline(always)]
     pub(crate) fn part(&mut self, t: usize, count: usize) -> GroupRows<'_> {
         GroupRows {
@@ -63,18 +62,17 @@ impl GroupRows<'_> {
     }
 }
 
-/// One of so many equal parts.
+/// Returns part `t` of `count` equal parts.
 #[inline(always)]
 fn part(all: &mut [f64], t: usize, count: usize) -> &mut [f64] {
     let width = all.len() / count;
     &mut all[t * width..][..width]
 }
 
-/// Weights of the unknowns themselves: equations `x_i = constant_i` of the given weight. The first two have the length of the
-/// vector of unknowns.
+/// Prior observations of unknowns: equations `x_i = constant_i` of a given weight. `weight` and `right` have one element per unknown.
 #[derive(Debug, Clone, Default)]
 pub struct Prior {
-    /// Weight w of each unknown; 0 leaves it free.
+    /// Weight w of each unknown; 0 for a free unknown.
     pub weight: Vec<f64>,
     /// Weight times constant, w l.
     pub right: Vec<f64>,
@@ -83,15 +81,14 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// An error unless both lengths are those of a layout.
+    /// Returns an error if a length differs from the layout.
     pub(super) fn check(&self, layout: &Layout) -> Result<(), LayoutError> {
         let Self { weight, right, .. } = self;
         LayoutError::unless_of_length("Prior::weight", weight.len(), layout.unknowns())?;
         LayoutError::unless_of_length("Prior::right", right.len(), layout.unknowns())
     }
 
-    /// The normal equations of the unknowns of one local block themselves: diagonal, with the damping still to come, and
-    /// right-hand side.
+    /// Returns the prior normal equations of a local block: undamped diagonal matrix and right-hand side.
     #[inline(always)]
     pub(super) fn of_local<const L: usize>(
         &self,

@@ -1,14 +1,14 @@
-//! Why a phase of a system has no result.
+//! Errors of the phases of a system.
 
 use thiserror::Error;
 
 use super::layout::LayoutError;
 use crate::Stopped;
 
-/// Why a phase of a system has no result.
+/// Error of a phase of a system.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SystemError {
-    /// The work was stopped: by whoever watched it, or for want of memory.
+    /// The work was stopped by the progress callback or for lack of memory.
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// The input contradicts the layout.

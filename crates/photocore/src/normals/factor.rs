@@ -1,5 +1,5 @@
-//! Formation, reduction and Cholesky factorisation of the normal equations in one walk up the elimination tree
-//! (multifrontal method, Duff and Reid 1983; Liu 1992).
+//! Formation, reduction and Cholesky factorisation of the normal equations in one traversal of the elimination tree (multifrontal method,
+//! Duff and Reid 1983; Liu 1992).
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,64 +21,63 @@ use super::workspace::Eliminated;
 use crate::Threads;
 use crate::parallel::lock;
 
-/// The Cholesky factor L of the reduced normal equations.
+/// Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
 pub struct Factor {
     pub(super) panels: Panels,
-    /// L^-1 n, in the order of elimination; of outer unknowns n as the others leave it.
+    /// L^-1 n, in elimination order; for outer unknowns the reduced right-hand side.
     pub(super) right: Vec<f64>,
-    /// What the elimination of the local blocks has left, for [`System::solve`]; empty where it is not cached.
+    /// Local eliminations for [`System::solve`]; empty without a cache.
     pub(super) eliminated: Eliminated,
-    /// The fraction of the diagonal of the normal equations that was added to it.
+    /// Fraction of the diagonal of the normal equations that was added to it.
     pub damping: f64,
-    /// Diagonal of the normal equations before any elimination, in the order of elimination.
+    /// Diagonal of the normal equations before any elimination, in elimination order.
     pub(super) diagonal: Vec<f64>,
-    /// Lost pivots, in the order of elimination.
+    /// Lost pivots, in elimination order.
     pub(super) lost: Vec<usize>,
-    /// Pivots that may be nothing but rounding.
+    /// Pivots that may be rounding errors.
     doubtful: Vec<usize>,
-    /// Sum of squares of the right-hand sides of all equations (priors not counted).
+    /// Sum of squares of the right-hand sides of all equations, without priors.
     pub sum_of_squares: f64,
-    /// Decrease of the sum of squares that a full step predicts, priors and all unknowns counted.
+    /// Predicted decrease of the sum of squares by a full step, including priors and all unknowns.
     pub decrease: f64,
     /// Local blocks that their equations do not determine, ascending.
     pub deficient_locals: Vec<usize>,
-    /// Share of the time of all threads that went into formation and reduction; the rest went into the factorisation.
+    /// Fraction of the computing time of all threads for formation and reduction; the rest is for the factorisation.
     pub formation_share: f64,
 }
 
-/// What eliminating a supernode leaves to its parent: lower triangle over the coupled rows, right-hand side and diagonal.
+/// Update matrix of a supernode for its parent: lower triangle over the coupled rows, right-hand side and diagonal.
 struct Update {
     matrix: Vec<f64>,
     right: Vec<f64>,
     diagonal: Vec<f64>,
 }
 
-/// What a visit to a supernode leaves to the result.
+/// Result of a visit to a supernode.
 struct Visited {
     sums: Sums,
     lost: Vec<usize>,
     doubtful: Vec<usize>,
-    /// Own part of L^-1 n and of the diagonal.
+    /// Parts of L^-1 n and of the diagonal for the eliminated blocks.
     right: Vec<f64>,
     diagonal: Vec<f64>,
     formation: f64,
     factorisation: f64,
 }
 
-/// What rounding leaves of a combination of unknowns that the equations do not determine, relative to what those of each unknown by
-/// itself would make of it, is less than a unit in the last place; weights that alone make a datum (GIANT's default of 60000 m for a
-/// station) leave a hundred.
+/// Threshold for an undetermined combination of unknowns: its information relative to the equations of each unknown alone. Rounding errors
+/// are less than one unit in the last digit. Priors that only define the datum (GIANT's default of 60000 m for a station) give a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl System {
-    /// Forms the normal equations, with the local blocks reduced out, and factors them. The result has the same bits for any number of
-    /// threads: every value is summed by one thread, in an order that depends on the pattern only.
+    /// Forms the normal equations, eliminates the local blocks and factors the rest. Results are bitwise identical for any number of
+    /// threads: every value is summed by one thread, in an order that depends only on the pattern.
     ///
-    /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
+    /// The caller must check whether all unknowns are determined: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn factor(
         &self,
         threads: &Threads,
@@ -96,14 +95,14 @@ impl System {
             loop {
                 let factor = formation.factor(&given_up)?;
                 if control.stopped() {
-                    // Supernodes were passed over: there is no factor to look at.
+                    // Supernodes were skipped, and the factor is invalid.
                     return Some(factor);
                 }
                 let lost = factor.lost_after_all();
                 if lost.is_empty() {
                     return Some(factor);
                 }
-                // What the columns after a lost pivot have made of it is worthless.
+                // Columns after a lost pivot are invalid, because the pivot was used.
                 given_up.extend(lost);
                 factor.recycle(self);
             }
@@ -113,7 +112,7 @@ impl System {
 }
 
 impl Formation<'_> {
-    /// Forms and factors; the pivots `given_up`, in the order of elimination, count as lost whatever they are. None without memory.
+    /// Forms and factors; the pivots `given_up`, in elimination order, are always regarded as lost. None if memory is insufficient.
     fn factor(&self, given_up: &[usize]) -> Option<Factor> {
         let symbolic = &self.system.symbolic;
         let values = self.control.allocated(self.system.workspace.zeros(symbolic.values()))?;
@@ -167,7 +166,7 @@ impl Formation<'_> {
         Some(factor)
     }
 
-    /// Assembles and factors one front; what it leaves to its parent goes to `updates[index]`. None without memory.
+    /// Assembles and factors one front; stores its update matrix in `updates[index]`. None if memory is insufficient.
     fn visit(
         &self,
         index: usize,
@@ -217,7 +216,7 @@ impl Formation<'_> {
         })
     }
 
-    /// Room for what is cached at each supernode: that of the formation before, where there was one.
+    /// Returns buffers for the cache of each supernode, reused from an earlier formation if possible.
     fn room(&self) -> Handover<Vec<f64>> {
         let cached = Handover::new(self.system.symbolic.supernode_count() + 1);
         if self.caches {
@@ -229,7 +228,7 @@ impl Formation<'_> {
 }
 
 impl Front<'_> {
-    /// Adds what a child leaves (extend-add), lower triangle only; `runs` says where its rows stand here.
+    /// Adds the update matrix of a child (extend-add), lower triangle only; `runs` maps its rows to rows of this front.
     fn add(&mut self, child: &Update, runs: &[(usize, usize, usize)]) {
         let (width, height, below) = (self.width, self.height, self.height - self.width);
         let order = child.right.len();
@@ -254,7 +253,7 @@ impl Front<'_> {
         }
     }
 
-    /// Eliminates the own columns, from the right-hand side too; returns the pivots that need a closer look.
+    /// Eliminates the columns of the supernode, including the right-hand side; returns the irregular pivots.
     fn factor(&mut self, given_up: &[usize], control: &Control) -> Pivots {
         let below = self.height - self.width;
         let panel = MatMut::from_column_major_slice_mut(self.panel, self.height, self.width);
@@ -280,31 +279,31 @@ impl Factor {
         }
     }
 
-    /// Whether it has cached what the elimination of the local blocks has left.
+    /// Whether the factor contains the cache of local eliminations.
     pub fn has_cached(&self) -> bool {
         !self.eliminated.is_empty()
     }
 
-    /// Gives that back.
+    /// Releases the cache of local eliminations.
     pub fn forget(&mut self) {
         self.eliminated = Vec::new();
     }
 
-    /// The unknowns that are not local and that a solution of the equations moves, ascending: those that take at least a tenth of
-    /// the largest share, each in units of what its equations alone determine.
+    /// Returns the retained unknowns that a solution moves, ascending: shares of at least one tenth of the largest. Unknowns are scaled by
+    /// the precision from their own equations alone.
     pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
         let unknowns = self.unknowns(&system.layout).map(|unknown| solution[unknown]);
         self.taking_part(&system.layout, unknowns.collect())
     }
 
-    /// The largest share of an unknown that is not local in a solution of the equations, in units of what its equations alone determine.
+    /// Returns the largest share of a retained unknown in a solution, scaled by the precision from its own equations alone.
     pub fn largest_share(&self, system: &System, solution: &[f64]) -> f64 {
         let mut shares: Vec<f64> = self.unknowns(&system.layout).map(|unknown| solution[unknown]).collect();
         self.scale(&mut shares);
         shares.iter().fold(0.0, |most, value| value.abs().max(most))
     }
 
-    /// The unknowns that take part in a vector over the unknowns that are not local, in the order of elimination.
+    /// Returns the unknowns with large shares in a vector over the retained unknowns in elimination order.
     pub(super) fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
         self.scale(&mut vector);
         let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
@@ -315,13 +314,13 @@ impl Factor {
         found
     }
 
-    /// The unknowns that are not local, in the order of elimination.
+    /// Returns the retained unknowns, in elimination order.
     pub(super) fn unknowns<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = usize> + 'a {
         let symbolic = &*self.panels.symbolic;
         (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(layout, position))
     }
 
-    /// The unknowns, none of them local, that neither an equation nor a weight touches, ascending.
+    /// Returns the retained unknowns without any equation or prior, ascending.
     pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
         let diagonal = self.unknowns(layout).zip(&self.diagonal);
         let mut found: Vec<usize> =
@@ -330,7 +329,7 @@ impl Factor {
         found
     }
 
-    /// Natural logarithm of the determinant of the normal equations, the local unknowns reduced out; None where it is zero.
+    /// Natural logarithm of the determinant of the reduced normal equations; None if it is zero.
     pub fn log_determinant(&self) -> Option<f64> {
         let logarithm = |(index, s): (usize, &Supernode)| {
             let columns = self.panels.panel(index).chunks_exact(s.height().max(1)).enumerate();
@@ -340,24 +339,24 @@ impl Factor {
         self.lost.is_empty().then(|| supernodes.map(logarithm).sum())
     }
 
-    /// Takes each unknown in units of what its equations alone determine.
+    /// Scales each unknown by the precision from its own equations alone.
     pub(super) fn scale(&self, vector: &mut [f64]) {
         for (value, &diagonal) in vector.iter_mut().zip(&self.diagonal) {
             *value *= if diagonal > 0.0 && diagonal.is_finite() { diagonal.sqrt() } else { 1.0 };
         }
     }
 
-    /// Gives its memory back to the system that it is of, for the next one.
+    /// Returns its memory to the workspace of the system for reuse.
     pub fn recycle(self, system: &System) {
         system.workspace.put_back(self.panels.values);
         system.workspace.put_back_eliminated(self.eliminated);
     }
 
-    /// The doubtful pivots that are nothing but rounding.
+    /// Returns the doubtful pivots that are rounding errors.
     ///
-    /// With x = L^-T e the combination of unknowns that a pivot stands for, x^T N x = 1, and what the equations of each unknown by
-    /// itself would make of it is the sum of n_ii x_i^2. A pivot alone does not tell: where the combination hardly moves its
-    /// unknown, rounding leaves a large fraction of that unknown's diagonal element.
+    /// For the combination x = L^-T e of a pivot, x^T N x = 1. The equations of each unknown alone would give the sum of n_ii x_i^2. The
+    /// pivot itself is not conclusive: if the combination hardly changes its unknown, a large fraction of the diagonal element is rounding
+    /// error.
     fn lost_after_all(&self) -> Vec<usize> {
         let is_lost = |&pivot: &usize| {
             let x = self.combination(pivot);
@@ -367,7 +366,7 @@ impl Factor {
         self.doubtful.iter().copied().filter(is_lost).collect()
     }
 
-    /// L^-T e: the combination of unknowns that a pivot stands for.
+    /// Returns L^-T e: the combination of unknowns of a pivot.
     pub(super) fn combination(&self, pivot: usize) -> Vec<f64> {
         let mut x = vec![0.0; self.right.len()];
         x[pivot] = 1.0;

@@ -1,4 +1,4 @@
-//! One front of the multifrontal method while it is assembled.
+//! Front of the multifrontal method during its assembly.
 
 use std::ops::Range;
 
@@ -7,16 +7,16 @@ use pulp::Simd;
 use super::panels::skip;
 use super::vectorised::{Rows, add_difference, add_product, add_products, add_right};
 
-/// A front: the columns of a supernode, and what their elimination will leave for the parent. Rows and columns are those of the
-/// supernode's panel, its own blocks before the coupled ones. Lower triangles; what stands above carries no meaning.
+/// Front: columns of a supernode and its update matrix. Rows and columns are in the order of the supernode's panel, eliminated blocks
+/// before coupled ones. Only lower triangles are used; upper ones are undefined.
 pub(super) struct Front<'a> {
-    /// Own columns.
+    /// Number of eliminated columns.
     pub width: usize,
-    /// Own and coupled rows.
+    /// Number of eliminated and coupled rows.
     pub height: usize,
-    /// Own columns, column by column.
+    /// Eliminated columns, column by column.
     pub panel: &'a mut [f64],
-    /// Coupled rows and columns, column by column.
+    /// Update matrix over coupled rows and columns, column by column.
     pub update: Vec<f64>,
     /// Right-hand side.
     pub right: Vec<f64>,
@@ -25,13 +25,13 @@ pub(super) struct Front<'a> {
 }
 
 impl<'a> Front<'a> {
-    /// A front of zeros, but for the panel; `update` must hold zeros on and below its diagonal.
+    /// Creates a front with zero right-hand side and diagonal; `update` must be zero on and below its diagonal.
     pub fn new(width: usize, height: usize, panel: &'a mut [f64], update: Vec<f64>) -> Self {
         let (right, diagonal) = (vec![0.0; height], vec![0.0; height]);
         Self { width, height, panel, update, right, diagonal }
     }
 
-    /// Adds one equation: coefficients in some rows and columns of the front, ascending, and the right-hand side.
+    /// Adds one equation: coefficients for some columns of the front, ascending, and the right-hand side.
     pub fn add_equation(&mut self, columns: &[usize], coefficients: &[f64], constant: f64) {
         let below = self.height - self.width;
         for (k, (&column, &value)) in columns.iter().zip(coefficients).enumerate() {
@@ -48,7 +48,7 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// All columns.
+    /// Returns a view of all columns.
     pub fn columns(&mut self) -> Columns<'_> {
         Columns {
             width: self.width,
@@ -61,7 +61,7 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// The columns in parts that begin at 0 and at the given columns, ascending.
+    /// Splits the columns into parts that start at 0 and at the given columns, ascending.
     pub fn parts(&mut self, starts: &[usize]) -> Vec<Columns<'_>> {
         let (width, height) = (self.width, self.height);
         let (mut panel, mut update) = (&mut *self.panel, &mut self.update[..]);
@@ -86,7 +86,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Some columns of a front.
+/// View of some columns of a front.
 pub(super) struct Columns<'a> {
     width: usize,
     height: usize,
@@ -97,17 +97,17 @@ pub(super) struct Columns<'a> {
     diagonal: &'a mut [f64],
 }
 
-/// A matrix whose columns belong to consecutive rows and columns of the front.
+/// Matrix with consecutive columns of the front.
 #[derive(Clone, Copy)]
 pub(super) struct Strip<'a> {
-    /// The first of them.
+    /// First column in the front.
     pub at: usize,
     /// The matrix.
     pub rows: Rows<'a>,
 }
 
 impl Strip<'_> {
-    /// The same without rows: its products are zero.
+    /// Returns the strip without rows, so that its products are zero.
     #[inline(always)]
     pub fn emptied(self) -> Self {
         Self { rows: Rows { count: 0, ..self.rows }, ..self }
@@ -115,7 +115,7 @@ impl Strip<'_> {
 }
 
 impl Columns<'_> {
-    /// Whether a column of the front is among these.
+    /// Whether a column of the front is in this view.
     #[inline(always)]
     pub fn contain(&self, column: usize) -> bool {
         self.columns.start <= column && column < self.columns.end
@@ -128,14 +128,14 @@ impl Columns<'_> {
         add_product(simd, target, stride, sign, a.rows, b.rows);
     }
 
-    /// Adds A^T A - V^T V in the rows and columns of both, in so many parts.
+    /// Adds A^T A - V^T V in the rows and columns of both, in the given number of parts.
     #[inline(always)]
     pub fn add_difference<S: Simd>(&mut self, simd: S, a: Strip<'_>, v: Strip<'_>, parts: usize) {
         let (target, stride) = self.target(a.at, a.at);
         add_difference(simd, target, stride, a.rows, v.rows, parts);
     }
 
-    /// What begins at a row and column of the front, and by how much its columns lie apart.
+    /// Returns the storage from a row and column of the front, with its column stride.
     #[inline(always)]
     fn target(&mut self, row: usize, column: usize) -> (&mut [f64], usize) {
         if column < self.width {
@@ -146,7 +146,7 @@ impl Columns<'_> {
         }
     }
 
-    /// Adds several products, each with its sign, in the rows of their A and the columns of their B: those of the first.
+    /// Adds several products with signs, all in the rows of the first A and the columns of the first B.
     #[inline(always)]
     pub fn add_products<S: Simd, const N: usize>(
         &mut self,
@@ -158,7 +158,7 @@ impl Columns<'_> {
         add_products(simd, target, stride, products.map(|(sign, a, b)| (sign, a.rows, b.rows)));
     }
 
-    /// Adds A^T b to the right-hand side, and the squares of the elements of A to the diagonal before elimination.
+    /// Adds A^T b to the right-hand side, and the squares of the elements of A to the initial diagonal.
     #[inline(always)]
     pub fn add_equations<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
         let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
@@ -166,8 +166,8 @@ impl Columns<'_> {
         add_right(simd, &mut self.right[own], diagonal, 1.0, a.rows, b);
     }
 
-    /// Adds a block, column by column with its stride: its rows and its columns belong to so many of the front from one on, and it is transposed
-    /// there where it would stand above the diagonal. On the diagonal it is its lower triangle. What goes to other columns is left out.
+    /// Adds a block, stored by columns with a stride, at the given rows and columns of the front. It is transposed if it would be above the
+    /// diagonal; on the diagonal only its lower triangle is added. Columns outside this view are skipped.
     #[inline]
     pub fn add_block(
         &mut self,
@@ -189,7 +189,7 @@ impl Columns<'_> {
         }
     }
 
-    /// Adds to the right-hand side from a row of the front on, and to the diagonal before elimination, where these columns are.
+    /// Adds to the right-hand side from a row of the front, and to the initial diagonal, for the columns of this view.
     #[inline]
     pub fn add_to_right(&mut self, row: usize, values: &[f64], square: impl Fn(usize) -> f64) {
         for i in self.own(row, values.len()) {
@@ -198,13 +198,13 @@ impl Columns<'_> {
         }
     }
 
-    /// Which of so many columns of the front from one on are among these.
+    /// Returns the part of a column range of the front that is in this view.
     fn own(&self, first: usize, count: usize) -> Range<usize> {
         let place = |column: usize| column.saturating_sub(first).min(count);
         place(self.columns.start)..place(self.columns.end)
     }
 
-    /// Takes A^T b off the right-hand side.
+    /// Subtracts A^T b from the right-hand side.
     #[inline(always)]
     pub fn subtract_right<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
         let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;

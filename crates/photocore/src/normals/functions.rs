@@ -1,11 +1,11 @@
-//! Cofactors of linear functions of the unknowns, any with any other: f^T N^-1 g.
+//! Cofactors f^T N^-1 g of linear functions of the unknowns.
 //!
-//! With the local blocks l reduced out of N, N_ll = L_l L_l^T, V = L_l^-1 N_lo and N_r = L L^T what is left of the others o, a function
-//! f is known by y = L_l^-1 f_l and e = f_o - V^T y:
+//! With local blocks l eliminated, N_ll = L_l L_l^T, V = L_l^-1 N_lo and N_r = L L^T for the others o. A function f is reduced to y =
+//! L_l^-1 f_l and e = f_o - V^T y:
 //!
 //! f^T N^-1 g = y_f^T y_g + e_f^T N_r^-1 e_g = y_f^T y_g + z_f^T z_g,    z = L^-1 e.
 //!
-//! Half of a solution does for all of them, and what it gives is symmetric and positive by construction.
+//! Forward substitution is sufficient, and the result is symmetric and positive semidefinite by construction.
 
 use std::collections::HashMap;
 
@@ -24,40 +24,40 @@ use super::workspace::zeros;
 use crate::sorting::sort_by;
 use crate::{Stopped, Threads, parallel};
 
-/// A linear function of the unknowns: unknowns that it takes, with their coefficients.
+/// Linear function of the unknowns: indices of unknowns with their coefficients.
 pub type Function = Vec<(usize, f64)>;
 
-/// A function with the local blocks reduced out.
+/// Function with the local blocks eliminated.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reduced {
-    /// e: places in the order of elimination, ascending, with their values.
+    /// e: positions in elimination order, ascending, with their values.
     pub entries: Vec<(usize, f64)>,
-    /// y of each local block that it takes, ascending.
+    /// y for each of its local blocks, ascending.
     locals: Vec<(usize, [f64; 3])>,
 }
 
-/// Functions ready for their cofactors: all rows of a matrix, and, unless they are to be combined with each other, all its columns.
+/// Reduced functions: the rows of a cofactor matrix, and its columns unless they are the same functions.
 #[derive(Debug)]
 pub struct Functions {
     rows: Vec<Reduced>,
     columns: Option<Vec<Reduced>>,
 }
 
-/// Local blocks that a thread takes at a time.
+/// Number of local blocks per task.
 const CHUNK: usize = 64;
-/// So many times more functions on one side, and the other side is solved for to its end: each solution then serves all of them.
+/// Ratio of the numbers of rows and columns above which the few functions are solved completely, each for all of the others.
 const FEW: usize = 8;
-/// Solutions at a time.
+/// Number of simultaneous solutions.
 const TOGETHER: usize = 16;
 
 impl System {
-    /// Reduces the local blocks out of linear functions.
+    /// Eliminates the local blocks from linear functions.
     ///
-    /// `columns` is None where the cofactors of every two of `rows` are asked for. `equations` and `prior` must be those that the factor
-    /// comes from; what is held must not be taken.
+    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` and `prior` must belong to the factor; functions
+    /// must not contain fixed or constrained unknowns.
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce(
         &self,
         threads: &Threads,
@@ -77,7 +77,7 @@ impl System {
         Ok(reduced?)
     }
 
-    /// Bytes that their cofactors take at the most, the matrix counted.
+    /// Returns the maximum size of the cofactor computation in bytes, including the matrix.
     pub fn memory_of(&self, functions: &Functions) -> usize {
         let (rows, columns) = (functions.rows.len(), functions.columns.as_ref().map_or(0, Vec::len));
         let matrix = rows * if functions.columns.is_some() { columns } else { rows };
@@ -88,10 +88,10 @@ impl System {
         size_of::<f64>() * (matrix + others)
     }
 
-    /// The cofactors f^T N^-1 g of functions: a matrix row by row; the same bits for any number of threads.
+    /// Computes the cofactors f^T N^-1 g: a matrix row by row, bitwise identical for any number of threads.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Interruption or lack of memory.
     pub fn cofactors_of(
         &self,
         threads: &Threads,
@@ -119,7 +119,7 @@ impl System {
         })
     }
 
-    /// e_f^T N_r^-1 e_g with a solution for each of a few functions.
+    /// Computes e_f^T N_r^-1 e_g by a complete solution for each of a few functions.
     fn solve_few(
         &self,
         factor: &Factor,
@@ -151,7 +151,7 @@ impl System {
 }
 
 impl Functions {
-    /// The few and the many, and whether the few are the columns; None where neither is.
+    /// Returns the smaller side, the larger side, and whether the smaller one contains columns; None if the sizes are similar.
     fn few(&self) -> Option<(&[Reduced], &[Reduced], bool)> {
         let (rows, columns) = (&self.rows, self.columns.as_ref()?);
         if rows.len() * FEW <= columns.len() {
@@ -166,7 +166,7 @@ impl Functions {
     }
 }
 
-/// A matrix that is written row by row, or column by column.
+/// Matrix that is written row by row or column by column.
 struct Target<'a> {
     matrix: &'a mut [f64],
     width: usize,
@@ -180,7 +180,7 @@ impl Target<'_> {
     }
 }
 
-/// Adds y_f^T y_g of all functions.
+/// Adds y_f^T y_g for all functions.
 fn add_locals(matrix: &mut [f64], rows: &[Reduced], columns: &[Reduced]) {
     let mut by_local: HashMap<usize, Vec<(usize, &[f64; 3])>> = HashMap::new();
     for (j, function) in columns.iter().enumerate() {
@@ -196,7 +196,7 @@ fn add_locals(matrix: &mut [f64], rows: &[Reduced], columns: &[Reduced]) {
 }
 
 impl Symbolic {
-    /// The place of every unknown that is not local, counted from the first of these, in the order of elimination.
+    /// Returns the position of every retained unknown in elimination order; the first retained unknown has index 0.
     fn places(&self, layout: &Layout) -> Vec<usize> {
         let mut places = vec![0; self.unknowns()];
         let first = layout.all_locals().end;
@@ -217,10 +217,10 @@ struct Reduction<'a> {
     control: &'a Control,
 }
 
-/// What the functions take of a local block: the function and its coefficients.
+/// Terms of functions in a local block: index of the function and coefficients.
 type Taken = Vec<(usize, [f64; 3])>;
 
-/// What a function becomes at a local block: its number, y, and what goes to e.
+/// Reduced function at a local block: its index, y, and contributions to e.
 type Found = (usize, [f64; 3], Vec<(usize, f64)>);
 
 impl Reduction<'_> {
@@ -280,7 +280,7 @@ impl Reduction<'_> {
     }
 }
 
-/// Sorts entries by their place and adds up those of the same.
+/// Sorts entries by position and sums duplicates.
 fn unite(entries: &mut Vec<(usize, f64)>) {
     entries.sort_by_key(|&(place, _)| place);
     entries.dedup_by(|next, retained| {

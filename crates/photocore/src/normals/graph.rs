@@ -1,15 +1,15 @@
-//! Which retained blocks share a local block, a tie or what a system below leaves, or are a pair that is asked for.
+//! Graph of the retained blocks: edges are nonzero blocks of the reduced normal equations.
 
 use super::layout::Layout;
 use crate::parallel;
 
-/// Kept blocks from which on several threads look for their neighbours and try orderings.
+/// Minimum number of retained blocks for several threads.
 pub(super) const MANY: usize = 500;
 
-/// The place of a block that is not in a list.
+/// Position of a block that is not in a list.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
-/// Which retained blocks share a local block, a tie or what a system below leaves, or are a pair that is asked for: an undirected graph in compressed form, neighbours ascending.
+/// Undirected graph of retained blocks in compressed form, neighbours ascending. Edges: a shared local block, tie, contribution or pair.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -17,7 +17,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Joins every two retained blocks that share one.
+    /// Builds the graph of a layout.
     pub fn new(layout: &Layout) -> Self {
         let retained = layout.retained();
         let ties = layout.ties().iter().map(|tie| &tie.retained[..]);
@@ -70,12 +70,12 @@ impl Graph {
         self.ptr.len() - 1
     }
 
-    /// Whether there are no blocks.
+    /// Whether the graph is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The blocks that share a local block or a tie with `block`.
+    /// Returns the blocks that share a local block, tie, contribution or requested pair with `block`.
     pub fn neighbours(&self, block: usize) -> impl Iterator<Item = usize> + '_ {
         self.neighbours[self.ptr[block]..self.ptr[block + 1]].iter().map(|&other| other as usize)
     }
@@ -84,8 +84,8 @@ impl Graph {
         self.ptr[block + 1] - self.ptr[block]
     }
 
-    /// The blocks reachable from `start` among those not yet `done`, breadth first, neighbours by rising degree;
-    /// with the number of levels. `level` is room for the level of every block: zeros, and so it is left.
+    /// Returns the blocks reachable from `start` that are not `done`, in breadth-first order, neighbours by rising degree. Also returns the
+    /// number of levels. `level` is zeroed scratch memory for the level of every block, and zeroed again at the end.
     fn breadth_first(&self, start: usize, done: &[bool], level: &mut [u32]) -> (Vec<usize>, u32) {
         level[start] = 1;
         let mut order = vec![start];
@@ -102,8 +102,8 @@ impl Graph {
         (order, levels)
     }
 
-    /// The graph of some blocks among themselves, counted as in the list. `place` is room for the place of every block in it:
-    /// [`NOWHERE`], and so it is left.
+    /// Returns the subgraph of some blocks, numbered as in the list. `place` is scratch memory for the index of every block, filled with
+    /// [`NOWHERE`] before and after.
     pub(crate) fn subgraph(&self, members: &[usize], place: &mut [u32]) -> Self {
         members.iter().zip(0..).for_each(|(&block, new)| place[block] = new);
         let mut part = Self { ptr: vec![0], neighbours: Vec::new() };
@@ -118,7 +118,7 @@ impl Graph {
         part
     }
 
-    /// All blocks breadth first from a pseudo-peripheral block of each component (George and Liu 1981, chapter 4).
+    /// Returns all blocks breadth first from a pseudo-peripheral block of each component (George and Liu 1981, chapter 4).
     pub(crate) fn breadth_first_line(&self) -> Vec<usize> {
         let (mut done, mut level) = (vec![false; self.len()], vec![0; self.len()]);
         let mut line = Vec::with_capacity(self.len());
@@ -127,7 +127,7 @@ impl Graph {
                 continue;
             }
             let (mut component, mut levels) = self.breadth_first(seed, &done, &mut level);
-            // The last block reached lies farthest out: start again there as long as that deepens the structure.
+            // Restart from the last block reached, the farthest, as long as the number of levels increases.
             while let Some(&far) = component.last() {
                 let (deeper, more) = self.breadth_first(far, &done, &mut level);
                 if more <= levels {
@@ -141,14 +141,14 @@ impl Graph {
         line
     }
 
-    /// Where the neighbours of each block start, and the neighbours; None if there are more than 32 bits number.
+    /// Returns the start of each block's neighbours, and the neighbours; None if a start exceeds 32 bits.
     pub(crate) fn compressed(&self) -> Option<(Vec<u32>, &[u32])> {
         let starts: Result<Vec<u32>, _> = self.ptr.iter().map(|&start| u32::try_from(start)).collect();
         Some((starts.ok()?, &self.neighbours))
     }
 }
 
-/// Where the units of every retained block start, and these, each once.
+/// Returns the start of the units of every retained block, and the units, each once per block.
 fn units_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
     let mut last = vec![u32::MAX; layout.retained()];
     let mut each = |take: &mut dyn FnMut(usize, u32)| {

@@ -1,4 +1,4 @@
-//! Which front each local block is eliminated into.
+//! Assignment of local blocks to the fronts into which they are eliminated.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,32 +10,31 @@ use super::layout::Layout;
 use super::symbolic::Symbolic;
 use crate::parallel;
 
-/// Local blocks from which on several threads sort them, and how many of them are taken together.
+/// Minimum number of local blocks for sorting with several threads, and local blocks per task.
 const MANY: usize = 10_000;
 const TOGETHER: usize = 2048;
-/// Units that are eliminated side by side at the most: their equations stay in the cache.
+/// Maximum number of units that are eliminated as one batch; their equations fit into the cache.
 const MOST: usize = 16;
 
-/// The groups of every local block by the position of their main blocks in the order of elimination, and the units of the layout by their
-/// *assembly node*: the supernode of the first position of all retained blocks they touch. All of them are in the pattern of the node, so
-/// that what the elimination of the unit leaves goes into one front.
+/// Groups of every local block by position of their main blocks, and units by *assembly node*. The node is the supernode of the first
+/// eliminated block of a unit. Its pattern contains all blocks of the unit, so that the Schur complement is added to a single front.
 #[derive(Debug)]
 pub(super) struct Incidence {
     groups: Vec<u32>,
     positions: Vec<u32>,
-    /// The units by node, those of the same pattern side by side.
+    /// Units by node; units of the same pattern are adjacent.
     by_node: Vec<u32>,
-    /// Where the local blocks and, behind them, the groups apart of each supernode start; then those that have no equations.
+    /// Start of the local blocks and of the independent groups of each supernode; last, units without equations.
     node_ptr: Vec<usize>,
-    /// Where each batch starts: a run of units of one node whose equations touch the same unknowns in the same way.
+    /// Start of each batch: consecutive units of one node with identical patterns.
     batch_ptr: Vec<usize>,
-    /// What each of the groups has in common with others, as a number; empty where none has anything.
+    /// Index of the shared block list of each group; empty if no group has shared blocks.
     commons: Vec<u32>,
-    /// One group that has it, of each of these.
+    /// Example group for each of these lists.
     group_with: Vec<u32>,
-    /// All that the groups of each unit have in common with others, as the number of a set; empty where none has anything.
+    /// Index of the set of shared block lists of each unit; empty if no group has shared blocks.
     sets: Vec<u32>,
-    /// What is in each set, ascending: photos of two cameras alternate, and see points with one before the other or after it.
+    /// Lists in each set, ascending: photos of two cameras may alternate in any order.
     members: Vec<Vec<u32>>,
 }
 
@@ -97,7 +96,7 @@ impl Incidence {
         incidence
     }
 
-    /// Numbers the sets of what the groups of units have in common with others. Neighbours nearly always have the same.
+    /// Numbers the sets of shared block lists of the units. Consecutive units usually have the same set.
     fn find_sets(&mut self, layout: &Layout) {
         let mut known: HashMap<SmallVec<[u32; 16]>, u32> = HashMap::from([(SmallVec::new(), 0)]);
         let (mut sets, mut members, mut last) = (vec![0; layout.units()], vec![Vec::new()], 0);
@@ -116,59 +115,59 @@ impl Incidence {
         (self.sets, self.members) = (sets, members);
     }
 
-    /// Whether the equations of two units touch the same unknowns in the same way.
+    /// Whether the equations of two units have identical patterns.
     fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
         layout.is_apart(a) == layout.is_apart(b)
             && self.positions_of(layout, a) == self.positions_of(layout, b)
             && self.commons_of(layout, a) == self.commons_of(layout, b)
     }
 
-    /// The groups of a unit, by position.
+    /// Returns the groups of a unit, by position.
     pub fn groups_of(&self, layout: &Layout, unit: usize) -> &[u32] {
         &self.groups[layout.groups_of_unit(unit)]
     }
 
-    /// The positions of the main blocks of the groups of a unit.
+    /// Returns the positions of the main blocks of the groups of a unit.
     pub fn positions_of(&self, layout: &Layout, unit: usize) -> &[u32] {
         &self.positions[layout.groups_of_unit(unit)]
     }
 
-    /// What each group of a unit has in common with others, as a number; empty where none has anything.
+    /// Returns the index of the shared block list of each group of a unit; empty if no group has shared blocks.
     pub fn commons_of(&self, layout: &Layout, unit: usize) -> &[u32] {
         self.commons.get(layout.groups_of_unit(unit)).unwrap_or_default()
     }
 
-    /// The set of all that the groups of a unit have in common with others.
+    /// Returns the set of shared block lists of a unit.
     pub fn set_of(&self, unit: usize) -> u32 {
         self.sets.get(unit).copied().unwrap_or_default()
     }
 
-    /// What is in a set, ascending.
+    /// Returns the lists in a set, ascending.
     pub fn members(&self, set: u32) -> &[u32] {
         &self.members[set as usize]
     }
 
-    /// A group that has in common with others what has this number.
+    /// Returns a group with this shared block list.
     pub fn group_with(&self, shared: u32) -> usize {
         self.group_with[shared as usize] as usize
     }
 
-    /// The units whose node is a supernode; after the last supernode those without equations.
+    /// Returns the units of a supernode; after the last supernode, units without equations.
     pub fn units_at(&self, supernode: usize) -> &[u32] {
         &self.by_node[self.node_ptr[2 * supernode]..self.node_ptr[2 * supernode + 2]]
     }
 
-    /// All batches, by node.
+    /// Returns all batches, by node.
     fn batches(&self) -> Batches<'_> {
         Batches { units: &self.by_node, ptr: &self.batch_ptr }
     }
 
-    /// The batches of a supernode; after the last supernode those of the units without equations.
+    /// Returns the batches of a supernode; after the last supernode, batches of units without equations.
     pub fn batches_at(&self, supernode: usize) -> Batches<'_> {
         self.batches_between(2 * supernode..2 * supernode + 2)
     }
 
-    /// Of these those of local blocks, whose elimination leaves something to others.
+    /// Returns the batches of local blocks only, whose elimination leaves a contribution.
     pub fn batches_of_locals_at(&self, supernode: usize) -> Batches<'_> {
         self.batches_between(2 * supernode..2 * supernode + 1)
     }
@@ -180,8 +179,8 @@ impl Incidence {
     }
 }
 
-/// Numbers what groups have in common with others: that of each group, none where no group has anything, and a group that has it of each
-/// number. The images of one photo nearly always have the same.
+/// Numbers the distinct shared block lists. Returns the number of each group, empty without shared blocks, and an example group for each
+/// list. Image observations of one photo usually have the same list.
 fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
     if !layout.has_shared() {
         return (Vec::new(), Vec::new());
@@ -207,14 +206,13 @@ fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
     (numbers, group_with)
 }
 
-/// A unit, and what it is sorted by before all else: its node and whether it is a group apart, and the first three of its positions, zero
-/// where there are fewer.
+/// Unit with its sort key: node, independence flag and first three positions (zero if missing).
 type Keyed = (u128, u32);
 
 /// Bits of a key below the node.
 const HOME: u32 = 96;
 
-/// The positions and groups of some local blocks, by position unless they stand apart, and the keys of their units.
+/// Returns positions and groups of some local blocks, by position unless independent, and the sort keys of their units.
 fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u32; 2]>, Vec<Keyed>) {
     let (mut sorted, mut keyed) = (Vec::new(), Vec::with_capacity(locals.len()));
     let key = |unit: usize, own: &[[u32; 2]]| {
@@ -239,14 +237,14 @@ fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u
     (sorted, keyed)
 }
 
-/// The node of a unit, from the first position of its main blocks; after the last supernode where it has no equations.
+/// Returns the node of a unit, from the first position of its main blocks; after the last supernode if it has no equations.
 fn node(layout: &Layout, symbolic: &Symbolic, unit: usize, first: Option<usize>) -> usize {
     let shared = layout.all_shared_of(unit).iter().map(|&block| symbolic.position(block as usize));
     let first = shared.chain(first).min();
     first.map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
 }
 
-/// Consecutive batches.
+/// Range of consecutive batches.
 #[derive(Clone, Copy)]
 pub(super) struct Batches<'a> {
     units: &'a [u32],
@@ -254,17 +252,17 @@ pub(super) struct Batches<'a> {
 }
 
 impl<'a> Batches<'a> {
-    /// Their units, batch by batch.
+    /// Returns the units of each batch.
     pub fn iter(self) -> impl Iterator<Item = &'a [u32]> {
         self.ptr.windows(2).map(move |ends| &self.units[ends[0]..ends[1]])
     }
 
-    /// How many units they have.
+    /// Number of units in all batches.
     pub fn units(self) -> usize {
         self.ptr[self.ptr.len() - 1] - self.ptr[0]
     }
 
-    /// Parts of so many batches at the most.
+    /// Splits into parts of at most `most` batches.
     pub fn parts(self, most: usize) -> Vec<Self> {
         let starts = (0..self.ptr.len() - 1).step_by(most);
         starts

@@ -1,7 +1,7 @@
-//! The selected inverse: the blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973), in one walk down
-//! the elimination tree that hands on cofactors of local blocks and equations on the way.
+//! Selected inversion: blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973). It starts at the root of the
+//! elimination tree and includes the cofactors of local blocks and equations.
 //!
-//! The front of outer unknowns, which stays unfactored (see [`Contribution`]).
+//! Unfactored front of the outer unknowns (see [`Contribution`]).
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,24 +24,24 @@ use super::watch::{Between, Control, watched};
 use crate::Threads;
 use crate::parallel::lock;
 
-/// Cofactors with the selected inverse that they come from.
+/// Cofactors with the selected inverse.
 #[derive(Debug)]
 pub struct Inversion {
-    /// Of every unknown and every equation.
+    /// Cofactors of every unknown and every equation.
     pub cofactors: Cofactors,
-    /// Of every two retained blocks that share a local block.
+    /// Blocks of the inverse inside the pattern of the factor.
     pub selected: SelectedInverse,
-    /// Share of the time of all threads that went into the selected inverse; the rest went into the other cofactors.
+    /// Fraction of the computing time of all threads for the selected inverse; the rest is for the other cofactors.
     pub inversion_share: f64,
 }
 
 impl System {
     /// Computes all cofactors.
     ///
-    /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
+    /// `equations` and `prior` must be those of the factor, and its damping must be zero.
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn invert(
         &self,
         threads: &Threads,
@@ -63,8 +63,7 @@ impl System {
         })?
     }
 
-    /// The diagonal of the normal equations of the unknowns of retained blocks before any elimination, which is given in that order, in the order
-    /// of the layout.
+    /// Converts the initial diagonal of the normal equations from elimination order to the order of the retained blocks in the layout.
     fn information(&self, diagonal: &[f64]) -> Vec<f64> {
         let retained = self.layout.all_retained();
         let mut information = vec![0.0; retained.len()];
@@ -76,7 +75,7 @@ impl System {
     }
 }
 
-/// The inverse over the rows of one front (own blocks, then coupled blocks), full square, column by column.
+/// Inverse over the rows of one front (eliminated blocks, then coupled blocks), full square, column by column.
 type Front = Arc<Vec<f64>>;
 
 struct Walk<'a> {
@@ -88,11 +87,11 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// None without memory.
+    /// Inverts all panels; None if memory is insufficient.
     fn invert(&self, mut panels: Panels, information: Vec<f64>) -> Option<Result<Inversion, SystemError>> {
         let symbolic = &*self.system.symbolic;
         let count = symbolic.supernode_count();
-        // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
+        // Front of the parent of each unprocessed supernode; a front is released after its last child.
         let above = Handover::new(count);
         let at_node = Handover::new(count);
         let divided = panels.divide();
@@ -125,7 +124,7 @@ impl Walk<'_> {
         Some(Ok(Inversion { cofactors, selected, inversion_share }))
     }
 
-    /// The blocks of the inverse of each retained block, one after the other, and of each pair of the layout.
+    /// Returns the diagonal blocks of the inverse for all retained blocks, one after the other, and the blocks of the pairs.
     fn blocks(&self, selected: &SelectedInverse) -> Result<[Vec<f64>; 2], LayoutError> {
         let layout = &self.system.layout;
         let (mut retained, mut pairs) = (vec![], vec![]);
@@ -138,8 +137,8 @@ impl Walk<'_> {
         Ok([retained, pairs])
     }
 
-    /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local
-    /// blocks assembled there, and the seconds that the inversion took; None without memory.
+    /// Inverts one panel from the front of its parent, and passes its own front to its children. Returns the cofactors of the local blocks
+    /// at this supernode, and the time of the inversion in seconds. None if memory is insufficient.
     fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> Option<(AtNode, f64)> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
@@ -195,8 +194,8 @@ fn take_coupled_rows(symbolic: &Symbolic, index: usize, parent: &[f64], front: &
 }
 
 impl Factor {
-    /// Takes what is left for the outer unknowns, in the order of the layout, and the memory of its front; empty for a whole system,
-    /// and the second time.
+    /// Returns the contribution to the outer unknowns, in the order of the layout, and releases their front. Empty for a whole system, and
+    /// at the second call.
     pub fn take_contribution(&mut self) -> Contribution<'static> {
         let symbolic = &*self.panels.symbolic;
         let Some(open) = symbolic.open() else { return Contribution::default() };
@@ -219,7 +218,7 @@ impl Factor {
 }
 
 impl Panels {
-    /// Makes room again for the front of outer unknowns that was taken.
+    /// Allocates the released front of the outer unknowns again.
     pub fn reopen(&mut self) {
         self.values.resize(self.symbolic.values(), 0.0);
     }

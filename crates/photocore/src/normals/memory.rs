@@ -1,4 +1,4 @@
-//! How much memory an adjustment takes.
+//! Memory requirements of an adjustment.
 
 use std::collections::HashMap;
 
@@ -6,14 +6,14 @@ use super::system::System;
 use super::system::vectors;
 use super::workspace::Workspace;
 
-/// Of a number.
+/// Size of a number in bytes.
 const BYTES: usize = size_of::<f64>();
-/// Bytes for what does not grow with the problem, threads among them.
+/// Bytes that do not depend on the size of the problem, including threads.
 const BASE: usize = 8 << 20;
 
 impl System {
-    /// Bytes that forming, factoring, solving and inverting take at the most, the problem itself and its results counted: the
-    /// factor, the fronts that wait for each other, and vectors.
+    /// Estimates the maximum size of all phases in bytes, including the problem and its results: the factor, simultaneous fronts and
+    /// vectors.
     pub fn memory(&self) -> usize {
         let mut buffers = Buffers::of(&self.workspace);
         self.walk_up(&mut buffers);
@@ -22,7 +22,7 @@ impl System {
         BASE + BYTES * (of_fronts + vectors(&self.layout))
     }
 
-    /// The same of a part of a larger system, which is released once it is formed.
+    /// Estimates the size for a partial system, which is released after its formation.
     pub fn memory_of_part(&self) -> usize {
         let mut walks = [Buffers::of(&self.workspace), Buffers::of(&self.workspace)];
         self.walk_up(&mut walks[0]);
@@ -31,19 +31,19 @@ impl System {
         BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + most)
     }
 
-    /// Bytes that what groups have to do with each other takes besides, as it is found and as it is handed out.
+    /// Extra bytes for the leverage matrices of groups: computation and result.
     pub fn memory_of_groups(&self) -> usize {
         let (groups, rows) = (self.layout.groups(), self.layout.rows());
         let alone = self.layout.locals() * self.layout.local_dim().pow(2);
         2 * BYTES * (2 * groups * rows * rows + alone)
     }
 
-    /// Gives back what is kept for the next formation or inversion: where others need memory before it comes.
+    /// Releases the buffers for the next formation or inversion, if other code needs memory before.
     pub fn release(&self) {
         self.workspace.clear();
     }
 
-    /// Takes and gives back the buffers of fronts that the walk up the elimination tree does.
+    /// Simulates the front buffers of the factorisation.
     fn walk_up(&self, buffers: &mut Buffers<'_>) {
         let supernodes = self.symbolic.supernodes();
         for s in supernodes {
@@ -55,12 +55,12 @@ impl System {
         }
     }
 
-    /// The same of the walk down.
+    /// Simulates the front buffers of the inversion.
     fn walk_down(&self, buffers: &mut Buffers<'_>) {
         let supernodes = self.symbolic.supernodes();
         for (index, s) in supernodes.iter().enumerate().rev() {
             buffers.take(s.height().pow(2));
-            // A front lives until the last child, the first in the order, has taken its part.
+            // A front is released by its last child, the first in the order.
             let parent = s.parent.map(|parent| &supernodes[parent]);
             if let Some(parent) = parent.filter(|parent| parent.children.first() == Some(&index)) {
                 buffers.put_back(parent.height().pow(2));
@@ -78,11 +78,11 @@ impl System {
     }
 }
 
-/// The buffers of a workspace, by capacity.
+/// Simulated buffers of a workspace, by capacity.
 struct Buffers<'a> {
     workspace: &'a Workspace,
     spare: HashMap<usize, usize>,
-    /// Numbers in all that there are, and in all that there ever were at once.
+    /// Current and maximum number of elements in all buffers.
     made: usize,
     most: usize,
 }

@@ -1,21 +1,20 @@
-//! Block normal equations: formed, reduced, ordered, factored, solved and selectively inverted.
+//! Block normal equations: formation, reduction, ordering, factorisation, solution and selected inverse.
 //!
-//! The unknowns stand in one vector: *local* blocks of equal size (object points, stars), then *retained* blocks of any size (photographs,
-//! cameras, a comparator). Each group of equations touches one local block, one main retained block and any further ones; ties are equations
-//! among any retained blocks. One pass over a system is
+//! The vector of unknowns consists of *local* blocks of equal size (object points, stars) and *retained* blocks of any size (photos,
+//! cameras, a comparator). Each group of equations involves one local block, one main retained block and optional shared ones. Ties are
+//! equations among retained blocks. A system is processed in five steps:
 //!
-//! 1. [`Layout`]: which unknowns there are and which group touches which of them;
-//! 2. [`System`]: the order of elimination and the pattern of the factor ([`Symbolic`]), once for all iterations;
-//! 3. [`System::factor`]: the normal equations formed, the local blocks reduced out and the rest factored (block Cholesky on dense
-//!    panels), front by front;
-//! 4. [`System::solve`], for the right-hand side of the equations or any others;
-//! 5. [`System::invert`]: the selected inverse, and cofactors of everything; [`System::reduce`] those of any linear functions.
+//! 1. [`Layout`]: the unknowns, and the blocks in each group of equations;
+//! 2. [`System`]: the elimination order and the pattern of the factor ([`Symbolic`]), computed once for all iterations;
+//! 3. [`System::factor`]: formation of the normal equations, elimination of the local blocks (Schur complement) and block Cholesky
+//!    factorisation on dense panels, front by front;
+//! 4. [`System::solve`]: solution for the right-hand side of the equations or for any others;
+//! 5. [`System::invert`]: the selected inverse with all cofactors. [`System::reduce`] prepares the cofactors of linear functions.
 //!
-//! A system may be a part of a larger one ([`Layout::as_part`]): some retained blocks, the outer ones, stay when all others are eliminated. Their
-//! front, ordered last, is assembled and left open, and is what the part leaves for the system above ([`Factor::take_contribution`]), into
-//! whose fronts it goes like what a child leaves for its parent ([`Equations::contribution`]). The step and the inverse that
-//! the system above has found for these blocks are options of the phases that go down. Cut near the top of its elimination tree, a system is
-//! solved in pieces so, to the same result (Helmert 1880; Wolf 1978).
+//! A system may be part of a larger one ([`Layout::as_part`]). Its outer retained blocks are not eliminated: their front, ordered last, is
+//! assembled but not factored. It is the contribution to the parent system ([`Factor::take_contribution`]), which adds it to its own fronts
+//! ([`Equations::contribution`]). The parent system returns the step and the inverse of the outer blocks as options of the later phases. A
+//! system that is cut near the root of its elimination tree is so solved in parts, with the same result (Helmert 1880; Wolf 1978).
 //!
 //! ```
 //! use std::ops::ControlFlow;

@@ -1,17 +1,17 @@
-//! What is asked of a system besides its equations, phase by phase.
+//! Options of the phases: factorisation, solution and inversion.
 
-/// How normal equations are factored.
+/// Options of the factorisation.
 #[derive(Debug, Clone, Copy)]
 pub struct FactorOptions {
-    /// Added to the diagonal of the normal equations as a fraction of it.
+    /// Fraction of the diagonal of the normal equations that is added to it.
     pub damping: f64,
-    /// Whether what the elimination of the local blocks leaves is cached for [`System::solve`](super::System::solve), where that takes no
-    /// more memory than results will: no equation is written again then.
+    /// Whether local eliminations are cached for [`System::solve`](super::System::solve), so that equations are not evaluated again.
+    /// Ignored if the cache would exceed the memory of the results.
     pub cached: bool,
 }
 
 impl FactorOptions {
-    /// Undamped, for a factor that is asked for no solution, or for cofactors first.
+    /// No damping and no cache: for a factor without solutions, or with cofactors first.
     pub const UNCACHED: Self = Self { damping: 0.0, cached: false };
 }
 
@@ -21,21 +21,21 @@ impl Default for FactorOptions {
     }
 }
 
-/// What normal equations are solved for.
+/// Options of the solution.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SolveOptions<'a> {
-    /// Right-hand sides over all unknowns in the order of the layout, one after the other: columns of the inverse, propagated functions,
-    /// other datums. None for the one that the equations have.
+    /// Right-hand sides over all unknowns in the order of the layout, one after the other, e.g. for columns of the inverse or other datums.
+    /// None selects the right-hand side of the equations.
     pub rights: Option<&'a [f64]>,
-    /// The outer unknowns of a part of a larger system, block by block, where the right-hand side is that of the equations.
+    /// Values of the outer unknowns of a partial system, block by block, for the right-hand side of the equations.
     pub outer: &'a [f64],
 }
 
-/// Which cofactors are computed.
+/// Options of the inversion.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct InvertOptions<'a> {
-    /// The inverse over the outer unknowns of a part of a larger system: a lower triangle, block by block, column by column.
+    /// Inverse over the outer unknowns of a partial system: lower triangle, block by block, column by column.
     pub outer: &'a [f64],
-    /// Whether to find what the equations of each group have to do with each other ([`Cofactors::groups`](super::Cofactors::groups)).
+    /// Whether to compute the leverage matrix of each group ([`Cofactors::groups`](super::Cofactors::groups)).
     pub by_groups: bool,
 }

@@ -1,4 +1,4 @@
-//! The order in which retained blocks are eliminated.
+//! Elimination order of the retained blocks.
 
 use super::dissection::minimum_degree;
 use super::dissection::nested_dissection;
@@ -6,26 +6,26 @@ use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
 use crate::sorting::sort_by;
 
-/// How the retained blocks are ordered for elimination.
+/// Ordering method for the retained blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ordering {
-    /// The cheapest of the others, by predicted operations.
+    /// The cheapest of the other methods, by predicted operations.
     #[default]
     Auto,
-    /// As they stand in the input.
+    /// Order of the input.
     Input,
-    /// Reverse Cuthill-McKee: a narrow band, the 1987 program's way (GIANT guide, Appendix A).
+    /// Reverse Cuthill-McKee: small bandwidth, as in the program of 1987 (GIANT guide, Appendix A).
     ReverseCuthillMckee,
-    /// Approximate minimum degree: for blocks that hang together without any shape.
+    /// Approximate minimum degree: for irregular networks.
     MinimumDegree,
-    /// Nested dissection across the places of the retained blocks; by the graph alone where the layout has none.
+    /// Nested dissection by the positions of the retained blocks; by the graph if the layout has none.
     DissectionByPlace,
-    /// Nested dissection by the graph alone.
+    /// Nested dissection by the graph.
     DissectionByGraph,
 }
 
 impl Ordering {
-    /// The orderings to try: itself, or all of them for [`Ordering::Auto`].
+    /// Returns the methods to try: all for [`Ordering::Auto`], otherwise only itself.
     pub fn candidates(self) -> &'static [Ordering] {
         match self {
             Ordering::Auto => &[
@@ -43,7 +43,7 @@ impl Ordering {
         }
     }
 
-    /// The name under which reports and options know it.
+    /// Name in options and reports.
     pub fn name(self) -> &'static str {
         match self {
             Ordering::Auto => "auto",
@@ -55,17 +55,17 @@ impl Ordering {
         }
     }
 
-    /// The ordering with a name.
+    /// Returns the ordering of a name.
     pub fn named(name: &str) -> Option<Self> {
         let mut all = std::iter::once(&Ordering::Auto).chain(Ordering::Auto.candidates());
         all.find(|ordering| ordering.name() == name).copied()
     }
 
-    /// The blocks of a graph in the order of their elimination.
+    /// Returns the blocks of a graph in their elimination order.
     ///
-    /// What nearly all others are joined to (the camera of a whole block) goes last, and is taken out of the graph before: a search
-    /// through it reaches everything in two steps, and there is no shape left to follow.
-    /// Outer blocks come after all others, in their own order. None if the graph is too large for the ordering.
+    /// Dense blocks, which are coupled to nearly all others (a camera of all photos), are ordered last. They are removed from the graph
+    /// before, because they would reduce all distances to two steps. Outer blocks follow all others, in their own order. None if the graph
+    /// is too large for the method.
     pub(crate) fn order(self, graph: &Graph, layout: &Layout) -> Option<Vec<usize>> {
         let mut last = if self == Ordering::Input { Vec::new() } else { dense_blocks(graph, layout) };
         last.retain(|&block| !layout.outer().contains(&(block as u32)));
@@ -94,8 +94,8 @@ impl Ordering {
     }
 }
 
-/// The blocks, none of them the main one of a group, that are joined to more than ten times the root of the number of all, as the
-/// dense rows of minimum degree (Amestoy, Davis and Duff 1996), in a small graph to more than half of them; by rising degree.
+/// Returns the dense blocks that are not main, by rising degree. Dense: degree above ten times the root of the block count (Amestoy, Davis
+/// and Duff 1996), or above one half of a small graph.
 fn dense_blocks(graph: &Graph, layout: &Layout) -> Vec<usize> {
     let count = graph.len() as f64;
     let most = (10.0 * count.sqrt()).min(0.5 * count);

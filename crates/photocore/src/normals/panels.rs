@@ -1,6 +1,6 @@
-//! Block-sparse symmetric matrices, stored as the dense panels of a [`Symbolic`] pattern.
+//! Block-sparse symmetric matrices, stored as dense panels in a [`Symbolic`] pattern.
 //!
-//! The blocks of the inverse inside the pattern of the factor.
+//! Selected inverse: blocks of the inverse inside the pattern of the factor.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,8 +8,8 @@ use super::layout::LayoutError;
 use super::symbolic::Symbolic;
 use crate::parallel::lock;
 
-/// The lower triangle of a symmetric matrix in the pattern of a factor: one column-major panel for each supernode.
-/// The strict upper triangle of a panel's own blocks carries no meaning.
+/// Lower triangle of a symmetric matrix in the pattern of a factor: one column-major panel per supernode. The strict upper triangle of the
+/// eliminated blocks in a panel is undefined.
 #[derive(Debug, Clone)]
 pub(super) struct Panels {
     pub symbolic: Arc<Symbolic>,
@@ -17,12 +17,12 @@ pub(super) struct Panels {
 }
 
 impl Panels {
-    /// The panel of a supernode.
+    /// Returns the panel of a supernode.
     pub fn panel(&self, supernode: usize) -> &[f64] {
         &self.values[self.symbolic.supernodes()[supernode].panel.clone()]
     }
 
-    /// The panels, each for the thread that visits its supernode.
+    /// Splits the values into panels, so that threads can write to them independently.
     pub fn divide(&mut self) -> Vec<Mutex<&mut [f64]>> {
         let mut rest = &mut self.values[..];
         let supernodes = self.symbolic.supernodes().iter();
@@ -30,21 +30,21 @@ impl Panels {
     }
 }
 
-/// Takes `count` elements off the front of a slice.
+/// Splits `count` elements off the front of a mutable slice.
 pub(super) fn skip<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let (head, tail) = std::mem::take(rest).split_at_mut(count);
     *rest = tail;
     head
 }
 
-/// The same of a slice that is read.
+/// Splits `count` elements off the front of a slice.
 pub(super) fn skip_ref<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
     let (head, tail) = rest.split_at(count);
     *rest = tail;
     head
 }
 
-/// One value for each supernode, handed from the thread that visits one to the thread that visits another.
+/// One value per supernode, passed between the threads that visit the supernodes.
 pub(super) struct Handover<T>(Vec<Mutex<Option<T>>>);
 
 impl<T> Handover<T> {
@@ -60,24 +60,24 @@ impl<T> Handover<T> {
         lock(&self.0[index]).take()
     }
 
-    /// What nobody has taken, in order.
+    /// Returns the remaining values, in order.
     pub fn into_values(self) -> impl Iterator<Item = Option<T>> {
         self.0.into_iter().map(|value| value.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// The blocks of N^-1 inside the pattern of the factor: every retained block's own, and those of every two retained blocks that
-/// share a local block, a tie or what a system below leaves, or are a pair of the layout.
+/// Blocks of N^-1 inside the pattern of the factor. They include diagonal blocks, and blocks of retained blocks that share a local block, a
+/// tie, a contribution or a pair of the layout.
 #[derive(Debug)]
 pub struct SelectedInverse {
     pub(super) panels: Panels,
 }
 
 impl SelectedInverse {
-    /// Block (row, column) of the inverse, row by row. Retained blocks are counted as in the layout.
+    /// Returns block (row, column) of the inverse, row by row. Blocks are numbered as in the layout.
     ///
     /// # Errors
-    /// [`LayoutError::Block`] if it is outside the pattern.
+    /// [`LayoutError::Block`] if the block is outside the pattern.
     pub fn block(&self, row: usize, column: usize) -> Result<Vec<f64>, LayoutError> {
         let symbolic = &*self.panels.symbolic;
         let (p, q) = (symbolic.position(row), symbolic.position(column));
@@ -87,7 +87,7 @@ impl SelectedInverse {
         let height = symbolic.supernodes()[supernode].height();
         let left = symbolic.range(first).start - symbolic.first_unknown(supernode);
         let panel = self.panels.panel(supernode);
-        // The lower triangle, that is the row later in the order of elimination, carries the values.
+        // Values are in the lower triangle: the row is later in elimination order.
         let value = |i: usize, j: usize| {
             let (high, low) = if p > q { (at + i, left + j) } else { (at + j, left + i) };
             if first == last {

@@ -1,10 +1,10 @@
-//! Whether the pattern of the factor contains what goes to each front: checked once, for all who look up rows in it.
+//! Validation of the factor pattern, so that row lookups in fronts always succeed.
 
 use super::layout::LayoutError;
 use super::system::System;
 
 impl System {
-    /// Refuses a pattern that lacks a block which equations, a system below or a child of the elimination tree bring to a front, or a pair.
+    /// Returns an error if a front lacks a block of its equations, contributions or children, or if a pair is missing.
     pub(super) fn check_pattern(&self) -> Result<(), LayoutError> {
         let (layout, symbolic, incidence) = (&self.layout, &*self.symbolic, &self.incidence);
         let mut in_front = vec![usize::MAX; symbolic.blocks()];
@@ -17,7 +17,7 @@ impl System {
             let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].retained));
             let below = &self.contributions;
             let below = below.at(front).iter().all(|&part| have(&layout.contributions()[part as usize]));
-            // Units of one batch touch the same.
+            // Units of one batch have the same pattern.
             let units = incidence.batches_at(front).iter().all(|units| {
                 let unit = units[0] as usize;
                 let shared = |&shared: &u32| have(layout.shared_of(incidence.group_with(shared)));
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
     use crate::normals::{Layout, Ordering, Symbolic, Tie};
 
-    /// Three local blocks that are each seen from one of three retained blocks; a fourth retained block is nobody's.
+    /// Three local blocks with a single group each, for one of three retained blocks; a fourth retained block is unused.
     fn apart() -> Layout {
         Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 1, 2, 3], vec![0, 1, 2]).unwrap()
     }

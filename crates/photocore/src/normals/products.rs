@@ -1,7 +1,7 @@
-//! Products z_f^T z_g of solutions z = L^-1 e, in one walk up the elimination tree.
+//! Products z_f^T z_g of solutions z = L^-1 e, in one traversal from the leaves of the elimination tree.
 //!
-//! A right-hand side that starts at a supernode is not zero at its ancestors only; there it meets those of other subtrees. What has been
-//! multiplied at a supernode is not needed above it, so that no solution is ever kept as a whole: what goes on is as high as the front.
+//! A right-hand side that starts at a supernode is nonzero only there and at its ancestors, which it shares with other subtrees. Rows of a
+//! supernode are not needed after their products are computed. A front is therefore the largest part of a solution in memory.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
@@ -13,7 +13,7 @@ use super::watch::Control;
 use super::workspace::zeros;
 use crate::parallel;
 
-/// Right-hand sides, sorted by where they start.
+/// Right-hand sides, sorted by their first supernode.
 pub(super) struct Products<'a> {
     symbolic: &'a Symbolic,
     count: usize,
@@ -21,17 +21,17 @@ pub(super) struct Products<'a> {
     entries: Vec<(usize, usize, usize, f64)>,
 }
 
-/// What a supernode leaves to its parent: the columns that have begun, and their values in the coupled rows, column by column.
+/// Update of a supernode for its parent: nonzero columns, and their values in the coupled rows, column by column.
 struct Update {
     columns: Vec<usize>,
     values: Vec<f64>,
 }
 
-/// Columns that go through a front together, and rows and columns of a tile of the products.
+/// Number of columns per solution of a front, and size of the tiles of the products.
 const TOGETHER: usize = 32;
 
 impl<'a> Products<'a> {
-    /// Of right-hand sides: places in the order of elimination, ascending, with their values.
+    /// Sorts right-hand sides, given as ascending positions in elimination order with their values.
     pub fn new(symbolic: &'a Symbolic, rights: &[&[(usize, f64)]]) -> Self {
         let mut supernode_of = vec![0; symbolic.unknowns()];
         for index in 0..symbolic.supernode_count() {
@@ -49,7 +49,7 @@ impl<'a> Products<'a> {
         Self { symbolic, count: rights.len(), entries }
     }
 
-    /// Numbers that fronts and what they leave take at the most.
+    /// Returns the maximum number of values in fronts and updates.
     pub fn numbers(&self) -> usize {
         let supernodes = self.symbolic.supernodes();
         let mut begun = vec![0; supernodes.len()];
@@ -68,7 +68,7 @@ impl<'a> Products<'a> {
         most
     }
 
-    /// Adds the products to a matrix row by row: of all columns with each other, or of those before the split with those from it on.
+    /// Adds the products to a matrix, row by row: of all pairs of columns, or of columns before `split` with columns from `split`.
     pub fn add(
         &self,
         factor: &Factor,
@@ -125,7 +125,7 @@ impl<'a> Products<'a> {
         Some(())
     }
 
-    /// Puts what begins at a supernode and what its children leave into its front.
+    /// Adds right-hand sides that start at a supernode, and updates of its children, to its front.
     fn assemble(
         &self,
         front: &mut [f64],
@@ -150,7 +150,7 @@ impl<'a> Products<'a> {
     }
 }
 
-/// The products of the columns of one front.
+/// Products of the columns of one front.
 struct Tiles<'a> {
     columns: &'a [usize],
     solved: MatRef<'a, f64>,
@@ -159,7 +159,7 @@ struct Tiles<'a> {
 }
 
 impl Tiles<'_> {
-    /// Adds them; only those up to the diagonal where all columns meet each other.
+    /// Adds the products; if there is one set of columns, only on and below the diagonal.
     fn add(&self, matrix: &mut [f64]) {
         let Self { columns, split, count, .. } = *self;
         let rows = split.map_or(columns.len(), |split| columns.partition_point(|&column| column < split));
@@ -199,7 +199,7 @@ impl Tiles<'_> {
     }
 }
 
-/// Copies what is below the diagonal of a square matrix to above it.
+/// Copies the lower triangle of a square matrix to the upper one.
 fn mirror(matrix: &mut [f64], count: usize) {
     for i in 0..count {
         for j in 0..i {

@@ -20,18 +20,18 @@ use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
 use crate::{Threads, parallel};
 
-/// Right-hand sides that go through the factor together.
+/// Number of right-hand sides per multiple solution.
 const TOGETHER: usize = 16;
 
 impl System {
-    /// Solves the normal equations for all unknowns, in the order of the layout, for one right-hand side or several, the solutions one after
-    /// the other: the retained blocks from the factor, the local blocks one by one. The same bits for any number of threads.
+    /// Solves the normal equations for all unknowns, in the order of the layout, for one or several right-hand sides; solutions follow one
+    /// another. Retained blocks are computed from the factor, then each local block. Bitwise identical for any number of threads.
     ///
-    /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
-    /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
+    /// `equations` and `prior` must belong to the factor. Without a cache the equations are evaluated again; for local blocks with zero
+    /// right-hand sides only once.
     ///
     /// # Errors
-    /// An interruption, no memory, lengths that contradict the layout.
+    /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn solve(
         &self,
         threads: &Threads,
@@ -68,7 +68,7 @@ impl System {
         Ok(solved?)
     }
 
-    /// The elimination of the local blocks that a factor comes from.
+    /// Returns the local eliminations of a factor.
     pub(super) fn elimination<'a>(
         &'a self,
         factor: &'a Factor,
@@ -80,7 +80,7 @@ impl System {
         Elimination { system: self, cached, equations, prior, damping: *damping, control }
     }
 
-    /// The parts of right-hand sides that belong to unknowns that are not local, in the order of elimination; the bytes that there are not.
+    /// Returns the rows of retained unknowns in elimination order. `Err`: size of the failed allocation in bytes.
     pub(super) fn of_others(&self, rights: &[f64]) -> Result<Vec<f64>, usize> {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         let unknowns = layout.unknowns().max(1);
@@ -95,12 +95,12 @@ impl System {
 }
 
 impl Elimination<'_> {
-    /// Solves for right-hand sides over all unknowns, C at a time; None without memory.
+    /// Solves for right-hand sides over all unknowns, C at a time; None if memory is insufficient.
     fn solve_for<const C: usize>(&self, factor: &Factor, rights: &[f64]) -> Option<Vec<f64>> {
         let (unknowns, count) = (self.system.layout.unknowns().max(1), self.system.symbolic.unknowns());
         let mut others = self.control.allocated(self.system.of_others(rights))?;
         let found = self.reduce::<C>(rights);
-        // One after the other in a fixed order, whichever thread has found them.
+        // In a fixed order, independent of the threads.
         found.iter().for_each(|found| found.add_to(&mut others, count));
         parallel::each_chunk(&mut others, TOGETHER * count, &|_, columns| {
             if !self.control.stopped() {
@@ -111,8 +111,8 @@ impl Elimination<'_> {
         self.complete(Some(own), &others, rights.len() / unknowns)
     }
 
-    /// Solves for the local blocks, the others being solved for in the order of elimination, and puts all in the order of the layout; None
-    /// without memory. There are so many columns.
+    /// Solves for the local blocks from the solutions of the others in elimination order, for `columns` right-hand sides. Returns all in
+    /// the order of the layout. None if memory is insufficient.
     pub fn complete<const C: usize>(
         &self,
         own: Option<Vec<Vec<[f64; C]>>>,
@@ -158,7 +158,7 @@ impl Elimination<'_> {
 }
 
 impl Factor {
-    /// The corrections of the unknowns that are not local, in the order of the layout; of a whole system.
+    /// Returns the corrections of the retained unknowns of a whole system, in the order of the layout.
     pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
         let (first, mut x) = (layout.all_locals().end, self.right.clone());
         self.solve_backward(&mut x);
@@ -167,8 +167,8 @@ impl Factor {
         corrections
     }
 
-    /// Solves the reduced normal equations for right-hand sides over the unknowns that are not local, in the order of the layout, one
-    /// after the other; so are the solutions. No equation is formed again.
+    /// Solves the reduced normal equations for right-hand sides over the retained unknowns, in the order of the layout, one after the
+    /// other. Returns solutions in the same form; equations are not formed again.
     pub fn solve_reduced(&self, layout: &Layout, rights: &[f64]) -> Vec<f64> {
         let (first, order) = (layout.all_locals().end, self.unknowns(layout).collect::<Vec<usize>>());
         let columns = rights.chunks_exact(order.len().max(1));
@@ -184,14 +184,13 @@ impl Factor {
         solutions
     }
 
-    /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them. Outer unknowns must be zero: they stay so only where the
-    /// others leave nothing for them, so that this is for whole systems.
+    /// Multiplies columns in elimination order by (L L^T)^-1. Only for whole systems: outer unknowns must be zero and remain so.
     pub(super) fn solve_columns(&self, columns: &mut [f64]) {
         self.forward_columns(columns);
         self.backward_columns(columns);
     }
 
-    /// Replaces columns by L^-1 times them, and what they have of outer unknowns by what is left of it.
+    /// Multiplies columns by L^-1; for outer unknowns computes the reduced right-hand side.
     pub(super) fn forward_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let count = columns.len() / symbolic.unknowns().max(1);
@@ -213,7 +212,7 @@ impl Factor {
         }
     }
 
-    /// Replaces columns by L^-T times them; outer unknowns stay as they are.
+    /// Multiplies columns by L^-T; outer unknowns are unchanged.
     pub(super) fn backward_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let count = columns.len() / symbolic.unknowns().max(1);
@@ -235,13 +234,13 @@ impl Factor {
         }
     }
 
-    /// The own and the coupled rows of the panel of a supernode.
+    /// Returns the eliminated and the coupled rows of the panel of a supernode.
     pub(super) fn panel(&self, index: usize) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
         let s = &self.panels.symbolic.supernodes()[index];
         MatRef::from_column_major_slice(self.panels.panel(index), s.height(), s.width).split_at_row(s.width)
     }
 
-    /// x := L^-T x; outer unknowns stay as they are.
+    /// Computes x := L^-T x; outer unknowns are unchanged.
     pub(super) fn solve_backward(&self, x: &mut [f64]) {
         run_unsized(Backward { panels: &self.panels, x });
     }

@@ -1,18 +1,18 @@
-//! Blocks that are eliminated together.
+//! Supernodes: blocks that are eliminated together.
 
 use std::ops::Range;
 
 use super::layout::Layout;
 
-/// Widest panel, in unknowns: wide enough that passing updates from panel to panel costs little beside the products, narrow enough that
-/// the inverse of a panel's own triangle, which one thread computes, does too.
+/// Widest panel, in unknowns. Wide panels reduce the cost of updates between panels; narrow ones reduce the serial inversion of the
+/// diagonal triangle.
 const WIDEST_PANEL: usize = 768;
 
-/// The blocks and the coupled rows of a supernode, as positions.
+/// Blocks and coupled rows of a supernode, as positions.
 pub(super) type Merged = (Range<usize>, Vec<usize>);
 
-/// Joins each column with the next one when that is its parent and few explicit zeros come in (relaxed supernodes,
-/// Ashcraft and Grimes 1989). Returns the blocks and the coupled rows of each supernode.
+/// Merges each column with its parent if they are adjacent and the merge adds few explicit zeros (relaxed supernodes, Ashcraft and Grimes
+/// 1989). Returns the blocks and the coupled rows of each supernode.
 pub(super) fn merge_columns(columns: Vec<Vec<usize>>, offset: &[usize]) -> Vec<Merged> {
     let dim = |position: usize| offset[position + 1] - offset[position];
     let size = |rows: &[usize]| rows.iter().map(|&row| dim(row)).sum::<usize>();
@@ -23,7 +23,7 @@ pub(super) fn merge_columns(columns: Vec<Vec<usize>>, offset: &[usize]) -> Vec<M
         let own = entries(dim(position), size(&rows));
         if let Some((blocks, above)) = merged.last_mut() {
             let width = offset[position + 1] - offset[blocks.start];
-            // All rows of the child but its parent stand in the parent's pattern, so the merged rows are the parent's.
+            // All rows of the child except its parent are in the parent's pattern, so the merged rows are the parent's.
             let zeros = 1.0 - (filled + own) / entries(width, size(&rows));
             let few = zeros < 0.05 || (width <= 48 && zeros < 0.2) || (width <= 24 && zeros < 0.4);
             if above.first() == Some(&position) && width <= WIDEST_PANEL && few {
@@ -39,7 +39,7 @@ pub(super) fn merge_columns(columns: Vec<Vec<usize>>, offset: &[usize]) -> Vec<M
     merged
 }
 
-/// Where each block stands in an order.
+/// Inverts an order: returns the index of each block.
 pub(super) fn places(order: &[usize]) -> Vec<usize> {
     let mut place = vec![0; order.len()];
     for (k, &block) in order.iter().enumerate() {
@@ -48,7 +48,7 @@ pub(super) fn places(order: &[usize]) -> Vec<usize> {
     place
 }
 
-/// Where the unknowns of each block of an order start; one more at the end.
+/// Returns the offset of the unknowns of each block of an order, and the end of the last.
 pub(super) fn offsets(layout: &Layout, order: &[usize]) -> Vec<usize> {
     let ends = order.iter().scan(0, |end, &block| {
         *end += layout.retained_dim(block);
@@ -57,8 +57,7 @@ pub(super) fn offsets(layout: &Layout, order: &[usize]) -> Vec<usize> {
     std::iter::once(0).chain(ends).collect()
 }
 
-/// Puts blocks that are the main one of no group into their own order within each supernode, where any order does: what groups have in common
-/// with others then stands together as often as it can.
+/// Sorts shared blocks by index within each supernode, so that the columns of shared block lists are mostly contiguous.
 pub(super) fn sort_commons(layout: &Layout, block_at: &mut [usize], merged: &mut [Merged]) {
     if !layout.has_shared() {
         return;

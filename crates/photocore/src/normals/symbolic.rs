@@ -1,4 +1,4 @@
-//! The order of elimination and the pattern of the factor.
+//! Symbolic phase: elimination order and pattern of the factor.
 
 use std::ops::Range;
 
@@ -8,13 +8,13 @@ use super::ordering::Ordering;
 use super::supernodes::{Merged, merge_columns, offsets, places, sort_commons};
 use crate::parallel;
 
-/// Operations that are as good as the least.
+/// Accepted ratio of predicted operations to the minimum.
 const AS_GOOD: f64 = 1.05;
 
-/// The order of elimination and the pattern of the factor of the reduced normal equations.
+/// Elimination order and factor pattern of the reduced normal equations.
 ///
-/// Blocks are counted by *position*, their place in the order of elimination. Blocks of nearly the same pattern are eliminated together,
-/// as one supernode whose columns form one dense panel. Outer blocks are the last supernode, which stays *open*: its front is
+/// The *position* of a block is its index in the elimination order. Blocks of nearly equal pattern form one supernode, whose columns form
+/// one dense panel. Outer blocks form the last supernode, which is *open*: its front is assembled but not factored.
 /// assembled and not factored.
 #[derive(Debug, Clone)]
 pub struct Symbolic {
@@ -26,63 +26,63 @@ pub struct Symbolic {
     supernode_of: Vec<usize>,
     supernodes: Vec<Supernode>,
     values: usize,
-    /// The supernode of the outer blocks.
+    /// Supernode of the outer blocks.
     open: Option<usize>,
 }
 
-/// Adjacent blocks that are eliminated together, with the blocks below that they are coupled to.
+/// Adjacent blocks that are eliminated together, with their coupled blocks below.
 #[derive(Debug, Clone)]
 pub(crate) struct Supernode {
-    /// Positions of its blocks.
+    /// Positions of the eliminated blocks.
     pub blocks: Range<usize>,
     /// Positions of the coupled blocks below, ascending.
     pub rows: Vec<usize>,
-    /// Row of the panel at which each of `rows` starts; one more at the end, the height.
+    /// Panel row of the start of each element of `rows`, and the height.
     pub row_offset: Vec<usize>,
-    /// Columns of the panel.
+    /// Number of columns of the panel.
     pub width: usize,
-    /// Supernode of the first of `rows`.
+    /// Supernode of the first element of `rows`.
     pub parent: Option<usize>,
-    /// Supernodes whose parent this is.
+    /// Supernodes whose parent is this one.
     pub children: Vec<usize>,
-    /// Where the panel, column by column, stands among the values.
+    /// Range of the panel, column by column, in the values of the factor.
     pub panel: Range<usize>,
 }
 
 impl Supernode {
-    /// Rows of the panel: those of its own blocks, then those of the coupled blocks.
+    /// Number of panel rows: eliminated blocks, then coupled blocks.
     pub fn height(&self) -> usize {
         self.row_offset[self.rows.len()]
     }
 
-    /// Rows below its own blocks.
+    /// Number of rows below the eliminated blocks.
     pub fn below(&self) -> usize {
         self.height() - self.width
     }
 
-    /// Multiply-adds of its part of the factorisation.
+    /// Predicted multiply-adds of its part of the factorisation.
     pub fn operations(&self) -> f64 {
         multiply_adds(self.width, self.below())
     }
 }
 
-/// Predicted multiply-adds.
+/// Predicted numbers of multiply-adds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Operations {
-    /// Reduction of the local blocks, each time the normal equations are formed.
+    /// Reduction of the local blocks, per formation.
     pub reduction: f64,
-    /// One factorisation of the reduced normal equations.
+    /// Factorisation of the reduced normal equations.
     pub factor: f64,
-    /// One selected inversion.
+    /// Selected inversion.
     pub inverse: f64,
 }
 
 impl Symbolic {
-    /// Orders the retained blocks of a layout and finds the pattern of the factor.
+    /// Orders the retained blocks of a layout and computes the pattern of the factor.
     ///
     /// # Errors
-    /// [`LayoutError::Ordering`] if the layout is too large for the ordering. [`Ordering::Auto`] passes over the orderings that it is too
-    /// large for (see [`Symbolic::predictions`]).
+    /// [`LayoutError::Ordering`] if the layout is too large for the ordering. [`Ordering::Auto`] skips orderings for which the layout is
+    /// too large (see [`Symbolic::predictions`]).
     pub fn new(layout: &Layout, ordering: Ordering) -> Result<Self, LayoutError> {
         let graph = Graph::new(layout);
         let try_out = |&candidate: &Ordering| {
@@ -96,7 +96,7 @@ impl Symbolic {
             parallel::map_each(orderings.iter().collect(), &try_out)
         };
         let predictions = predictions_of(&candidates);
-        // In the order of the input, which comes first, photos stand before what they share: equations go into small fronts, side by side.
+        // The input order, the first candidate, has photos before shared blocks: fronts are small and independent.
         let enough = if layout.has_shared() { AS_GOOD } else { 1.0 };
         let (ordering, order) = cheapest(candidates, enough).ok_or(LayoutError::Ordering(ordering.name()))?;
         Ok(Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) })
@@ -124,7 +124,7 @@ impl Symbolic {
         symbolic
     }
 
-    /// Makes supernodes with their panels. Blocks from position `inner` on are outer ones.
+    /// Creates the supernodes and their panels. Blocks from position `inner` are outer blocks.
     fn gather_supernodes(&mut self, merged: Vec<Merged>, inner: usize) {
         let count = self.block_at.len();
         let outer = (inner < count).then_some((inner..count, Vec::new()));
@@ -158,12 +158,12 @@ impl Symbolic {
         }
     }
 
-    /// The ordering in force (never [`Ordering::Auto`]).
+    /// Returns the chosen ordering (never [`Ordering::Auto`]).
     pub fn ordering(&self) -> Ordering {
         self.ordering
     }
 
-    /// The orderings that were candidates, each with the predicted multiply-adds of a factorisation; None if the layout is too large for it.
+    /// Returns the candidate orderings with the predicted multiply-adds of a factorisation; None if the layout is too large for one.
     pub fn predictions(&self) -> &[(Ordering, Option<f64>)] {
         &self.predictions
     }
@@ -188,7 +188,7 @@ impl Symbolic {
         self.supernodes.len()
     }
 
-    /// Predicted multiply-adds of each phase.
+    /// Returns the predicted multiply-adds of each phase.
     pub fn operations(&self, layout: &Layout) -> Operations {
         let reduction = (0..layout.locals())
             .map(|local| {
@@ -207,17 +207,17 @@ impl Symbolic {
         self.closed().iter().map(Supernode::operations).sum()
     }
 
-    /// The supernode of the outer blocks, the last one, whose front is not factored.
+    /// Returns the supernode of the outer blocks, the last one, whose front is not factored.
     pub(crate) fn open(&self) -> Option<usize> {
         self.open
     }
 
-    /// How many unknowns the outer blocks have.
+    /// Number of unknowns in the outer blocks.
     pub fn outer_unknowns(&self) -> usize {
         self.open.map_or(0, |open| self.supernodes[open].width)
     }
 
-    /// The supernodes that are factored: all but the open one.
+    /// Returns the factored supernodes: all except the open one.
     pub(crate) fn closed(&self) -> &[Supernode] {
         &self.supernodes[..self.open.unwrap_or(self.supernodes.len())]
     }
@@ -226,17 +226,17 @@ impl Symbolic {
         &self.supernodes
     }
 
-    /// Place of a retained block in the order of elimination.
+    /// Returns the position of a retained block in the elimination order.
     pub(crate) fn position(&self, block: usize) -> usize {
         self.position_of[block]
     }
 
-    /// The retained block at a position.
+    /// Returns the retained block at a position.
     pub(crate) fn block(&self, position: usize) -> usize {
         self.block_at[position]
     }
 
-    /// All blocks in the order of their elimination.
+    /// Returns all blocks in their elimination order.
     pub fn order(&self) -> &[usize] {
         &self.block_at
     }
@@ -245,12 +245,12 @@ impl Symbolic {
         self.offset[position + 1] - self.offset[position]
     }
 
-    /// Where the unknowns of a position stand in the order of elimination.
+    /// Returns the unknowns of a position, as indices in the elimination order.
     pub(crate) fn range(&self, position: usize) -> Range<usize> {
         self.offset[position]..self.offset[position + 1]
     }
 
-    /// Where the unknowns of a position stand in the vector of unknowns.
+    /// Returns the unknowns of a position, as indices in the vector of unknowns.
     pub(crate) fn unknowns_at(&self, layout: &Layout, position: usize) -> Range<usize> {
         layout.retained_range(self.block_at[position])
     }
@@ -259,19 +259,19 @@ impl Symbolic {
         self.supernode_of[position]
     }
 
-    /// First unknown of a supernode in the order of elimination.
+    /// Returns the first unknown of a supernode in the elimination order.
     pub(crate) fn first_unknown(&self, supernode: usize) -> usize {
         self.offset[self.supernodes[supernode].blocks.start]
     }
 
-    /// Row of the panel of `supernode` at which the block at `position` starts, if it is in its pattern.
+    /// Returns the panel row of the block at `position` in a supernode; None if it is outside the pattern.
     pub(crate) fn panel_row(&self, supernode: usize, position: usize) -> Option<usize> {
         let s = &self.supernodes[supernode];
         let is_in_it = s.blocks.contains(&position) || s.rows.binary_search(&position).is_ok();
         is_in_it.then(|| self.row_of(supernode, position))
     }
 
-    /// The same of a block that goes to the front of the supernode: it is in the pattern, which a [`System`](super::System) checks once.
+    /// Returns the panel row of a block in the pattern, which [`System`](super::System) has checked.
     pub(crate) fn row_of(&self, supernode: usize, position: usize) -> usize {
         let s = &self.supernodes[supernode];
         if s.blocks.contains(&position) {
@@ -280,8 +280,8 @@ impl Symbolic {
         s.row_offset[s.rows.partition_point(|&row| row < position)]
     }
 
-    /// Where the coupled rows of a supernode stand in the front of its parent (own blocks, then coupled blocks):
-    /// `(row in this front below the panel's own blocks, row in the parent's front, how many)`.
+    /// Maps the coupled rows of a supernode to the front of its parent (eliminated blocks, then coupled blocks). Each run is `(row below
+    /// the eliminated blocks, row in the parent's front, length)`.
     pub(crate) fn rows_in_parent(&self, supernode: usize) -> Vec<(usize, usize, usize)> {
         let s = &self.supernodes[supernode];
         let Some(parent) = s.parent else { return Vec::new() };
@@ -297,14 +297,14 @@ impl Symbolic {
     }
 }
 
-/// An ordering with its predicted multiply-adds and the order; None if the graph is too large for it.
+/// Ordering with predicted multiply-adds and order; None if the graph is too large.
 type Candidate = (Ordering, Option<(f64, Vec<usize>)>);
 
 fn predictions_of(candidates: &[Candidate]) -> Vec<(Ordering, Option<f64>)> {
     candidates.iter().map(|(ordering, order)| (*ordering, order.as_ref().map(|(count, _)| *count))).collect()
 }
 
-/// The candidate of the fewest operations, or the order of the input if it takes no more than `enough` times as many; None if all have failed.
+/// Returns the cheapest candidate, or the input order if its operations are within `enough` times the minimum. None without candidates.
 fn cheapest(candidates: Vec<Candidate>, enough: f64) -> Option<(Ordering, Vec<usize>)> {
     let mut orders: Vec<(Ordering, f64, Vec<usize>)> = candidates
         .into_iter()
@@ -319,7 +319,7 @@ fn cheapest(candidates: Vec<Candidate>, enough: f64) -> Option<(Ordering, Vec<us
     Some((ordering, order))
 }
 
-/// The elimination tree of a graph in a given order (Liu 1990, algorithm 4.2): parent of each place in the order.
+/// Computes the elimination tree of a graph in a given order (Liu 1990, algorithm 4.2): the parent of each position.
 fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Option<usize>> {
     let mut parent = vec![None; order.len()];
     let mut ancestor: Vec<Option<usize>> = vec![None; order.len()];
@@ -341,8 +341,8 @@ fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Opti
     parent
 }
 
-/// Multiply-adds of the factorisation in a given order, from the heights of the columns of the factor. Each row of the factor is a
-/// subtree of the elimination tree, whose leaves are neighbours (Liu 1990, section 4.1): it is walked, not stored.
+/// Predicts the multiply-adds of a factorisation from the column heights of the factor. Each row of the factor is a subtree of the
+/// elimination tree with neighbours as leaves (Liu 1990, section 4.1). The rows are traversed, not stored.
 fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 {
     let place = places(order);
     let parent = elimination_tree(graph, order, &place);
@@ -355,7 +355,7 @@ fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 
             while seen_by[i] != k {
                 seen_by[i] = k;
                 below[i] += layout.retained_dim(block);
-                // The walk ends at k itself, the root of the subtree, at the latest.
+                // The traversal ends at k, the root of the subtree.
                 i = parent[i].unwrap_or(k);
             }
         }
@@ -364,14 +364,14 @@ fn predicted_operations(layout: &Layout, graph: &Graph, order: &[usize]) -> f64 
     inner.iter().zip(below).map(|(&block, below)| multiply_adds(layout.retained_dim(block), below)).sum()
 }
 
-/// Multiply-adds of eliminating `width` unknowns that are coupled to `below` others.
+/// Returns the multiply-adds of eliminating `width` unknowns that are coupled to `below` others.
 fn multiply_adds(width: usize, below: usize) -> f64 {
     let (w, r) = (width as f64, below as f64);
     w * w * w / 6.0 + w * w * r / 2.0 + w * r * r / 2.0
 }
 
-/// Reorders so that every subtree of the elimination tree of the first `inner` blocks is contiguous, and that of all others, which
-/// become one front, too; the fill stays the same.
+/// Reorders the blocks so that each subtree of the elimination tree of the first `inner` blocks is contiguous. The other blocks follow as
+/// one front; the fill is unchanged.
 fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
     let mut parent = elimination_tree(graph, order, &places(order));
     parent.truncate(inner);
@@ -399,7 +399,7 @@ fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
     result
 }
 
-/// The positions below the diagonal in each block column of the factor: its own neighbours and what its children leave.
+/// Returns the positions below the diagonal in each block column of the factor: neighbours and fill from its children.
 fn column_patterns(graph: &Graph, block_at: &[usize], position_of: &[usize]) -> Vec<Vec<usize>> {
     let count = block_at.len();
     let mut columns: Vec<Vec<usize>> = Vec::with_capacity(count);

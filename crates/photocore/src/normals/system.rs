@@ -1,8 +1,8 @@
-//! A system ready to be formed and solved again and again.
+//! Ordered systems, ready for repeated formation.
 //!
-//! Which front what touches several retained blocks goes to.
+//! Assembly nodes of ties and contributions.
 //!
-//! Numbers that there is room for: in vectors, and in what the elimination of local blocks leaves.
+//! Sizes of vectors and of cached local eliminations.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::watch::Control;
 use super::workspace::Workspace;
 use crate::sorting::order;
 
-/// A system ready to be formed again and again: the pattern and the order are found once.
+/// Layout with its elimination order and factor pattern, which are computed once and reused by every formation.
 #[derive(Debug)]
 pub struct System {
     pub(super) layout: Layout,
@@ -26,14 +26,14 @@ pub struct System {
     pub(super) contributions: Nodes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
-    /// Whether what the elimination of local blocks leaves is cached for the solution.
+    /// Whether the local eliminations are cached for the solution.
     pub(super) caches: bool,
-    /// Numbers in what is cached of it at each supernode, and last of the local blocks without equations, at the most; none where it is not.
+    /// Upper bounds of the cached values per supernode; last, of local blocks without equations. Empty without a cache.
     pub(super) cached: Vec<usize>,
 }
 
 impl System {
-    /// Orders a layout.
+    /// Orders a layout and computes its factor pattern.
     ///
     /// # Errors
     /// [`LayoutError::Pattern`] if the order contradicts the layout, [`LayoutError::Ordering`] if the layout is too large for the ordering.
@@ -72,29 +72,29 @@ impl System {
         Ok(system)
     }
 
-    /// The unknowns and groups.
+    /// Returns the layout.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// The order and the pattern.
+    /// Returns the elimination order and the factor pattern.
     pub fn symbolic(&self) -> &Symbolic {
         &self.symbolic
     }
 
-    /// Counts the local blocks of a batch that is done.
+    /// Adds the local blocks of a finished batch to the progress count.
     pub(super) fn count(&self, units: &[u32], control: &Control) {
         control.count(units.iter().filter(|&&unit| !self.layout.is_apart(unit as usize)).count());
     }
 
-    /// Numbers that a factor holds at the most: the panels, and what the elimination of local blocks has left for the solution.
+    /// Returns the maximum number of values in a factor: panels and cached local eliminations.
     pub fn numbers_in_factor(&self) -> usize {
         self.symbolic.values() + self.cached.iter().sum::<usize>()
     }
 }
 
-/// Time for forming and eliminating the units assembled in a supernode, in multiply-adds of a factorisation: those of their own,
-/// which run at a lower rate, and their equations.
+/// Estimates the cost of forming and eliminating the units of a supernode, in multiply-adds of a factorisation. The estimate includes the
+/// evaluation of the equations.
 fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
     let of_batch = |run: &[u32]| {
         let first = run.first().map_or(0, |&first| first as usize);
@@ -104,12 +104,12 @@ fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
     incidence.batches_at(index).iter().map(of_batch).sum::<usize>() as f64
 }
 
-/// Lists of retained blocks, those of ties or of what systems below leave, by their *assembly node*: the supernode of the first of their blocks in
-/// the order of elimination. All other blocks of a list are in the pattern of its node.
+/// Lists of retained blocks (of ties or contributions), grouped by *assembly node*: the supernode of the block that is eliminated first.
+/// All other blocks of a list are in the pattern of the node.
 #[derive(Debug)]
 pub(super) struct Nodes {
     by_node: Vec<u32>,
-    /// Where those of each supernode start; one more at the end.
+    /// Start of each supernode's lists, and the end of the last.
     node_ptr: Vec<usize>,
 }
 
@@ -126,7 +126,7 @@ impl Nodes {
         Self { by_node: by_node.into_iter().map(|list| list as u32).collect(), node_ptr }
     }
 
-    /// The lists whose node is a supernode.
+    /// Returns the lists whose assembly node is the supernode.
     pub fn at(&self, supernode: usize) -> &[u32] {
         match self.node_ptr.get(supernode..supernode + 2) {
             Some(ends) => &self.by_node[ends[0]..ends[1]],
@@ -135,31 +135,31 @@ impl Nodes {
     }
 }
 
-/// Numbers for each unknown: values, steps, priors and their copies, cofactors, what is made of them for the caller.
+/// Vector elements per unknown: values, steps, priors and copies, cofactors and results for the caller.
 const PER_UNKNOWN: usize = 38;
-/// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
-/// as given, as ordered for the adjustment and as handed back.
+/// Vector elements per equation, without coefficients: observed value, standard deviation, residual, redundancy number and test value. Each
+/// is stored as given, in the order of the adjustment and as returned.
 const PER_EQUATION: usize = 18;
-/// Of these, the part that is made of the results after the last solution: what is cached from the formation to the solution may take it.
+/// Fraction of the vectors that is allocated after the last solution; the cache may use this memory before.
 const LATER: f64 = 0.65;
 
-/// Numbers in vectors, the problem itself and its results counted.
+/// Returns the number of elements in all vectors, including the problem and its results.
 pub(super) fn vectors(layout: &Layout) -> usize {
     PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations()
 }
 
-/// Numbers in what is made of results only.
+/// Returns the number of elements in vectors that only contain results.
 pub(super) fn made_of_results(layout: &Layout) -> usize {
     (LATER * vectors(layout) as f64) as usize
 }
 
-/// Numbers that are cached of so many local blocks of one pattern, at the most.
+/// Returns the maximum number of cached values for `count` local blocks of one pattern.
 fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
     let l = layout.local_dim();
     count * (l * (layout.reduced_width(first) + 1) + Triangle::numbers(l))
 }
 
-/// The same of all local blocks assembled in a supernode.
+/// Returns the maximum number of cached values for all local blocks of a supernode.
 pub(super) fn numbers_at(incidence: &Incidence, layout: &Layout, index: usize) -> usize {
     let of_batch =
         |run: &[u32]| run.first().map_or(0, |&first| numbers_of(layout, first as usize, run.len()));

@@ -1,4 +1,4 @@
-//! The elimination tree, walked by several threads.
+//! Parallel traversal of the elimination tree.
 
 use std::sync::atomic::{AtomicUsize, Ordering::AcqRel};
 
@@ -6,24 +6,24 @@ use rayon::ScopeFifo;
 
 use super::symbolic::Symbolic;
 
-/// The elimination tree on two floors: subtrees that one thread walks, and single supernodes above them. Supernodes of which neither
-/// is below the other are independent, so that the order in which they are visited changes no bit of a result.
+/// Elimination tree with two levels of tasks: subtrees for one thread each, and single supernodes above them. Supernodes in different
+/// branches are independent, so that the order of visits does not change results.
 #[derive(Debug)]
 pub(super) struct Tree {
     parent: Vec<Option<usize>>,
-    /// First supernode of the subtree of each: the order is a postorder, so a subtree has no gaps.
+    /// First supernode of each subtree: in a postorder, a subtree is contiguous.
     first: Vec<usize>,
-    /// The units of work: supernodes above, and roots of undivided subtrees. Those without parent, and those below each supernode.
+    /// Task units, namely upper supernodes and roots of undivided subtrees; `roots` without parent, `below` under each upper supernode.
     roots: Vec<usize>,
     below: Vec<Vec<usize>>,
-    /// Whether a supernode stands above the undivided subtrees.
+    /// Whether a supernode is above the undivided subtrees.
     above: Vec<bool>,
 }
 
 impl Tree {
-    /// Share of the whole work up to which a subtree is not divided.
+    /// Maximum fraction of the total work in an undivided subtree.
     const SHARE: f64 = 1.0 / 32.0;
-    /// Work (multiply-adds) up to which nothing is divided.
+    /// Maximum work (multiply-adds) of an undivided tree.
     const SMALL: f64 = 1e6;
 
     /// Divides the tree by the work at each supernode (multiply-adds).
@@ -49,7 +49,7 @@ impl Tree {
         Self { parent, first, roots, below, above }
     }
 
-    /// Visits every supernode after all those below it.
+    /// Visits every supernode after its descendants.
     pub fn upward(&self, visit: &(dyn Fn(usize) + Sync)) {
         let waiting: Vec<AtomicUsize> =
             self.below.iter().map(|units| AtomicUsize::new(units.len())).collect();
@@ -57,7 +57,7 @@ impl Tree {
             (self.first[unit]..unit).for_each(visit);
             let mut index = unit;
             visit(index);
-            // The last to arrive below a supernode goes on with it.
+            // The last finished child continues with the parent.
             while let Some(parent) = self.parent[index] {
                 if waiting[parent].fetch_sub(1, AcqRel) > 1 {
                     break;
@@ -75,7 +75,7 @@ impl Tree {
         });
     }
 
-    /// Visits every supernode before all those below it.
+    /// Visits every supernode before its descendants.
     pub fn downward(&self, visit: &(dyn Fn(usize) + Sync)) {
         rayon::scope_fifo(|scope| self.roots.iter().for_each(|&root| self.descend(scope, root, visit)));
     }

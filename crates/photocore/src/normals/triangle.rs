@@ -1,27 +1,27 @@
-//! The Cholesky factor of a local block.
+//! Cholesky factor of a local block.
 
 use pulp::Simd;
 
 use super::vectorised::LANES;
 
-/// A pivot smaller than this fraction of its diagonal element before elimination is rounding error: the unknown is not determined.
-/// What rounding leaves of a zero pivot is some tens of units in the last place; weights that alone make a datum (GIANT's default
-/// of 60000 m for a station) leave ten times this and more.
+/// Minimum ratio of a pivot to its initial diagonal element; the unknown is undetermined below it. The rounding error of a zero pivot is
+/// some tens of units in the last digit. Priors that only define the datum (GIANT's default of 60000 m for a station) give ten times this
+/// or more.
 pub(crate) const PIVOT_TOLERANCE: f64 = 512.0 * f64::EPSILON;
 
-/// The Cholesky factor L of a small matrix, with the reciprocals of its diagonal.
+/// Cholesky factor L of a small matrix, with reciprocal diagonal elements.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Triangle {
     values: [[f64; 3]; 3],
 }
 
 impl Triangle {
-    /// Numbers in the lower triangle of so many rows.
+    /// Number of elements in a lower triangle.
     pub const fn numbers(rows: usize) -> usize {
         rows * (rows + 1) / 2
     }
 
-    /// Writes them, row by row.
+    /// Writes the elements, row by row.
     pub fn write_to(&self, rows: usize, numbers: &mut [f64]) {
         let mut at = 0;
         for (row, own) in self.values[..rows].iter().enumerate() {
@@ -30,7 +30,7 @@ impl Triangle {
         }
     }
 
-    /// The triangle of such numbers.
+    /// Creates the triangle from its elements.
     #[inline(always)]
     pub fn of(rows: usize, numbers: &[f64]) -> Self {
         let mut found = Self::default();
@@ -42,8 +42,8 @@ impl Triangle {
         found
     }
 
-    /// Factors the lower triangles of as many matrices as there are lanes, in these: the triangles, and one for each that is regular, zero for
-    /// those of which a pivot is lost in rounding (one then stands in its place).
+    /// Factors the lower triangles of one matrix per lane. Returns the triangles, and for each lane one, or zero if a pivot is lost in
+    /// rounding errors (it is replaced by one).
     #[inline(always)]
     pub fn factor_lanes<S: Simd, const N: usize>(
         simd: S,
@@ -82,7 +82,7 @@ impl Triangle {
         (found, regular)
     }
 
-    /// The triangle in one lane.
+    /// Returns the triangle in one lane.
     #[inline(always)]
     pub fn in_lane<const N: usize>(lanes: &[[[f64; LANES]; N]; N], t: usize) -> Self {
         let mut found = Self::default();
@@ -94,7 +94,7 @@ impl Triangle {
         found
     }
 
-    /// Replaces a matrix of N rows of the given width by L^-1 times it.
+    /// Multiplies a matrix of N rows and the given width by L^-1.
     #[inline(always)]
     pub fn forward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
         for a in 0..N {
@@ -106,7 +106,7 @@ impl Triangle {
         }
     }
 
-    /// The same of N rows in vectors.
+    /// Multiplies N rows in vectors by L^-1.
     #[inline(always)]
     pub fn forward_vectors<S: Simd, const N: usize>(&self, simd: S, rows: &mut [[S::f64s; LANES]; N]) {
         for k in 0..LANES / S::F64_LANES {
@@ -121,7 +121,7 @@ impl Triangle {
         }
     }
 
-    /// Replaces a matrix of N rows of the given width by L^-T times it.
+    /// Multiplies a matrix of N rows and the given width by L^-T.
     #[inline(always)]
     pub fn backward<const N: usize>(&self, matrix: &mut [f64], width: usize) {
         for a in (0..N).rev() {
@@ -160,7 +160,7 @@ mod tests {
         }
     }
 
-    /// The last lane holds a singular matrix, the others positive definite ones.
+    /// Matrix of lane t: the last lane is singular, the others are positive definite.
     fn matrix(t: usize) -> [[f64; 3]; 3] {
         let x = t as f64;
         let weight = if t + 1 < LANES { 2.0 + x } else { 0.0 };
@@ -177,7 +177,7 @@ mod tests {
         for t in 0..LANES {
             assert_eq!(regular[t] == 1.0, t + 1 < LANES);
             let l = Triangle::in_lane(&triangles, t);
-            // L^-1 N L^-T is the identity: N is symmetric, its upper triangle that of the lower.
+            // L^-1 N L^-T is the identity; N is symmetric, with the upper triangle equal to the lower one.
             let mut product = [0.0; 9];
             (0..9).for_each(|k| product[k] = matrix(t)[(k / 3).max(k % 3)][(k / 3).min(k % 3)]);
             for _ in 0..2 {

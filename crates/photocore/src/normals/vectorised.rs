@@ -1,4 +1,4 @@
-//! Kernels compiled for the vector instructions of the machine that they run on, and for the common sizes of blocks.
+//! Kernels compiled for the vector instructions of the current machine, and for common block sizes.
 
 use std::ops::Range;
 
@@ -6,21 +6,21 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::layout::Layout;
 
-/// Work compiled for several sizes: rows R of a group, unknowns L of a local block and D of a retained block. Those that are zero are
-/// known at run time only.
+/// Computation compiled for several sizes: rows R of a group, unknowns L of a local block and D of a retained block. Zero means known at
+/// run time only.
 ///
-/// Implementations are `#[inline(always)]`, and so is all that they call, iterators with long closures excepted: what is not inlined
-/// is not compiled for the machine.
+/// Implementations and all functions that they call must be `#[inline(always)]`, except iterators with long closures. Only inlined code is
+/// compiled for the vector instructions.
 pub(super) trait Kernel {
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S);
 }
 
-/// Runs a kernel for the sizes of a layout; `retained_dim` is that of all retained blocks concerned, where they have the same.
+/// Runs a kernel for the sizes of a layout; `retained_dim` is the size of all retained blocks concerned, if it is equal.
 pub(super) fn run(layout: &Layout, retained_dim: Option<usize>, kernel: impl Kernel) {
     Arch::new().dispatch(Sized::<_, false> { layout, retained_dim, kernel });
 }
 
-/// The same of a kernel that local blocks of any size need only once.
+/// Runs a kernel whose general version is independent of the local block size.
 pub(super) fn run_for_any_local(layout: &Layout, retained_dim: Option<usize>, kernel: impl Kernel) {
     Arch::new().dispatch(Sized::<_, true> { layout, retained_dim, kernel });
 }
@@ -30,13 +30,13 @@ pub(super) fn run_unsized(kernel: impl Kernel) {
     Arch::new().dispatch(Unsized { kernel });
 }
 
-/// A size: the constant where there is one.
+/// Returns the compile-time size, or the run-time size if it is zero.
 #[inline(always)]
 pub(super) fn size<const N: usize>(at_run_time: usize) -> usize {
     if N > 0 { N } else { at_run_time }
 }
 
-/// `ANY`: whether one kernel is for local blocks of any size, where there is none for the sizes of all.
+/// `ANY`: whether one general kernel for all local block sizes is used if the sizes are uncommon.
 struct Sized<'a, K, const ANY: bool> {
     layout: &'a Layout,
     retained_dim: Option<usize>,
@@ -48,7 +48,7 @@ impl<K: Kernel, const ANY: bool> WithSimd for Sized<'_, K, ANY> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // Machines without vectors do without sizes: unrolled lane by lane, they would be the largest part of the library.
+        // Machines without vectors use general kernels, because specialised ones, unrolled by lanes, would dominate the library size.
         match (self.layout.rows(), self.layout.local_dim(), self.retained_dim) {
             (2, 3, Some(6)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 6>(simd),
             (2, 3, Some(9)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 9>(simd),
@@ -74,22 +74,22 @@ impl<K: Kernel> WithSimd for Unsized<K> {
     }
 }
 
-/// Columns of a product whose sums are kept in registers together.
+/// Number of columns of a product with sums in registers.
 const TOGETHER: usize = 6;
-/// Rows of a product whose sums are kept in registers together; matrices are followed by so many readable elements.
+/// Number of rows of a product with sums in registers; matrices must be followed by as many readable elements.
 pub(super) const LANES: usize = 8;
 
-/// A matrix row by row, in a buffer that goes on for [`LANES`] elements at least.
+/// Matrix stored row by row, in a buffer with at least [`LANES`] more elements.
 #[derive(Clone, Copy)]
 pub(super) struct Rows<'a> {
     pub values: &'a [f64],
     pub width: usize,
-    /// From the start of a row to that of the next.
+    /// Distance between the starts of successive rows.
     pub stride: usize,
     pub count: usize,
 }
 
-/// target[i, j] += sign times the sum over rows of a[row][i] b[row][j]; the target is column by column with the given stride.
+/// target[i, j] += sign times the sum over rows of a[row][i] b[row][j]; the target is stored by columns with the given stride.
 #[inline(always)]
 pub(super) fn add_product<S: Simd>(
     simd: S,
@@ -102,7 +102,7 @@ pub(super) fn add_product<S: Simd>(
     add_products(simd, target, stride, [(sign, a, b)]);
 }
 
-/// The same of several products, summed together before the target is touched; all a have one width, and so have all b.
+/// Adds several products, which are summed before the target is accessed; all a have equal widths, and all b.
 #[inline(always)]
 pub(super) fn add_products<S: Simd, const N: usize>(
     simd: S,
@@ -116,8 +116,8 @@ pub(super) fn add_products<S: Simd, const N: usize>(
         let mut j = 0;
         while j < width {
             let target = &mut target[j * stride..];
-            // Eight columns are one where their sums have room in registers, or twice four, not six and two that wait for each other.
-            // Unrolled lane by lane, without vectors, several columns would be a large part of the library.
+            // Eight columns are processed together if their sums fit into registers, otherwise as twice four, not as six and two, for
+            // independent operations. Without vectors, unrolled columns would be a large part of the library.
             j += match width - j {
                 _ if const { S::F64_LANES == 1 } => {
                     add_columns::<S, N, 1>(simd, target, stride, &products, i, j)
@@ -135,7 +135,7 @@ pub(super) fn add_products<S: Simd, const N: usize>(
     }
 }
 
-/// right += sign times the sum over rows of a[row] b[row], and diagonal, where there is one, the sum of the squares of a.
+/// right += sign times the sum over rows of a[row] b[row]; diagonal, if given, += the sum of squares of a.
 #[inline(always)]
 pub(super) fn add_right<S: Simd>(
     simd: S,
@@ -164,7 +164,7 @@ pub(super) fn add_right<S: Simd>(
     }
 }
 
-/// Adds the sum over rows of x[row] times the start of the row, for each of two x, to sums.
+/// Adds the sum over rows of x[row] times the first elements of the row, for each of two x.
 #[inline(always)]
 pub(super) fn add_rows<S: Simd>(
     simd: S,
@@ -184,7 +184,7 @@ pub(super) fn add_rows<S: Simd>(
     }
 }
 
-/// Copies a row of a block; the common sizes without a call.
+/// Copies a row of a block; common sizes without a call.
 #[inline(always)]
 pub(super) fn copy_few(from: &[f64], to: &mut [f64]) {
     match from.len() {
@@ -195,13 +195,13 @@ pub(super) fn copy_few(from: &[f64], to: &mut [f64]) {
     }
 }
 
-/// The product of two vectors.
+/// Returns the scalar product of two vectors.
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// The product of two vectors, summed in as many parts as there are lanes.
+/// Returns the scalar product of two vectors, with one partial sum per lane.
 #[inline(always)]
 pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     let ((a, last), (b, end)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
@@ -214,7 +214,7 @@ pub(super) fn dot_in_lanes(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + last.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// The products of a vector with C others, whose rows are given.
+/// Returns the scalar products of a vector with C others, stored by rows.
 #[inline(always)]
 pub(super) fn dot_columns<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C] {
     let mut sums = [0.0; C];
@@ -226,7 +226,7 @@ pub(super) fn dot_columns<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C]
     sums
 }
 
-/// The same of short vectors, summed in four parts that do not wait for each other.
+/// Returns the scalar products of short vectors, with four independent partial sums.
 #[inline(always)]
 pub(super) fn dot_by_fours<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C] {
     let ((a, last), (b, end)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
@@ -243,7 +243,7 @@ pub(super) fn dot_by_fours<const C: usize>(a: &[f64], b: &[[f64; C]]) -> [f64; C
     std::array::from_fn(|c| (first[c] + second[c]) + (third[c] + fourth[c]) + rest[c])
 }
 
-/// rights -= the sum over rows of a[row] b[row], of C right-hand sides.
+/// rights -= the sum over rows of a[row] b[row], for C right-hand sides.
 #[inline(always)]
 pub(super) fn subtract_rights<S: Simd, const C: usize>(
     simd: S,
@@ -264,8 +264,8 @@ pub(super) fn subtract_rights<S: Simd, const C: usize>(
     }
 }
 
-/// target += the sum over `parts` equal parts of a and v of a^T a - v^T v. Both are summed together, part by part: where the
-/// difference is small, so are the sums on the way to it.
+/// target += the sum over `parts` equal parts of a^T a - v^T v. Both products are summed jointly, part by part, so that small differences
+/// have small partial sums.
 #[inline(always)]
 pub(super) fn add_difference<S: Simd>(
     simd: S,
@@ -289,7 +289,7 @@ pub(super) fn add_difference<S: Simd>(
     }
 }
 
-/// C columns of the products, and as many rows as there are lanes; returns C.
+/// Adds C columns of the products, and one row per lane; returns C.
 #[inline(always)]
 fn add_columns<S: Simd, const N: usize, const C: usize>(
     simd: S,
@@ -327,8 +327,8 @@ fn add_difference_columns<S: Simd, const C: usize>(
     add_sums::<S, C>(simd, target, stride, 1.0, &sums, LANES.min(a.width - i));
 }
 
-/// Adds `sign` times the products of elements i and on of the rows of a with elements j and on of those of b to the sums: as many
-/// vectors as the lanes of the machine need; the others are never touched.
+/// Adds `sign` times the products of elements from i in the rows of a with elements from j in the rows of b. Only as many vectors as the
+/// machine needs for [`LANES`] elements are used.
 #[inline(always)]
 fn sum<S: Simd, const C: usize>(
     simd: S,
@@ -377,7 +377,7 @@ fn add_sums<S: Simd, const C: usize>(
     }
 }
 
-/// The elements of at most [`LANES`] ones that vector `k` holds.
+/// Returns the elements of vector `k` in a slice of at most [`LANES`] elements.
 #[inline(always)]
 fn part_in_vector<S: Simd>(all: &mut [f64], k: usize) -> &mut [f64] {
     let (first, end) = (k * S::F64_LANES, (k + 1) * S::F64_LANES);
@@ -385,7 +385,7 @@ fn part_in_vector<S: Simd>(all: &mut [f64], k: usize) -> &mut [f64] {
     &mut all[first.min(count)..end.min(count)]
 }
 
-/// Copies the first elements of [`LANES`] ones in vectors.
+/// Copies the first of [`LANES`] elements in vectors.
 #[inline(always)]
 pub(super) fn copy_vectors<S: Simd>(simd: S, vectors: &[S::f64s; LANES], target: &mut [f64]) {
     for k in 0..LANES / S::F64_LANES {

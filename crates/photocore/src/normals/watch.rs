@@ -1,4 +1,4 @@
-//! Long work watched from the calling thread, and stopped when it says so.
+//! Progress callback and cancellation of long work.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -7,14 +7,14 @@ use std::time::Duration;
 
 use crate::{Stopped, Threads};
 
-/// Called on the calling thread before the work and every few hundredths of a second during it, with the number of local
-/// blocks done; breaking stops the work.
+/// Progress callback: called on the calling thread before the work and every 40 ms during it, with the number of finished local blocks.
+/// `Break` stops the work.
 pub type Between<'a> = &'a mut dyn FnMut(usize) -> ControlFlow<()>;
 
-/// Time from one look to the next.
+/// Interval between calls of the progress callback.
 const PERIOD: Duration = Duration::from_millis(40);
 
-/// What the threads at work and the calling thread tell each other.
+/// State shared by the worker threads and the calling thread.
 #[derive(Debug, Default)]
 pub(super) struct Control {
     stopped: AtomicBool,
@@ -24,12 +24,12 @@ pub(super) struct Control {
 }
 
 impl Control {
-    /// Whether the work is to stop: what has been computed will not be looked at.
+    /// Whether the work must stop; its results will be discarded.
     pub fn stopped(&self) -> bool {
         self.stopped.load(Relaxed)
     }
 
-    /// A buffer; without memory for it the work is to stop.
+    /// Returns a buffer, or stops the work if its allocation failed.
     pub fn allocated(&self, buffer: Result<Vec<f64>, usize>) -> Option<Vec<f64>> {
         let note = |bytes: &usize| {
             self.failed.store(*bytes, Relaxed);
@@ -38,7 +38,7 @@ impl Control {
         buffer.inspect_err(note).ok()
     }
 
-    /// What the work ended with, or why it did not.
+    /// Returns the result of the work, or the reason for its stop.
     fn ended<T>(&self, result: Option<T>) -> Result<T, Stopped> {
         match (self.failed.load(Relaxed), result) {
             (0, Some(result)) => Ok(result),
@@ -53,7 +53,7 @@ impl Control {
     }
 }
 
-/// Does work on some threads while the calling thread watches it. The work may end with nothing when it was stopped.
+/// Runs work on some threads while the calling thread calls `between`. Stopped work may return None.
 pub(super) fn watched<T: Send>(
     threads: &Threads,
     between: Between<'_>,
@@ -64,7 +64,7 @@ pub(super) fn watched<T: Send>(
     }
     let control = Control::default();
     if threads.pool().current_thread_index().is_some() {
-        // One of the threads must not wait for another; whoever put it to work watches.
+        // A pool thread must not wait for another one; the code that started it calls the progress callback.
         return control.ended(work(&control));
     }
     let (mut work, mut result) = (Some(work), None);
@@ -72,11 +72,11 @@ pub(super) fn watched<T: Send>(
     if watch(threads, between, &control, &mut work).is_break() {
         return Err(Stopped::Interrupted);
     }
-    // The work leaves its result unless it panics, and then the scope has passed the panic on.
+    // The result is missing only after a panic, which the scope has propagated.
     control.ended(result)
 }
 
-/// The same for all work, whatever it is and leaves: what threads and channel are made of is compiled once.
+/// Runs a closure without result behind a reference, so that threads and channel are compiled once.
 fn watch(
     threads: &Threads,
     between: Between<'_>,
@@ -88,7 +88,7 @@ fn watch(
     threads.pool().in_place_scope(|scope| {
         scope.spawn(move |_| {
             work();
-            // A receiver that is gone has nothing to hear.
+            // A missing receiver is not an error.
             let _ = sender.send(());
         });
         while let Err(RecvTimeoutError::Timeout) = receiver.recv_timeout(PERIOD) {

@@ -1,4 +1,4 @@
-//! Memory that is used again, and that may not be there.
+//! Reusable buffers, with errors for failed allocations.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -6,30 +6,28 @@ use std::sync::Mutex;
 use super::batch::Batch;
 use crate::parallel::lock;
 
-/// For each supernode, and last for the local blocks without equations: V, v and L of every batch assembled there, one after
-/// the other; nothing where it is not cached.
+/// Matrices V, v and L of every batch, one after the other, per supernode; last, local blocks without equations. Empty without a cache.
 pub(super) type Eliminated = Vec<Vec<f64>>;
 
-/// Spare buffers, by their capacity (see [`capacity`]). Fronts come and go by the thousand; fresh pages for each of them, and
-/// giving them back, would cost more than the arithmetic.
+/// Spare buffers by capacity (see [`capacity`]). There are thousands of fronts, and allocating and releasing fresh pages for each would
+/// cost more than the arithmetic.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    /// Whether what is huge goes back to the system, and is taken as large as it need be.
+    /// Whether very large buffers are allocated exactly and released after use.
     frugal: bool,
     spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
     eliminated: Mutex<Eliminated>,
-    /// Room for batches, which differ little in size.
+    /// Batch buffers, which differ little in size.
     batches: Mutex<Vec<Batch>>,
 }
 
 impl Workspace {
-    /// Of a part of a larger system: beside what the parts around it have left, its fronts are few and huge, and each larger than the
-    /// one before. None would ever be used again.
+    /// Creates the workspace of a partial system: its fronts are few, very large and of increasing size, so that they are not reusable.
     pub fn frugal() -> Self {
         Self { frugal: true, ..Self::default() }
     }
 
-    /// The capacity of a buffer for so many numbers: the next power of two, for large ones the next eighth of it.
+    /// Returns the capacity of a buffer of `length` numbers: the next power of two, for large ones the next eighth of it.
     pub fn capacity(&self, length: usize) -> usize {
         let power = length.next_power_of_two();
         if length < LARGE {
@@ -41,12 +39,12 @@ impl Workspace {
         }
     }
 
-    /// Whether a buffer of a capacity goes back to the system.
+    /// Whether a buffer of this capacity is released after use.
     pub fn gives_back(&self, capacity: usize) -> bool {
         self.frugal && capacity >= HUGE
     }
 
-    /// A buffer of zeros; the bytes that there are not.
+    /// Returns a zeroed buffer. `Err`: size of the failed allocation in bytes.
     pub fn zeros(&self, length: usize) -> Result<Vec<f64>, usize> {
         let mut buffer = self.take(length)?;
         buffer.clear();
@@ -54,50 +52,50 @@ impl Workspace {
         Ok(buffer)
     }
 
-    /// A square matrix, column by column, of zeros on and below the diagonal and anything above it; the bytes that there are not.
+    /// Returns a square matrix by columns: lower triangle zeroed, upper undefined. `Err`: size of the failed allocation in bytes.
     pub fn lower_zeros(&self, order: usize) -> Result<Vec<f64>, usize> {
         let mut buffer = self.any(order * order)?;
         buffer.chunks_exact_mut(order.max(1)).enumerate().for_each(|(j, column)| column[j..].fill(0.0));
         Ok(buffer)
     }
 
-    /// A buffer of anything; the bytes that there are not.
+    /// Returns a buffer with undefined contents. `Err`: size of the failed allocation in bytes.
     pub fn any(&self, length: usize) -> Result<Vec<f64>, usize> {
         let mut buffer = self.take(length)?;
         buffer.resize(length, 0.0);
         Ok(buffer)
     }
 
-    /// Takes a buffer back.
+    /// Stores a buffer for reuse.
     pub fn put_back(&self, buffer: Vec<f64>) {
         if buffer.capacity() > 0 && !self.gives_back(buffer.capacity()) {
             lock(&self.spare).entry(buffer.capacity()).or_default().push(buffer);
         }
     }
 
-    /// Gives all spare buffers back to the system.
+    /// Releases all spare buffers.
     pub fn clear(&self) {
         lock(&self.spare).clear();
         drop(self.take_eliminated());
         lock(&self.batches).clear();
     }
 
-    /// Room for a batch, of anything.
+    /// Returns a batch with undefined contents.
     pub fn batch(&self) -> Batch {
         lock(&self.batches).pop().unwrap_or_default()
     }
 
-    /// Takes it back.
+    /// Stores a batch for reuse.
     pub fn put_back_batch(&self, batch: Batch) {
         lock(&self.batches).push(batch);
     }
 
-    /// Room for what is cached of local blocks, as it was given back; nothing where it was not.
+    /// Returns the stored cache of local eliminations; empty if there is none.
     pub fn take_eliminated(&self) -> Eliminated {
         std::mem::take(&mut *lock(&self.eliminated))
     }
 
-    /// Takes it back.
+    /// Stores the cache of local eliminations for reuse.
     pub fn put_back_eliminated(&self, room: Eliminated) {
         *lock(&self.eliminated) = room;
     }
@@ -109,13 +107,13 @@ impl Workspace {
     }
 }
 
-/// Numbers from which on a buffer is not twice as large as it need be.
+/// Minimum number of elements for capacities that are not powers of two.
 const LARGE: usize = 1 << 20;
 
-/// Numbers from which on a part gives a buffer back: 64 MiB, which an allocator takes from the system by itself.
+/// Minimum number of elements of a very large buffer: 64 MiB, which an allocator maps separately.
 const HUGE: usize = 1 << 23;
 
-/// An empty vector with room for so many numbers; the bytes that there are not.
+/// Returns an empty vector with a reserved capacity. `Err`: size of the failed allocation in bytes.
 pub(super) fn reserved(capacity: usize) -> Result<Vec<f64>, usize> {
     let mut buffer = Vec::new();
     match buffer.try_reserve_exact(capacity) {
@@ -124,7 +122,7 @@ pub(super) fn reserved(capacity: usize) -> Result<Vec<f64>, usize> {
     }
 }
 
-/// So many zeros; the bytes that there are not.
+/// Returns `length` zeros. `Err`: size of the failed allocation in bytes.
 pub(super) fn zeros(length: usize) -> Result<Vec<f64>, usize> {
     let mut buffer = reserved(length)?;
     buffer.resize(length, 0.0);

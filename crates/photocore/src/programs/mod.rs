@@ -1,4 +1,4 @@
-//! The photogrammetric models beside the network.
+//! Photogrammetric models other than the network.
 
 pub mod comparator;
 pub mod features;

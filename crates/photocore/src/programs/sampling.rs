@@ -1,6 +1,6 @@
-//! Small samples for a consensus, the same in every run.
+//! Reproducible random samples for consensus methods.
 
-/// Draws indices below a count; xorshift (Marsaglia 2003) from a fixed seed.
+/// Generator of indices below a count: xorshift (Marsaglia 2003) with a fixed seed.
 #[derive(Debug)]
 pub(super) struct Samples {
     count: usize,
@@ -8,12 +8,12 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// Samples of so many.
+    /// Creates a generator of indices below `count`.
     pub fn new(count: usize) -> Self {
         Self { count, state: 0x9E37_79B9_7F4A_7C15 }
     }
 
-    /// N different indices; there must be as many.
+    /// Returns N different indices; `count` must be at least N.
     pub fn draw<const N: usize>(&mut self) -> [usize; N] {
         let mut drawn = [usize::MAX; N];
         for k in 0..N.min(self.count) {

@@ -1,4 +1,4 @@
-//! Trees of nodes, and what belongs to which: blocks of unknowns as vertices, what touches several of them as cliques.
+//! Trees of nodes and the assignment of parameter blocks (vertices) and terms (cliques) to them.
 
 use std::collections::BTreeSet;
 
@@ -9,19 +9,19 @@ pub const TREES: [&[Option<usize>]; 4] = [
     &[Some(2), Some(2), Some(6), Some(5), Some(5), Some(6), None],
 ];
 
-/// Blocks of unknowns on the nodes of a tree.
+/// Assignment of parameter blocks to the nodes of a tree.
 pub struct Cut {
     pub parent: Vec<Option<usize>>,
-    /// The node of each block.
+    /// Node of each block.
     pub node_of: Vec<usize>,
-    /// The node of each clique: the lowest of its blocks.
+    /// Node of each clique: the lowest node of its blocks.
     pub homes: Vec<usize>,
-    /// The blocks above each node that it touches, or nodes below it do.
+    /// Blocks of ancestors that each node or its descendants depend on.
     pub outer: Vec<Vec<usize>>,
 }
 
 impl Cut {
-    /// Takes blocks up from the given nodes until those of every clique stand on one way to the root.
+    /// Moves blocks up from the given nodes until the blocks of every clique are on one path to the root.
     pub fn new(parent: &[Option<usize>], cliques: &[Vec<usize>], mut node_of: Vec<usize>) -> Self {
         let above = |node: usize| std::iter::successors(Some(node), |&node| parent[node]);
         loop {
@@ -56,17 +56,17 @@ impl Cut {
             let handed = outer[p].clone();
             parent[p].into_iter().for_each(|above| outer[above].extend(&handed));
         }
-        // Not in the order of the blocks: every node has an order of its own.
+        // Each node has its own order, different from the order of the blocks.
         let outer = outer.into_iter().map(|blocks| blocks.into_iter().rev().collect()).collect();
         Self { parent: parent.to_vec(), node_of, homes, outer }
     }
 
-    /// The children of a node, ascending.
+    /// Returns the children of a node, ascending.
     pub fn children(&self, node: usize) -> Vec<usize> {
         (0..node).filter(|&child| self.parent[child] == Some(node)).collect()
     }
 
-    /// The blocks at home in a node, then the outer ones in ascending order.
+    /// Returns the blocks of a node, then the outer ones in ascending order.
     pub fn blocks(&self, node: usize) -> Vec<usize> {
         let own = (0..self.node_of.len()).filter(|&block| self.node_of[block] == node);
         let mut outer = self.outer[node].clone();

@@ -1,9 +1,9 @@
-//! The collinearity equations written out once more, as a chain of single rotations about axes, for complex arguments.
+//! Independent implementation of the collinearity equations for complex arguments, as a chain of single rotations.
 
 use num_complex::Complex64 as C;
 use photocore::geometry::{Ellipsoid, ObjectSpace};
 
-/// Geographic space on a spheroid of these semi-axes; rectangular space without.
+/// Returns geographic space on a spheroid with these semi-axes, or rectangular space without a spheroid.
 pub fn object_space(spheroid: Option<(f64, f64)>) -> ObjectSpace {
     spheroid.map_or(ObjectSpace::Rectangular, |(a, b)| ObjectSpace::Geographic(Ellipsoid::new(a, b).unwrap()))
 }
@@ -22,7 +22,7 @@ fn geocentric(a: f64, b: f64, [longitude, latitude, height]: [C; 3]) -> [C; 3] {
     [out * longitude.cos(), out * longitude.sin(), (b * b / d + height) * latitude.sin()]
 }
 
-/// East, north and up of `to`, seen from `from`; differences of X, Y, Z without a spheroid.
+/// Returns east, north and up of `to` relative to `from`; differences of X, Y, Z without a spheroid.
 pub fn local(spheroid: Option<(f64, f64)>, from: [C; 3], to: [C; 3]) -> [C; 3] {
     let (start, end) = match spheroid {
         None => (from, to),
@@ -32,12 +32,12 @@ pub fn local(spheroid: Option<(f64, f64)>, from: [C; 3], to: [C; 3]) -> [C; 3] {
     if spheroid.is_none() {
         return d;
     }
-    // Turn the x axis east, then tilt the z axis to the zenith.
+    // Rotate the x axis east, then tilt the z axis to the zenith.
     let quarter = C::new(std::f64::consts::FRAC_PI_2, 0.0);
     about_axis(0, quarter - from[1], about_axis(2, quarter + from[0], d))
 }
 
-/// x, y of a vector in the local frame at the camera.
+/// Returns x, y of a vector in the local frame at the camera.
 pub fn image(to_ground: bool, c: f64, [omega, phi, kappa]: [C; 3], local: [C; 3]) -> [C; 2] {
     let mut d = local;
     if to_ground {
@@ -52,9 +52,9 @@ pub fn image(to_ground: bool, c: f64, [omega, phi, kappa]: [C; 3], local: [C; 3]
     [c * d[0] / d[2], c * d[1] / d[2]]
 }
 
-/// Partials of x, y with respect to the nine unknowns (position, omega, phi, kappa of the photo, then the point) by complex
-/// steps, and the largest difference from given ones: each group of three relative to its norm, with longitude and latitude
-/// in units of length, so that all columns of a group weigh alike.
+/// Computes the partials of x, y by complex steps and returns the largest difference from given ones. The nine unknowns are position,
+/// omega, phi, kappa of the photo, then the point. Each group of three is relative to its norm; longitude and latitude are in units of
+/// length, so that the columns of a group have equal weight.
 pub fn disagreement(
     unknowns: [f64; 9],
     radius: f64,
@@ -75,7 +75,7 @@ pub fn disagreement(
             let norm = numeric.iter().map(|value| value * value).sum::<f64>().sqrt();
             for k in 0..3 {
                 let difference = (analytic[k] / unit[k] - numeric[k]).abs() / norm;
-                // NaN must not pass for agreement.
+                // NaN must count as disagreement.
                 worst = if difference <= worst { worst } else { difference };
             }
         }

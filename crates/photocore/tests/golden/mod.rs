@@ -1,21 +1,21 @@
-//! Golden data, read where they are at hand.
+//! Golden data, read if available.
 
-// Each test takes what it needs.
+// Each test uses a part of the functions.
 #![allow(dead_code)]
 
 use serde_json::Value;
 
-/// A file of the golden data for networks; None, visibly, where they are not at hand.
+/// Returns a file of the golden data for networks; None, with a message, if unavailable.
 pub fn golden(name: &str) -> Option<Value> {
     golden_of("network", name)
 }
 
-/// A file of the golden data of a folder.
+/// Returns a file of the golden data of a folder.
 pub fn golden_of(folder: &str, name: &str) -> Option<Value> {
     golden_text(folder, name).map(|text| serde_json::from_str(&text).unwrap())
 }
 
-/// The text of such a file.
+/// Returns the text of a golden file.
 pub fn golden_text(folder: &str, name: &str) -> Option<String> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
     match std::fs::read_to_string(format!("{path}/{folder}/{name}")) {

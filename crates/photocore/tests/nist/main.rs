@@ -16,24 +16,24 @@ use photocore::normals::{GroupRows, Layout, Ordering, System};
 
 use problems::{Certified, PROBLEMS};
 
-/// A curve y(x) with parameters: the retained block. The local block is one unknown that is fixed and measured by nothing.
+/// Curve y(x) with parameters: the retained block. The local block is one fixed unknown without observations.
 struct Curve<'a> {
     name: &'a str,
     x: &'a [f64],
     y: &'a [f64],
 }
 
-/// Unknowns before the parameters.
+/// Number of unknowns in front of the parameters.
 const FIRST: usize = 1;
-/// Imaginary step of the partials (Squire and Trapp 1998), small enough for its square to vanish.
+/// Imaginary step of the partials (Squire and Trapp 1998), small enough that its square vanishes.
 const STEP: f64 = 1e-30;
 
-/// The arctangent near the real axis: the library's loses small imaginary parts.
+/// Returns the arctangent near the real axis: the library function loses small imaginary parts.
 fn arctangent(value: Complex64) -> Complex64 {
     Complex64::new(value.re.atan(), value.im / (1.0 + value.re * value.re))
 }
 
-/// The models as NIST prints them.
+/// Returns the model functions as printed by NIST.
 fn curve(name: &str, b: &[Complex64], x: f64) -> Complex64 {
     match name {
         "Misra1a" => b[0] * (1.0 - (-b[1] * x).exp()),
@@ -77,7 +77,7 @@ impl Evaluated for At<'_> {
     }
 }
 
-/// Adjusts a problem from a start. Observations get their certified standard deviation.
+/// Adjusts a problem from initial values. Observations have their certified standard deviation.
 fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustment, AdjustError> {
     let count = certified.x.len();
     let layout = Layout::new(1, 1, &[start.len()], vec![0, count], vec![0; count]).unwrap();
@@ -95,14 +95,14 @@ fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustmen
     adjust(&problem, &options, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
-/// Digits that agree, of the value that agrees worst.
+/// Returns the number of agreeing digits of the worst value.
 fn digits(found: &[f64], certified: &[f64]) -> f64 {
     let of =
         |(found, certified): (&f64, &f64)| -((found - certified).abs() / certified.abs()).max(1e-16).log10();
     found.iter().zip(certified).map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// Digits of parameters, of their standard deviations, and of the sum of squares.
+/// Returns the agreeing digits of parameters, of their standard deviations, and of the sum of squares.
 fn agreement(certified: &Certified, adjusted: &Adjustment) -> [f64; 3] {
     let squares: f64 = adjusted.residuals.iter().map(|v| v * v).sum();
     let count = certified.parameters.len();
@@ -116,11 +116,11 @@ fn agreement(certified: &Certified, adjusted: &Adjustment) -> [f64; 3] {
     ]
 }
 
-/// Digits that must agree; certified values have eleven.
+/// Number of digits that must agree; certified values have eleven.
 const WANTED: f64 = 6.0;
-/// Its first start leads every descent onto a plateau, where the parameters are not determined.
+/// From the first start every descent reaches a plateau, on which the parameters are not determined.
 const PLATEAU: (&str, usize) = ("MGH10", 0);
-/// From its first start the curve is zero at nearly all points: small steps take longer than 5,000 iterations.
+/// From the first start the curve is zero at nearly all points: small steps need more than 5,000 iterations.
 const FAR: (&str, usize) = ("Eckerle4", 0);
 
 #[test]

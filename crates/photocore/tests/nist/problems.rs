@@ -3,7 +3,7 @@
 //!
 //! The file of Rat43 prints 9 degrees of freedom; its certified residual standard deviation needs 15 - 4 = 11.
 
-/// A problem: data, two starts, and the certified solution.
+/// Problem with data, two starts, and the certified solution.
 pub struct Certified {
     pub name: &'static str,
     /// `lower`, `average` or `higher`.

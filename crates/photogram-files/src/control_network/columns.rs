@@ -1,4 +1,4 @@
-//! Points and measures as columns.
+//! Columns of points and measures.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -8,11 +8,11 @@ use photocore::Stopped;
 use super::fault::Reason;
 use super::fields::{Field, Kind, MEASURES, POINT};
 
-/// A value of a column that may be absent.
+/// Column value that may be absent.
 pub trait Value: Copy {
-    /// What stands for none.
+    /// Representation of an absent value.
     const ABSENT: Self;
-    /// Whether there is none.
+    /// Returns whether the value is absent.
     fn is_absent(&self) -> bool;
 }
 
@@ -35,7 +35,7 @@ values! {
     i32: -1, |value: &i32| *value < 0;
 }
 
-/// A column that is as long as its last value that is there.
+/// Column without trailing absent values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sparse<'a, T: Value>(pub Cow<'a, [T]>);
 
@@ -46,12 +46,12 @@ impl<T: Value> Default for Sparse<'_, T> {
 }
 
 impl<T: Value> Sparse<'_, T> {
-    /// The value of a row.
+    /// Returns the value of a row.
     pub fn get(&self, row: usize) -> T {
         self.0.get(row).copied().unwrap_or(T::ABSENT)
     }
 
-    /// Sets the value of the last row so far, and says whether it had one.
+    /// Sets the value of the last row; returns whether the row had a value.
     fn set(&mut self, row: usize, value: T) -> Result<bool, Stopped> {
         let had = !self.get(row).is_absent();
         if value.is_absent() && !had {
@@ -65,7 +65,7 @@ impl<T: Value> Sparse<'_, T> {
         Ok(had)
     }
 
-    /// The whole column of so many rows; None where nothing is in it.
+    /// Returns the column extended to `rows` values; None if it is empty.
     pub fn whole(self, rows: usize) -> Option<Vec<T>> {
         let mut own = self.0.into_owned();
         (!own.is_empty()).then(|| {
@@ -79,7 +79,7 @@ fn reserve<T>(values: &mut Vec<T>, more: usize) -> Result<(), Stopped> {
     values.try_reserve(more).map_err(|_| Stopped::OutOfMemory((values.len() + more) * size_of::<T>()))
 }
 
-/// A text in every row.
+/// Column with a separate text in every row.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Texts {
     text: String,
@@ -87,13 +87,13 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// The text of a row.
+    /// Returns the text of a row.
     pub fn get(&self, row: usize) -> &str {
         let start = if row == 0 { 0 } else { self.ends[row - 1] };
         &self.text[start..self.ends[row]]
     }
 
-    /// All of them.
+    /// Returns an iterator over all texts.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &str> {
         (0..self.ends.len()).map(|row| self.get(row))
     }
@@ -120,18 +120,18 @@ impl<S: AsRef<str>> FromIterator<S> for Texts {
     }
 }
 
-/// Texts that many rows have in common: their indices, and each of them once.
+/// Column of repeated texts: row indices into a list of distinct texts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Names<'a> {
-    /// Which one a row has.
+    /// Index of the text of each row.
     pub indices: Sparse<'a, i32>,
-    /// The texts, in the order in which they came up.
+    /// Distinct texts, in the order of their first use.
     pub names: Vec<String>,
     known: HashMap<String, i32>,
 }
 
 impl<'a> Names<'a> {
-    /// Names that are known, with their indices.
+    /// Creates the column from indices and distinct texts.
     pub fn of(indices: Sparse<'a, i32>, names: Vec<String>) -> Self {
         Self { indices, names, known: HashMap::new() }
     }
@@ -150,29 +150,29 @@ impl<'a> Names<'a> {
     }
 }
 
-/// A column of a table.
+/// Column of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Column<'a> {
-    /// Of [`Kind::Text`].
+    /// Column of [`Kind::Text`].
     Texts(Texts),
-    /// Of [`Kind::Name`].
+    /// Column of [`Kind::Name`].
     Names(Names<'a>),
-    /// Of [`Kind::Code`].
+    /// Column of [`Kind::Code`].
     Codes(Sparse<'a, i8>),
-    /// Of [`Kind::Truth`].
+    /// Column of [`Kind::Truth`].
     Truths(Sparse<'a, bool>),
-    /// Of [`Kind::Number`].
+    /// Column of [`Kind::Number`].
     Numbers(Sparse<'a, f64>),
-    /// Of [`Kind::Covariance`].
+    /// Column of [`Kind::Covariance`].
     Covariances(Sparse<'a, [f64; 6]>),
-    /// Of [`Kind::Index`].
+    /// Column of [`Kind::Index`].
     Indices(Sparse<'a, i32>),
-    /// What has none.
+    /// No column: the field is stored in [`Rest`].
     Kept,
 }
 
 impl Column<'_> {
-    /// An empty column.
+    /// Creates an empty column.
     pub fn empty(kind: Kind) -> Self {
         match kind {
             Kind::Text => Self::Texts(Texts::default()),
@@ -186,7 +186,7 @@ impl Column<'_> {
         }
     }
 
-    /// Whether a row has a value.
+    /// Returns whether a row has a value.
     pub fn has(&self, row: usize) -> bool {
         match self {
             Self::Texts(own) => own.ends.len() > row,
@@ -200,7 +200,7 @@ impl Column<'_> {
         }
     }
 
-    /// Sets the value of the last row so far, and says whether it had one; a value of another kind is none.
+    /// Sets the value of the last row; returns whether the row had a value. Cells of another kind are ignored.
     pub(super) fn set(&mut self, row: usize, cell: Cell<'_>) -> Result<bool, Stopped> {
         match (self, cell) {
             (Self::Texts(own), Cell::Text(text)) => Ok(own.set(row, text)),
@@ -214,7 +214,7 @@ impl Column<'_> {
         }
     }
 
-    /// Whether it is no longer than so many rows, and holds only what its field can have.
+    /// Checks that the column has at most `rows` values, all valid for its field.
     fn agrees(&self, field: &Field, rows: usize) -> bool {
         let fits = |length: usize| length <= rows;
         match (self, field.kind) {
@@ -237,7 +237,7 @@ impl Column<'_> {
     }
 }
 
-/// A value on its way into a column.
+/// Value to be stored in a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cell<'a> {
     Text(&'a str),
@@ -248,12 +248,12 @@ pub(super) enum Cell<'a> {
     Index(i32),
 }
 
-/// What has no column: fields of messages, byte for byte, of each row.
+/// Fields without a column: their messages as bytes, per row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rest<'a> {
-    /// Of all rows.
+    /// Bytes of all rows.
     pub bytes: Cow<'a, [u8]>,
-    /// Where those of a row begin, and where the last ones end.
+    /// Start of the bytes of each row, and end of the last row.
     pub starts: Cow<'a, [i64]>,
 }
 
@@ -264,7 +264,7 @@ impl Default for Rest<'_> {
 }
 
 impl Rest<'_> {
-    /// What is kept of a row.
+    /// Returns the bytes of a row.
     pub fn row(&self, row: usize) -> &[u8] {
         &self.bytes[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
@@ -277,20 +277,20 @@ impl Rest<'_> {
     }
 }
 
-/// Points or measures.
+/// Table of points or of measures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table<'a> {
-    /// What they consist of: what every row has to have comes first.
+    /// Fields of the table, required ones first.
     pub fields: &'static [Field],
-    /// A column for each field.
+    /// One column per field.
     pub columns: Vec<Column<'a>>,
-    /// What has no column.
+    /// Fields without a column.
     pub rest: Rest<'a>,
-    /// How many there are.
+    /// Number of rows.
     pub rows: usize,
 }
 
-/// Fields that every point and measure has: what it is called, and its type.
+/// Number of required fields: identifier and type.
 const REQUIRED: usize = 2;
 
 impl<'a> Table<'a> {
@@ -299,7 +299,7 @@ impl<'a> Table<'a> {
         Self { fields, columns, rest: Rest::default(), rows: 0 }
     }
 
-    /// Ends the row that was filled.
+    /// Ends the current row.
     pub(super) fn end_row(&mut self) -> Result<(), Reason> {
         let missing = (0..REQUIRED).find(|&slot| !self.columns[slot].has(self.rows));
         if let Some(slot) = missing {
@@ -310,7 +310,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// Where the column of a field of messages stands.
+    /// Returns the column index of a message field.
     pub(super) fn slot_of_number(&self, number: u64) -> Option<usize> {
         self.fields.iter().position(|field| u64::from(field.number) == number)
     }
@@ -327,14 +327,14 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The points of a network with their measures.
+/// Points of a network with their measures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points<'a> {
-    /// The points.
+    /// Points.
     pub points: Table<'a>,
-    /// The measures, those of a point one after the other.
+    /// Measures, grouped by point.
     pub measures: Table<'a>,
-    /// The first measure of each point, and the number of all.
+    /// Index of the first measure of each point, and the number of measures.
     pub firsts: Cow<'a, [i64]>,
 }
 
@@ -345,7 +345,7 @@ impl Default for Points<'_> {
 }
 
 impl Points<'_> {
-    /// Ends the point that was filled.
+    /// Ends the current point.
     pub(super) fn end_point(&mut self) -> Result<(), Reason> {
         let first = self.firsts.last().map_or(0, |&first| first as usize);
         self.check_reference(self.points.rows, self.measures.rows - first)?;
@@ -363,7 +363,7 @@ impl Points<'_> {
         }
     }
 
-    /// The measure of a point that is its reference, counted from its first one.
+    /// Returns the index of the reference measure among the measures of a point.
     pub fn reference(&self, point: usize) -> Option<i32> {
         self.points.columns.iter().find_map(|column| match column {
             Column::Indices(own) => Some(own.get(point)).filter(|index| !index.is_absent()),
@@ -371,12 +371,12 @@ impl Points<'_> {
         })
     }
 
-    /// The measures of a point.
+    /// Returns the range of the measures of a point.
     pub fn measures_of(&self, point: usize) -> std::ops::Range<usize> {
         self.firsts[point] as usize..self.firsts[point + 1] as usize
     }
 
-    /// Refuses columns that do not agree, before any of them is written.
+    /// Checks the consistency of all columns before writing.
     pub(super) fn check(&self) -> Result<(), Reason> {
         let firsts = &self.firsts;
         let sound = firsts.first() == Some(&0)

@@ -1,38 +1,38 @@
-//! What points and measures consist of: numbers of fields in messages, keys of text, names of columns.
+//! Fields of points and measures: message field numbers, keys in text, column names.
 
-/// What a field holds.
+/// Type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A text of its own in every row.
+    /// Separate text in every row.
     Text,
-    /// A text that many rows have in common.
+    /// Text shared by many rows.
     Name,
-    /// One of so many words; in messages its place among them.
+    /// Word from a list; messages contain its index.
     Code(&'static [&'static str]),
-    /// Yes or no, no where it is not said.
+    /// Yes or no; no by default.
     Truth,
-    /// A number, with the unit that text gives it.
+    /// Number, with its unit in text.
     Number(Option<&'static str>),
-    /// The upper triangle of a symmetric matrix of three rows, row by row.
+    /// Upper triangle of a symmetric 3 x 3 matrix, row by row.
     Covariance,
-    /// The index of a measure.
+    /// Index of a measure.
     Index,
-    /// A text without a column.
+    /// Text without a column.
     Kept,
-    /// Numbers that a program has left, without a column: in text by keys of their own.
+    /// Logged numbers without a column; text uses one key per number.
     Log,
 }
 
-/// A field of a point or a measure.
+/// Field of a point or a measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
-    /// Its number in messages.
+    /// Field number in messages.
     pub number: u32,
-    /// Its key in text.
+    /// Key in text.
     pub key: &'static str,
-    /// The name of its column.
+    /// Name of the column.
     pub name: &'static str,
-    /// What it holds.
+    /// Type of the field.
     pub kind: Kind,
 }
 
@@ -42,14 +42,14 @@ const fn field(number: u32, key: &'static str, name: &'static str, kind: Kind) -
 
 use Kind::{Code, Covariance, Index, Kept, Log, Name, Number, Text, Truth};
 
-/// Types of points; the first two are those of old networks.
+/// Types of points; the first two belong to old networks.
 pub const POINT_TYPES: &[&str] = &["Tie", "Ground", "Free", "Constrained", "Fixed"];
-/// Where a-priori coordinates are from.
+/// Sources of a-priori coordinates.
 const SOURCES: &[&str] =
     &["None", "User", "AverageOfMeasures", "Reference", "Ellipsoid", "DEM", "Basemap", "BundleSolution"];
 /// Types of measures.
 const MEASURE_TYPES: &[&str] = &["Candidate", "Manual", "RegisteredPixel", "RegisteredSubPixel"];
-/// The numbers of a log of a measure; what a message says is the place among them, from 1.
+/// Names of the logged numbers of a measure; a message contains the index, from 1.
 pub const LOGS: &[&str] = &[
     "Eccentricity",
     "GoodnessOfFit",
@@ -63,10 +63,10 @@ pub const LOGS: &[&str] = &[
 const METERS: Kind = Number(Some("meters"));
 const PIXELS: Kind = Number(Some("pixels"));
 
-/// The field of a point that holds a measure.
+/// Field number of the measures in a point.
 pub const MEASURE: u32 = 25;
 
-/// The fields of a point, in the order of text.
+/// Fields of a point, in the order of text.
 pub static POINT: &[Field] = &[
     field(2, "PointType", "types", Code(POINT_TYPES)),
     field(1, "PointId", "ids", Text),
@@ -93,7 +93,7 @@ pub static POINT: &[Field] = &[
     field(23, "AdjustedCovarianceMatrix", "adjusted_covariance", Covariance),
 ];
 
-/// The fields of a measure, in the order of text.
+/// Fields of a measure, in the order of text.
 pub static MEASURES: &[Field] = &[
     field(1, "SerialNumber", "serial", Name),
     field(2, "MeasureType", "types", Code(MEASURE_TYPES)),

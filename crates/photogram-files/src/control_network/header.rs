@@ -1,35 +1,35 @@
-//! The header of a binary network.
+//! Header of a binary network.
 
 use std::ops::Range;
 
 use super::fault::{Fault, Reason};
 use super::messages::{LARGEST, Message, Packed, Packet, put_bytes, put_number, put_whole};
 
-/// What a binary network says of itself, before its points.
+/// Header of a binary network, in front of the points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Header {
-    /// Network, target, created, modified, description, user; None where it is not said.
+    /// Network, target, created, modified, description, user; None if missing.
     pub texts: [Option<String>; 6],
-    /// The number of points, as it is said.
+    /// Number of points; None if missing.
     pub points: Option<u64>,
-    /// Version 2: the length of each point's message.
+    /// Length of each point's message (version 2).
     pub lengths: Vec<u64>,
     /// Radii of the target, m.
     pub radii: Vec<f64>,
-    /// Fields that nobody knows, byte for byte.
+    /// Unknown fields as bytes.
     pub rest: Vec<u8>,
 }
 
-/// Number of the field that counts points, or lists their lengths.
+/// Field number of the point count, or of the list of lengths.
 const POINTS: u32 = 7;
-/// Number of the field of radii.
+/// Field number of the radii.
 const RADII: u32 = 10;
 
 impl Header {
-    /// Reads it from a part of a file.
+    /// Reads a header from a part of a file.
     ///
     /// # Errors
-    /// What is wrong with it, at which byte.
+    /// An error with its byte.
     pub fn decoded(file: &[u8], part: Range<usize>) -> Result<Self, Fault> {
         let bytes = file.get(part.clone()).ok_or_else(|| Reason::Ends("the header").at_byte(file.len()))?;
         let mut own = Self::default();
@@ -65,7 +65,7 @@ impl Header {
         Ok(())
     }
 
-    /// Writes it as version 5 has it.
+    /// Encodes the header in version 5.
     pub fn encoded(&self) -> Vec<u8> {
         let mut to = vec![];
         for (number, text) in (1..).zip(&self.texts) {

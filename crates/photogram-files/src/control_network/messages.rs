@@ -1,10 +1,10 @@
-//! Messages as columns.
+//! Conversion of messages to columns.
 //!
-//! Columns as messages.
+//! Conversion of columns to messages.
 //!
-//! Protobuf's wire format: a message is fields one after the other, each a key (number and wire type) and a value.
+//! Protobuf wire format: a message is a sequence of fields, each a key (number and wire type) and a value.
 //!
-//! Whether to go on.
+//! Interruption by the caller.
 
 use std::ops::{ControlFlow, Range};
 
@@ -14,19 +14,19 @@ use super::fields::{Field, Kind, MEASURE};
 use super::values::number_or_absent;
 use photocore::Stopped;
 
-/// How long each message is.
+/// Encoding of the message lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Framing<'a> {
-    /// Version 5: before each message stands its length, four bytes, the lowest first.
+    /// Version 5: four bytes in front of each message, lowest first.
     Lengths,
-    /// Version 2: the header has listed the lengths.
+    /// Version 2: list of lengths in the header.
     Listed(&'a [u64]),
 }
 
-/// Reads the messages that stand in a part of a file.
+/// Reads the messages in a part of a file.
 ///
 /// # Errors
-/// What is wrong with them, in which point, at which byte; `watch` has said so, or there is no memory.
+/// An error with its point and byte, an interruption by `watch`, or lack of memory.
 pub fn decoded(
     file: &[u8],
     part: Range<usize>,
@@ -52,7 +52,7 @@ pub fn decoded(
     Ok(all)
 }
 
-/// Where the next message stands.
+/// Returns the range of the next message.
 fn next_message(
     file: &[u8],
     part: Range<usize>,
@@ -94,7 +94,7 @@ fn read_point(bytes: &[u8], start: usize, all: &mut Points<'_>) -> Result<(), Fa
     all.end_point().map_err(|reason| reason.at_byte(start))
 }
 
-/// Puts a field into its column, or keeps it: where it has none, and where it says what a column has for absent.
+/// Stores a field in its column, or in the rest if the column is missing or would treat the value as absent.
 fn take(packet: Packet<'_>, table: &mut Table<'_>) -> Result<(), Fault> {
     let fault = |reason: Reason| reason.at_byte(packet.start);
     if packet.number > LARGEST {
@@ -113,7 +113,7 @@ fn take(packet: Packet<'_>, table: &mut Table<'_>) -> Result<(), Fault> {
     table.rest.keep(packet.raw).map_err(|stopped| fault(stopped.into()))
 }
 
-/// The value of a field.
+/// Returns the value of a field.
 fn cell<'a>(field: &Field, packet: &Packet<'a>) -> Result<Cell<'a>, Reason> {
     match (field.kind, packet.value) {
         (Kind::Text | Kind::Name, Packed::Bytes(bytes)) => {
@@ -142,12 +142,12 @@ fn cell<'a>(field: &Field, packet: &Packet<'a>) -> Result<Cell<'a>, Reason> {
     }
 }
 
-/// Writes points as messages of version 5, each behind its length.
+/// Encodes points as messages of version 5, each after its length.
 ///
-/// Fields stand in the order of their numbers, those that were kept between them.
+/// Fields are in the order of their numbers, including stored fields without a column.
 ///
 /// # Errors
-/// Columns do not agree, something was kept that only text can hold, a message is longer than its length can say.
+/// Inconsistent columns, content that only text can store, or a message longer than its length field allows.
 pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
     all.check().map_err(Reason::of_columns)?;
     let (orders, mut to, mut own) = ((order(&all.points), order(&all.measures)), vec![], vec![]);
@@ -173,7 +173,7 @@ pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
     Ok(to)
 }
 
-/// The columns in the order of their fields' numbers.
+/// Returns the columns in the order of their field numbers.
 fn order(table: &Table<'_>) -> Vec<usize> {
     let mut order: Vec<usize> = (0..table.fields.len()).collect();
     order.sort_by_key(|&column| table.fields[column].number);
@@ -182,7 +182,7 @@ fn order(table: &Table<'_>) -> Vec<usize> {
 
 type Inside<'a> = &'a mut dyn FnMut(&mut Vec<u8>) -> Result<(), Reason>;
 
-/// Writes the fields of a row: `measures` are those between the ones of lower and of higher numbers.
+/// Writes the fields of a row; `measures` writes the measures at their field number.
 fn write_row(
     table: &Table<'_>,
     row: usize,
@@ -205,7 +205,7 @@ fn write_row(
         {
             write(to)?;
         }
-        // What was kept because it said that there is none goes where there now is one.
+        // A stored absent value is omitted if the column now has a value.
         let slot = table.slot_of_number(packet.number);
         if !slot.is_some_and(|slot| table.columns[slot].has(row)) {
             to.extend_from_slice(packet.raw);
@@ -215,7 +215,7 @@ fn write_row(
     inside.take().map_or(Ok(()), |write| write(to))
 }
 
-/// The first line of what was kept of text.
+/// Returns the first line of a stored text.
 fn shown(kept: Packed<'_>) -> String {
     let Packed::Bytes(bytes) = kept else { return "what is no text".to_owned() };
     String::from_utf8_lossy(bytes).lines().next().unwrap_or_default().trim().to_owned()
@@ -243,21 +243,21 @@ fn write_field(table: &Table<'_>, slot: usize, row: usize, to: &mut Vec<u8>) {
     }
 }
 
-/// A value as it is packed.
+/// Encoded value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Packed<'a> {
-    /// Wire type 0: a whole number of any length.
+    /// Wire type 0: integer of variable length.
     Varint(u64),
     /// Wire type 1: eight bytes.
     Eight([u8; 8]),
-    /// Wire type 2: a text, a message, numbers in a row.
+    /// Wire type 2: text, message, or packed numbers.
     Bytes(&'a [u8]),
     /// Wire type 5: four bytes.
     Four,
 }
 
 impl Packed<'_> {
-    /// The number of its wire type.
+    /// Returns the wire type.
     pub fn wire(&self) -> u8 {
         match self {
             Self::Varint(_) => 0,
@@ -268,22 +268,22 @@ impl Packed<'_> {
     }
 }
 
-/// A field of a message.
+/// Field of a message.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet<'a> {
-    /// Its number.
+    /// Field number.
     pub number: u64,
-    /// Its value.
+    /// Value.
     pub value: Packed<'a>,
-    /// The whole of it, byte for byte.
+    /// Complete field as bytes.
     pub raw: &'a [u8],
-    /// Where it begins in the file.
+    /// Start of the field in the file.
     pub start: usize,
-    /// Where its value ends in the file.
+    /// End of the value in the file.
     pub end: usize,
 }
 
-/// The fields of a message, one after the other.
+/// Iterator over the fields of a message.
 #[derive(Debug, Clone)]
 pub struct Message<'a> {
     bytes: &'a [u8],
@@ -291,16 +291,16 @@ pub struct Message<'a> {
     base: usize,
 }
 
-/// The largest number that a field can have.
+/// Largest valid field number.
 pub const LARGEST: u64 = (1 << 29) - 1;
 
 impl<'a> Message<'a> {
-    /// A message whose first byte is the one of number `base` in its file.
+    /// Creates a message whose first byte has the position `base` in its file.
     pub fn new(bytes: &'a [u8], base: usize) -> Self {
         Self { bytes, at: 0, base }
     }
 
-    /// The next number that is packed as a varint; None at the end.
+    /// Returns the next packed varint; None at the end.
     pub fn varint(&mut self) -> Option<Result<u64, Fault>> {
         (self.at < self.bytes.len()).then(|| self.whole())
     }
@@ -322,7 +322,7 @@ impl<'a> Message<'a> {
         Err(self.fault(Reason::Endless, start))
     }
 
-    /// The next bytes of a field that begins at `start`.
+    /// Returns the next bytes of a field that begins at `start`.
     fn take(&mut self, count: usize, start: usize) -> Result<&'a [u8], Fault> {
         let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
         self.at += taken.map_or(0, <[u8]>::len);
@@ -380,32 +380,32 @@ fn put_key(number: u64, wire: u64, to: &mut Vec<u8>) {
     put_varint(number << 3 | wire, to);
 }
 
-/// Writes a field that is a whole number.
+/// Writes an integer field.
 pub fn put_whole(number: u32, value: u64, to: &mut Vec<u8>) {
     put_key(number.into(), 0, to);
     put_varint(value, to);
 }
 
-/// Writes a field that is a number.
+/// Writes a field with a floating-point number.
 pub fn put_number(number: u32, value: f64, to: &mut Vec<u8>) {
     put_key(number.into(), 1, to);
     to.extend(value.to_le_bytes());
 }
 
-/// Writes a field that is a text or a message.
+/// Writes a field with a text or a message.
 pub fn put_bytes(number: u64, bytes: &[u8], to: &mut Vec<u8>) {
     put_key(number, 2, to);
     put_varint(bytes.len() as u64, to);
     to.extend_from_slice(bytes);
 }
 
-/// Asked now and then whether to go on.
+/// Callback that decides whether to continue.
 pub type Watch<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
 
-/// Points between two questions.
+/// Number of points between two calls.
 const PATIENCE: usize = 1024;
 
-/// Asks at some points, by their numbers, whether to go on.
+/// Calls `watch` once per `PATIENCE` points; fails if it breaks.
 pub fn go_on(watch: &mut dyn FnMut() -> ControlFlow<()>, point: usize) -> Result<(), Reason> {
     match point.is_multiple_of(PATIENCE) && watch().is_break() {
         true => Err(Stopped::Interrupted.into()),

@@ -1,8 +1,8 @@
-//! Control networks of ISIS: points, each with its measures in images.
+//! Control networks of ISIS: points with their measures in images.
 //!
-//! A network is a message in protobuf's wire format for each point ([`decoded`], [`encoded`]), or text ([`read_text`], [`text`]);
-//! [`fields`] says once what both consist of. Both are read into the same columns ([`Points`]), and written from them. What has no column
-//! (who measured, when, by which program; fields and keys that nobody knows) is kept with its point or measure, and written back.
+//! A network is a sequence of protobuf messages, one per point ([`decoded`], [`encoded`]), or text ([`read_text`], [`text`]); [`fields`]
+//! declares the contents of both. Both are read into the same columns ([`Points`]), and written from them. Data without a column (author,
+//! date, program, unknown fields and keys) is stored with its point or measure, and written unchanged.
 
 mod columns;
 mod fault;

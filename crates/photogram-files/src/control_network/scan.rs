@@ -1,27 +1,27 @@
-//! Text line by line: a key with its value, which may go on over further lines.
+//! Scanner of text: statements of a key and a value, which may extend over several lines.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use super::fault::{Fault, Reason};
 
-/// Characters of a line that an error shows.
+/// Number of characters of a line in an error.
 const SHOWN: usize = 60;
 
-/// A statement: a line, or several where its value goes on.
+/// Statement: one line, or several lines of a continued value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statement<'a> {
-    /// The number of its first line, from 1.
+    /// Number of the first line, from 1.
     pub line: usize,
-    /// What stands there.
+    /// Text of the statement.
     pub text: &'a str,
-    /// Its key, or what ends a group.
+    /// Key, or the word that ends a group.
     pub key: &'a str,
-    /// What stands behind the equals sign.
+    /// Text after the equals sign.
     pub value: &'a str,
 }
 
-/// The statements of a text, without comments.
+/// Iterator over the statements of a text, without comments.
 #[derive(Debug, Clone)]
 pub struct Statements<'a> {
     text: &'a str,
@@ -29,7 +29,7 @@ pub struct Statements<'a> {
     line: usize,
 }
 
-/// What a statement has open at the end of a line.
+/// Open quotes and lists at the end of a line.
 #[derive(Debug, Default)]
 struct Open {
     quote: Option<u8>,
@@ -38,7 +38,7 @@ struct Open {
 }
 
 impl Open {
-    /// Goes over a line, and says whether the statement ends with it.
+    /// Scans a line; returns whether the statement ends with it.
     fn ends_with(&mut self, line: &[u8]) -> bool {
         let mut before = b' ';
         for &byte in line {
@@ -61,12 +61,12 @@ impl Open {
 }
 
 impl<'a> Statements<'a> {
-    /// Those of a text.
+    /// Creates an iterator over a text.
     pub fn new(text: &'a str) -> Self {
         Self { text, at: 0, line: 0 }
     }
 
-    /// Where the next line stands.
+    /// Returns the range of the next line.
     fn next_line(&mut self) -> Option<Range<usize>> {
         let start = self.at;
         let rest = self.text.get(start..).filter(|rest| !rest.is_empty())?;
@@ -114,42 +114,42 @@ impl<'a> Iterator for Statements<'a> {
     }
 }
 
-/// What has an end.
+/// Type of a block with an end statement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// `Object` .. `End_Object`.
+    /// Block `Object` .. `End_Object`.
     Object,
-    /// `Group` .. `End_Group`.
+    /// Block `Group` .. `End_Group`.
     Group,
 }
 
-/// What a statement does.
+/// Effect of a statement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// Begins a group or object.
+    /// Begin of a group or object.
     Begin(Kind),
-    /// Ends one.
+    /// End of a group or object.
     End(Kind),
-    /// Ends the text.
+    /// End of the text.
     Stop,
-    /// Gives a key its value.
+    /// Assignment of a value to a key.
     Give,
 }
 
-/// A value of text.
+/// Value in text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Read<'a> {
-    /// The text, or what stands between the parentheses of a list.
+    /// Text, or the content of a parenthesized list.
     pub text: Cow<'a, str>,
-    /// Its unit.
+    /// Unit.
     pub unit: Option<Cow<'a, str>>,
 }
 
 impl<'a> Statement<'a> {
-    /// What it does.
+    /// Returns the effect of the statement.
     pub fn act(&self) -> Act {
         let is = |words: &[&str]| words.iter().any(|word| self.key.eq_ignore_ascii_case(word));
-        // Few keys begin so.
+        // Few keys begin with these letters.
         match self.key.as_bytes().first().map(u8::to_ascii_lowercase) {
             Some(b'o' | b'b') if is(&["Object", "Begin_Object"]) => Act::Begin(Kind::Object),
             Some(b'g' | b'b') if is(&["Group", "Begin_Group"]) => Act::Begin(Kind::Group),
@@ -160,17 +160,17 @@ impl<'a> Statement<'a> {
         }
     }
 
-    /// Whether it begins a thing of this kind and name.
+    /// Returns whether the statement begins a block of this kind and name.
     pub fn begins(&self, kind: Kind, name: &str) -> bool {
         self.act() == Act::Begin(kind) && self.value.eq_ignore_ascii_case(name)
     }
 
-    /// The fault of a statement that is not understood.
+    /// Returns the fault of a statement with a syntax error.
     pub fn fault(&self) -> Fault {
         Reason::Line(self.text.chars().take(SHOWN).collect()).on_line(self.line)
     }
 
-    /// Its value: without marks of quotation, lines that go on put together.
+    /// Returns the value without quotation marks, with continued lines joined.
     pub fn read(&self) -> Result<Read<'a>, Fault> {
         let is_word = !self.value.starts_with(['"', '\'', '(', '{']);
         let read = match self.value.contains('\n') && is_word {
@@ -185,7 +185,7 @@ impl<'a> Statement<'a> {
     }
 }
 
-/// A value without marks of quotation or parentheses, and its unit; None where something else stands behind it.
+/// Returns a value without quotation marks or parentheses, and its unit; None if other text follows.
 fn parts(value: &str) -> Option<(&str, Option<&str>)> {
     let (text, rest) = match value.as_bytes().first()? {
         quote @ (b'"' | b'\'') => value[1..].split_once(char::from(*quote))?,
@@ -202,7 +202,7 @@ fn parts(value: &str) -> Option<(&str, Option<&str>)> {
     (behind.is_empty() || behind.starts_with('#')).then_some((text, unit))
 }
 
-/// A quoted text in one line: what goes on after a hyphen without it, other lines after a space.
+/// Joins the lines of a quoted text: without hyphen after a hyphen, with a space otherwise.
 fn unfolded(text: &str) -> Cow<'_, str> {
     match text.contains('\n') {
         true => put_together(&put_together(text, "-", ""), "", " ").into(),
@@ -210,7 +210,7 @@ fn unfolded(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Lines as one: `mark` stands where they end, `between` comes in its place.
+/// Joins lines that end with `mark`, which `between` replaces.
 fn put_together(text: &str, mark: &str, between: &str) -> String {
     let mut lines = text.split('\n').map(|line| line.trim_end_matches('\r')).peekable();
     let (mut all, mut joined) = (String::new(), false);

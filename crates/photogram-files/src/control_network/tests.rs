@@ -15,7 +15,7 @@ fn read(file: &[u8]) -> Result<Points<'static>, Fault> {
     decoded(file, 0..file.len(), Framing::Lengths, &mut go_on)
 }
 
-/// A point behind its length: two measures, a flag that says no, what nobody knows.
+/// Returns a length-prefixed point: two measures, a false flag, an unknown field.
 fn point(name: &str) -> Vec<u8> {
     let mut own = vec![];
     put_bytes(1, name.as_bytes(), &mut own);

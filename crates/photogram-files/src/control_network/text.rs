@@ -1,6 +1,6 @@
-//! Text as columns.
+//! Conversion of text to columns.
 //!
-//! Columns as text.
+//! Conversion of columns to text.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -12,18 +12,18 @@ use super::messages::{LARGEST, Message, Packed, Packet, Watch, go_on, put_bytes,
 use super::scan::{Act, Kind as Part, Read, Statement, Statements};
 use super::values::number_or_absent;
 
-/// The number of a field, which no file can have, that keeps text that nobody knows.
+/// Field number of unknown text, outside of the range of files.
 pub(super) const UNKNOWN: u64 = LARGEST + 1;
-/// The key of the measure that a point refers to.
+/// Key of the reference measure of a point.
 pub(super) const REFERENCE: &str = "Reference";
 
-/// The unit of what text gives no unit.
+/// Optional unit of values without a declared unit.
 const PIXELS: &str = "pixels";
 
-/// Reads the points of a network in text, and what stands around them: the same text without its points, on the same lines.
+/// Reads the points of a network in text. Also returns the text without its points, with unchanged line numbers.
 ///
 /// # Errors
-/// What is wrong, in which point, on which line; `watch` has said so, or there is no memory.
+/// An error with its point and line, an interruption by `watch`, or lack of memory.
 pub fn read_text(file: &[u8], watch: Watch<'_>) -> Result<(Points<'static>, String), Fault> {
     let text = str::from_utf8(file).map_err(|error| {
         let line = file[..error.valid_up_to()].split(|&byte| byte == b'\n').count();
@@ -75,7 +75,7 @@ fn read_point(statements: &mut Statements<'_>, begun: usize, all: &mut Points<'_
     all.end_point().map_err(|reason| reason.on_line(begun))
 }
 
-/// Reads a measure, and says whether it is the one that its point refers to.
+/// Reads a measure; returns whether it is the reference measure of its point.
 fn read_measure(statements: &mut Statements<'_>, begun: usize, table: &mut Table<'_>) -> Result<bool, Fault> {
     let mut is_reference = false;
     loop {
@@ -100,7 +100,7 @@ fn next<'a>(statements: &mut Statements<'a>, begun: usize) -> Result<Statement<'
     statements.next().ok_or_else(|| Reason::Ends("a point").on_line(begun))?
 }
 
-/// Keeps a group that nobody knows, up to its end.
+/// Stores an unknown group up to its end.
 fn keep_group(
     statements: &mut Statements<'_>,
     begin: &Statement<'_>,
@@ -128,7 +128,7 @@ fn keep(table: &mut Table<'_>, write: impl FnOnce(&mut Vec<u8>)) -> Result<(), R
     Ok(table.rest.keep(&raw)?)
 }
 
-/// Gives a key its value.
+/// Assigns a value to its key.
 fn give(statement: &Statement<'_>, table: &mut Table<'_>) -> Result<(), Fault> {
     let fault = |reason: Reason| reason.on_line(statement.line);
     let slot = table.fields.iter().position(|field| statement.key.eq_ignore_ascii_case(field.key));
@@ -151,7 +151,7 @@ fn give(statement: &Statement<'_>, table: &mut Table<'_>) -> Result<(), Fault> {
     keep(table, |to| put_bytes(field.into(), &message, to)).map_err(fault)
 }
 
-/// Puts a value into its column, or keeps it where it has none.
+/// Stores a value in its column, or in the rest for fields without a column.
 fn take(field: &Field, slot: usize, read: &Read<'_>, table: &mut Table<'_>) -> Result<(), Reason> {
     let row = table.rows;
     let cell = match field.kind {
@@ -169,7 +169,7 @@ fn take(field: &Field, slot: usize, read: &Read<'_>, table: &mut Table<'_>) -> R
         Kind::Index => Cell::Index(index(field.key, &read.text)?),
     };
     set(table, table.fields[slot].key, cell)?;
-    // What is said to be absent is no value, but was said.
+    // An explicitly absent value is stored separately, because the column treats it as missing.
     match cell {
         _ if table.columns[slot].has(row) => Ok(()),
         Cell::Number(absent) => keep(table, |to| put_number(field.number, absent, to)),
@@ -214,7 +214,7 @@ fn truth(key: &'static str, text: &str) -> Result<bool, Reason> {
     }
 }
 
-/// A number; NaN where there is said to be none.
+/// Parses a number; NaN for `null`.
 fn number(key: &'static str, text: &str) -> Result<f64, Reason> {
     if text.eq_ignore_ascii_case("null") {
         return Ok(f64::NAN);
@@ -234,13 +234,13 @@ fn covariance(key: &'static str, text: &str) -> Result<[f64; 6], Reason> {
     values.iter().all(|value| !value.is_absent()).then_some(values).ok_or_else(six)
 }
 
-/// What text is called where something has no place in it.
+/// Name of the text format in errors.
 const TEXT: &str = "a network in text";
 
-/// Writes points as text, as they stand in the object of their network: keys in the order of ISIS, one below the other.
+/// Writes points as text, as part of the object of their network: keys in the order of ISIS, one per line.
 ///
 /// # Errors
-/// Columns do not agree, something was kept that only messages can hold.
+/// Inconsistent columns, or content that only messages can store.
 pub fn text(all: &Points<'_>, watch: Watch<'_>) -> Result<String, Fault> {
     all.check().map_err(Reason::of_columns)?;
     let mut to = String::new();
@@ -263,11 +263,11 @@ pub fn text(all: &Points<'_>, watch: Watch<'_>) -> Result<String, Fault> {
     Ok(to)
 }
 
-/// What stands in a point or a measure.
+/// Item of a point or a measure.
 enum Item<'a> {
-    /// A key with its value.
+    /// Key with its value.
     Key(Cow<'a, str>, String),
-    /// A group that nobody knows, as it was.
+    /// Unknown group, unchanged.
     Group(&'a str),
 }
 
@@ -275,7 +275,7 @@ fn put_items(items: &[Item<'_>], indent: usize, to: &mut String) {
     let width = items.iter().map(|item| if let Item::Key(key, _) = item { key.len() } else { 0 }).max();
     let width = width.unwrap_or(0);
     for item in items {
-        // Writing to memory does not fail.
+        // Writing to memory cannot fail.
         let _ = match item {
             Item::Key(key, value) => writeln!(to, "{:indent$}{key:width$} = {value}", ""),
             Item::Group(text) => {
@@ -285,7 +285,7 @@ fn put_items(items: &[Item<'_>], indent: usize, to: &mut String) {
     }
 }
 
-/// What stands in a row, in the order of its fields, then what nobody knows.
+/// Returns the items of a row, in the order of its fields, followed by unknown ones.
 fn items<'a>(table: &'a Table<'_>, row: usize) -> Result<Vec<Item<'a>>, Reason> {
     let packets: Vec<Packet<'a>> = Message::new(table.rest.row(row), 0)
         .collect::<Result<_, _>>()
@@ -312,7 +312,7 @@ fn items<'a>(table: &'a Table<'_>, row: usize) -> Result<Vec<Item<'a>>, Reason> 
     Ok(items)
 }
 
-/// The value of a column.
+/// Returns the value of a column as text.
 fn value(field: &Field, column: &Column<'_>, row: usize) -> Result<String, Reason> {
     let number = |value: f64| format!("{value:?}");
     Ok(match (column, field.kind) {
@@ -327,7 +327,7 @@ fn value(field: &Field, column: &Column<'_>, row: usize) -> Result<String, Reaso
     })
 }
 
-/// What was kept of a field that is known.
+/// Returns the item of a known field without a column value.
 fn kept<'a>(field: &Field, packet: &Packet<'a>) -> Result<Item<'a>, Reason> {
     let key = |value: &str| Item::Key(field.key.into(), value.to_owned());
     match (field.kind, packet.value) {
@@ -343,7 +343,7 @@ fn kept<'a>(field: &Field, packet: &Packet<'a>) -> Result<Item<'a>, Reason> {
     }
 }
 
-/// A number of a log: what it is, and how large.
+/// Returns the item of a logged number: its name and value.
 fn log<'a>(bytes: &[u8]) -> Result<Item<'a>, Reason> {
     let mut packets = Message::new(bytes, 0).flatten().map(|packet| (packet.number, packet.value));
     if let (Some((1, Packed::Varint(kind))), Some((2, Packed::Eight(value))), None) =
@@ -357,7 +357,7 @@ fn log<'a>(bytes: &[u8]) -> Result<Item<'a>, Reason> {
     Err(Reason::NoPlace("a log that is no number with a name".to_owned(), TEXT))
 }
 
-/// What stood in text and nobody knows.
+/// Returns the item of unknown text.
 fn unknown(bytes: &[u8]) -> Result<Item<'_>, Reason> {
     let text = str::from_utf8(bytes).map_err(|_| Reason::Utf8("what is kept"))?;
     Ok(match text.split_once('=') {
@@ -366,7 +366,7 @@ fn unknown(bytes: &[u8]) -> Result<Item<'_>, Reason> {
     })
 }
 
-/// A text as a value: in marks of quotation where it is no single word.
+/// Returns a text as a value, quoted unless it is a single word.
 fn quoted(text: &str) -> Result<String, Reason> {
     let special = |c: char| c.is_whitespace() || "\"'(){}<>,=#;".contains(c);
     if !text.is_empty() && !text.contains(special) && !text.contains("/*") && !text.ends_with('-') {

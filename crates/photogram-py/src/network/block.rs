@@ -1,4 +1,4 @@
-//! What an adjustment of a block is given: photos with their cameras, poses in angles.
+//! Input of a block adjustment: photos with their cameras, poses in angles.
 
 use nalgebra::DMatrix;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
@@ -17,7 +17,7 @@ use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::trajectories::{TimedRow, TrajectoryRow, on_trajectory, trajectory};
 
-/// Model, parameters and their standard deviations of a camera, covariance matrix of the weighted ones row by row, knots.
+/// Model, parameters and standard deviations of a camera, covariance matrix of the weighted ones row by row, knots.
 type CameraRow = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>, Option<Vec<f64>>);
 
 fn camera((model, parameters, sd, covariance, knots): CameraRow) -> PyResult<Camera> {
@@ -28,7 +28,7 @@ fn camera((model, parameters, sd, covariance, knots): CameraRow) -> PyResult<Cam
     Ok(Camera { covariance: covariance.map(square), ..Camera::new(knotted(&model, &parameters, knots)?, sd) })
 }
 
-/// Kind; indices of common unknowns; of points, photos or cameras; numbers.
+/// Type; indices of shared parameters; indices of points, photos or cameras; numbers.
 type PassageRow<'py> = (String, Vec<usize>, Vec<usize>, Array<'py>);
 
 fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<Passage> {
@@ -114,7 +114,7 @@ pub fn block_network(
         images: images(&image_photos, &image_points, &image_xy, &image_sd)?,
         observations: observations(&observation_groups)?,
         commons: unknowns.into_iter().map(common).collect::<PyResult<_>>()?,
-        // A trajectory comes before the sensors on it.
+        // A trajectory precedes the sensors on it.
         mounts: timed
             .into_iter()
             .map(|own| on_trajectory(own).into())

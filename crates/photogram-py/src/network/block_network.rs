@@ -1,4 +1,4 @@
-//! A block as the core has it: adjusted, taken to other datums, asked for covariances.
+//! Block of the core: adjustment, transformation to other datums, covariances.
 
 use numpy::PyArray1;
 use photocore::Threads;
@@ -18,17 +18,17 @@ use crate::arrays::{Array, Indices, Vector, indices, numbers};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
-/// A block with the options of its adjustment.
+/// Block with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockNetwork {
     pub network: Network,
     pub options: Options,
-    /// How many of its photos, the last, are records on trajectories; they have the last camera.
+    /// Number of photos that are trajectory records: the last photos, with the last camera.
     pub records: usize,
 }
 
 impl BlockNetwork {
-    /// A solution as callers know it: without what stands for records.
+    /// Converts a solution to columns without trajectory records.
     fn told(&self, solution: Solution, pool: &Threads) -> Told {
         Told::without_records(solution, self.records, pool)
     }
@@ -161,7 +161,7 @@ impl BlockNetwork {
     }
 }
 
-/// Whether a failure is that the network has a datum already.
+/// Returns whether an error reports that the network has a datum already.
 pub fn has_datum(error: &Failure) -> bool {
     matches!(error, Failure::Datum(DatumError::NotFree))
 }

@@ -1,4 +1,4 @@
-//! What an adjustment of a collection is given: every photo with a camera of its own, poses in vectors.
+//! Input of a collection adjustment: every photo with its own camera, poses in vectors.
 
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::camera::ModelFacts;
@@ -20,12 +20,12 @@ use crate::memory::LOADED;
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::work::{Workers, watched};
 
-/// A collection with the options of its adjustment.
+/// Collection with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct CollectionNetwork {
     network: Network,
     options: Options,
-    /// Of a photo: its pose and its camera.
+    /// Number of unknowns of a photo: its pose and its camera.
     unknowns: usize,
 }
 
@@ -81,15 +81,15 @@ fn refused(error: &Failure) -> PyErr {
     }
 }
 
-/// Parameters of a pose in vectors.
+/// Number of parameters of a pose in vectors.
 const POSE: usize = 6;
 
-/// What is known of a model of cameras.
+/// Returns the description of a camera model.
 fn model(camera: &str) -> PyResult<ModelFacts> {
     geometry::Camera::model(camera).ok_or_else(|| unknown("camera", camera))
 }
 
-/// Pose and camera of every row of an (n, 6 + k) array, one after the other: there may be a row for every image.
+/// Returns photos from an (n, 6 + k) array of poses and cameras, in one pass: the number of rows may be large.
 fn photos(
     camera: &str,
     name: &str,

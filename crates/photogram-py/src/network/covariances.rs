@@ -20,10 +20,10 @@ pub struct BlockCovariances {
     refused: Refused,
 }
 
-/// A failure as Python sees it: of a block, or of a collection.
+/// Conversion of an error to an exception for a block or a collection.
 pub(super) type Refused = fn(&Failure) -> PyErr;
 
-/// Something that has cofactors: its kind and its index.
+/// Type and index of an object with cofactors.
 pub(super) type OfRow = (String, usize);
 
 pub(super) fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
@@ -38,7 +38,7 @@ pub(super) fn of_rows(rows: Vec<OfRow>) -> PyResult<Vec<Of>> {
     rows.into_iter().map(of).collect()
 }
 
-/// Factors the normal equations of a network where its adjustment has ended.
+/// Factors the normal equations of a network at the end of its adjustment.
 pub fn factored(
     py: Python<'_>,
     (network, options): (&Network, &Options),
@@ -56,7 +56,7 @@ pub fn factored(
         .map_err(|error| refused(&error))
 }
 
-/// A failure of a block as Python sees it.
+/// Converts an error of a block to an exception.
 pub fn refused(error: &Failure) -> PyErr {
     BlockError::new_err(failure(error, "block"))
 }
@@ -161,11 +161,11 @@ impl BlockCovariances {
     }
 }
 
-/// Number of groups, and the group of each coordinate of images, component of points, unknown of poses, of each camera, common unknown and
-/// other observation; -1 for none.
+/// Number of groups, and the group of each image coordinate, point component, pose unknown, camera, shared parameter and other observation;
+/// -1 for none.
 type GroupsRow<'py> = (usize, Indices<'py>, Indices<'py>, Indices<'py>, Vec<i64>, Vec<i64>, Vec<i64>);
 
-/// Equations of each group, sums of squares, and which columns of them are exact.
+/// Number of equations of each group, sums of squares, and whether each column is exact.
 type SquaresRow<'py> = (Vec<usize>, Vector<'py>, Vec<bool>);
 
 fn groups_of(

@@ -1,4 +1,4 @@
-//! First values of photos and points; their documentation is in `_photocore.pyi`.
+//! Initial values of photos and points; the documentation is in `_photocore.pyi`.
 
 use numpy::PyArray1;
 use photocore::geometry::{Matrix3, Pose, Vector3};
@@ -14,7 +14,7 @@ use crate::arrays::{
 };
 use crate::work::{Workers, watched};
 
-/// Positions, attitudes, sources and what is missing of photos; positions of points; images set aside; control that images contradict;
+/// Positions, attitudes, sources and reasons for missing poses of photos; positions of points; rejected observations; contradicted control;
 /// the frame; the misfit.
 type FoundRow<'py> = (
     Matrix<'py>,

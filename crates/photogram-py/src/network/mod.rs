@@ -1,4 +1,4 @@
-//! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
+//! Networks of photos: blocks and collections; the documentation is in `_photocore.pyi`.
 
 pub mod block;
 pub mod block_network;
@@ -34,7 +34,7 @@ create_exception!(
     "The collection cannot be adjusted: (kind, message, combinations, points, seconds)."
 );
 
-/// Points with their standard deviations.
+/// Returns points with their standard deviations.
 fn points(positions: &Array<'_>, sd: &Array<'_>) -> PyResult<Vec<Point>> {
     let coordinates = rows_in_place("point_positions", positions)?;
     let sd = rows_in_place("point_sd", sd)?;
@@ -42,7 +42,7 @@ fn points(positions: &Array<'_>, sd: &Array<'_>) -> PyResult<Vec<Point>> {
     Ok(coordinates.iter().zip(&*sd).map(|(&coordinates, &sd)| Point { coordinates, sd }).collect())
 }
 
-/// Image points: indices of their photos and points, coordinates and standard deviations.
+/// Returns image observations: indices of their photos and points, coordinates and standard deviations.
 fn images(
     photos: &Indices<'_>,
     points: &Indices<'_>,
@@ -62,14 +62,14 @@ fn images(
     Ok((0..xy.len()).map(image).collect())
 }
 
-/// What an undetermined combination moves: photos, cameras, common unknowns, parameters of cameras, parts of poses.
+/// Members of an undetermined combination: photos, cameras, shared parameters, camera parameters, pose components.
 type CombinationRow = (Vec<usize>, Vec<usize>, Vec<usize>, Vec<(usize, usize)>, Vec<&'static str>);
 
-/// Kind, message, and what is concerned: combinations or, where there are none, photos in one; points; seconds of a trajectory: a time,
-/// the first that it reaches, the last.
+/// Code, message, and objects concerned: combinations, or photos in one combination; points; trajectory times in seconds (time, first and
+/// last valid time).
 type FailureRow = (&'static str, String, Vec<CombinationRow>, Vec<usize>, Vec<f64>);
 
-/// A failure as Python sees it.
+/// Converts an error to a row for Python.
 fn failure(error: &Failure, what: &str) -> FailureRow {
     let photos_alone = |photos: &[usize]| {
         vec![combination_row(&Combination { photos: photos.to_vec(), ..Combination::default() })]
@@ -126,7 +126,7 @@ fn combination_row(combination: &Combination) -> CombinationRow {
     (photos, cameras, commons, parameters, poses.into_iter().map(PosePart::name).collect())
 }
 
-/// What went wrong, in terms of what was given: a block or a collection.
+/// Returns the message of an error for a block or a collection.
 fn said(error: &Failure, what: &str) -> String {
     match error {
         Failure::Index(image) => format!("image {image} names a photo or point that is not in the {what}"),

@@ -1,4 +1,4 @@
-//! A node of the elimination tree of a block that is adjusted in parts; its documentation is in `_photocore.pyi`.
+//! Node of the elimination tree of a partitioned block adjustment; the documentation is in `_photocore.pyi`.
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,13 +23,13 @@ use crate::arrays::{Array, InputError, Vector, numbers};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
-/// Matrix, right-hand side and diagonal of what a node leaves.
+/// Matrix, right-hand side and diagonal of the Schur complement of a node.
 type ContributionRow<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
-/// T, W and B^T W, the last step, the condition of B^T G, and unknowns that do not move: see `FormedNode.invert`.
+/// T, W and B^T W, the last step, the condition of B^T G, and fixed unknowns: see `FormedNode.invert`.
 type TransformationRow<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, f64, Vec<usize>);
 
-/// What a block of unknowns belongs to, and its index.
+/// Type and index of the owner of a parameter block.
 pub type BlockRow = (String, usize);
 
 fn block_of((kind, index): BlockRow) -> PyResult<BlockOf> {
@@ -42,7 +42,7 @@ fn block_of((kind, index): BlockRow) -> PyResult<BlockOf> {
     })
 }
 
-/// A failure of a node: what is wrong with its arguments, or with the block.
+/// Converts an error of a node to an exception: invalid arguments, or an error of the block.
 fn failed(error: &Failure) -> PyErr {
     match error {
         Failure::NoBlock(_) | Failure::Node(_) | Failure::State | Failure::Layout(_) => {
@@ -56,16 +56,16 @@ fn indices<'py>(py: Python<'py>, places: &[usize]) -> Bound<'py, PyArray1<i64>> 
     PyArray1::from_iter(py, places.iter().map(|&place| place as i64))
 }
 
-/// What stands together in memory: large arrays are not copied.
+/// Returns the contiguous data of an array; large arrays are not copied.
 fn slice<'a>(name: &str, array: &'a Array<'_>) -> PyResult<&'a [f64]> {
     array.as_slice().map_err(|_| InputError::new_err(format!("{name} must be contiguous")))
 }
 
-/// A node, its blocks ordered.
+/// Node with ordered blocks.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct Node {
     node: Arc<Core>,
-    /// How many of its photos, the last, are records on trajectories.
+    /// Number of photos that are trajectory records: the last photos.
     records: usize,
 }
 
@@ -230,7 +230,7 @@ impl Node {
 }
 
 impl Node {
-    /// A block as a node of a larger one, whose blocks are named for the nodes above and below.
+    /// Creates the node of a block in a larger network; its blocks are named for the nodes above and below.
     pub fn new(
         py: Python<'_>,
         (network, options, records): (&Network, &Options, usize),
@@ -252,7 +252,7 @@ impl Node {
     }
 }
 
-/// A node at a state, its points and blocks eliminated.
+/// Node at a state, with eliminated points and blocks.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct FormedNode {
     node: Arc<Core>,
@@ -261,7 +261,7 @@ pub struct FormedNode {
     decrease: f64,
     undetermined: Option<FailureRow>,
     contribution: Mutex<Option<Contribution<'static>>>,
-    /// None once it is inverted.
+    /// None after the inversion.
     formed: Mutex<Option<Formed>>,
 }
 
@@ -274,7 +274,7 @@ fn used_up(what: &str) -> PyErr {
 }
 
 impl FormedNode {
-    /// Asks the factor, which an inversion uses up.
+    /// Runs a query on the factor, which an inversion consumes.
     fn asked<T: Send>(
         &self,
         py: Python<'_>,

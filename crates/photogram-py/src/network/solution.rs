@@ -1,4 +1,4 @@
-//! What an adjustment of a network has found, as arrays.
+//! Result of a network adjustment as arrays.
 
 use std::mem::take;
 use std::sync::{Arc, Mutex};
@@ -16,12 +16,12 @@ use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 
-/// Cofactors of so many unknowns of each photo, (n, N, N); those of held ones are zero.
+/// Returns the cofactors of the unknowns of each photo, (n, N, N); zero for fixed unknowns.
 fn photo_cofactors<'py>(py: Python<'py>, photos: &[AdjustedPhoto], unknowns: usize) -> PyResult<Blocks<'py>> {
     let mut all = vec![0.0; photos.len() * unknowns * unknowns];
     for (photo, matrix) in photos.iter().zip(all.chunks_exact_mut(unknowns * unknowns)) {
         let own = photo.redundancy.len();
-        // A block has the unknowns of cameras apart.
+        // In a block the camera unknowns are separate.
         let shown = own.min(unknowns);
         for (row, values) in photo.cofactors.as_slice().chunks_exact(own).take(shown).enumerate() {
             matrix[row * unknowns..][..shown].copy_from_slice(&values[..shown]);
@@ -33,7 +33,7 @@ fn photo_cofactors<'py>(py: Python<'py>, photos: &[AdjustedPhoto], unknowns: usi
     PyArray1::from_vec(py, all).reshape([photos.len(), unknowns, unknowns])
 }
 
-/// Redundancy numbers of so many unknowns of each photo, (n, N); those of held ones are zero.
+/// Returns the redundancy numbers of the unknowns of each photo, (n, N); zero for fixed unknowns.
 fn photo_redundancy<'py>(
     py: Python<'py>,
     photos: &[AdjustedPhoto],
@@ -50,7 +50,7 @@ fn photo_redundancy<'py>(
     PyArray1::from_vec(py, all).reshape([photos.len(), unknowns])
 }
 
-/// Six corrections of each photo in each iteration, (iterations, n, 6).
+/// Returns the six corrections of each photo in each iteration, (iterations, n, 6).
 fn photo_corrections<'py>(
     py: Python<'py>,
     iterations: &[Vec<f64>],
@@ -68,13 +68,13 @@ fn photo_corrections<'py>(
     PyArray1::from_vec(py, values).reshape([iterations.len(), photos.len(), 6])
 }
 
-/// The points that were left out for a reason.
+/// Returns the points that were excluded for a reason.
 fn left_out(solution: &Solution, reason: Reason) -> Vec<usize> {
     let own = solution.dropped.iter().filter(|dropped| dropped.reason == reason);
     own.map(|dropped| dropped.point).collect()
 }
 
-/// Parameters, cofactors row by row, redundancy numbers, diagonal of the normal equations, photos and images of an adjusted camera.
+/// Parameters, cofactors row by row, redundancy numbers, diagonal of the normal equations, numbers of photos and observations of a camera.
 type CameraRow = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize, usize);
 
 fn camera_row(camera: AdjustedCamera) -> CameraRow {
@@ -82,7 +82,7 @@ fn camera_row(camera: AdjustedCamera) -> CameraRow {
     (parameters, cofactors.data.into(), redundancy, information, photos, images)
 }
 
-/// What adjusted blocks and collections have alike.
+/// Common part of the solutions of blocks and collections.
 #[pyclass(frozen, subclass, get_all, module = "photogram._photocore")]
 pub struct NetworkSolution {
     status: &'static str,
@@ -115,7 +115,7 @@ pub struct NetworkSolution {
 }
 
 impl NetworkSolution {
-    /// Of a block or a collection, of so many unknowns of a photo: its pose, and its camera where that may be unknown.
+    /// Creates the solution of a block or a collection; `unknowns` per photo are the pose and, in collections, the camera.
     fn new(py: Python<'_>, told: &mut Told, unknowns: usize, what: &str) -> PyResult<Self> {
         let kept = Arc::new(Mutex::new(told.solution.converged.take()));
         let Solution { adjustment, state, joint, weak, .. } = &told.solution;
@@ -153,7 +153,7 @@ impl NetworkSolution {
     }
 }
 
-/// An adjusted block.
+/// Adjusted block.
 #[pyclass(frozen, get_all, extends = NetworkSolution, module = "photogram._photocore")]
 pub struct BlockSolution {
     datum_unknowns: Vec<(usize, usize)>,
@@ -187,7 +187,7 @@ impl BlockSolution {
         };
         let numbers = |all: &[usize]| PyArray1::from_iter(py, all.iter().map(|&own| own as i64)).unbind();
         let sums = found.sums_of_squares;
-        // A camera, a point that stays or a mount is no photo.
+        // Cameras, points and pose links in the order are not photos.
         let order = found.adjustment.effort.order.iter().filter(|&&block| block < found.photos.len());
         let own = Self {
             datum_unknowns: found.datum.held_commons.clone(),
@@ -216,7 +216,7 @@ impl BlockSolution {
     }
 }
 
-/// An adjusted collection.
+/// Adjusted collection.
 #[pyclass(frozen, get_all, extends = NetworkSolution, module = "photogram._photocore")]
 pub struct CollectionSolution {
     photo_parameters: Py<PyArray2<f64>>,
@@ -229,7 +229,7 @@ pub struct CollectionSolution {
 }
 
 impl CollectionSolution {
-    /// Of so many unknowns of a photo.
+    /// Creates the solution of a collection with `unknowns` per photo.
     pub fn new(py: Python<'_>, mut told: Told, unknowns: usize) -> PyResult<Py<Self>> {
         let base = NetworkSolution::new(py, &mut told, unknowns, "collection")?;
         let Told { solution: found, point_rays_behind, .. } = told;

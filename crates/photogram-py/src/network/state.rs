@@ -1,4 +1,4 @@
-//! Where the adjustment of a block has ended, and the datum that it was taken to.
+//! Final state of a block adjustment, and its datum.
 
 use std::sync::{Arc, Mutex};
 
@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 use crate::arrays::{Matrix, matrix};
 use crate::options::{named_ordering, unknown};
 
-/// What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, and what makes these lengths.
+/// Datum: name, points, photos, whether scale is constrained, photos with constrained attitudes, radius that converts them to lengths.
 pub type DatumRow = (String, Vec<usize>, Vec<usize>, bool, Vec<usize>, Option<f64>);
 
-/// The datum of a row.
+/// Converts a row to a datum.
 pub fn datum_of((name, points, photos, scale, attitudes, radius): DatumRow) -> PyResult<NetworkDatum> {
     Ok(match (name.as_str(), photos.first()) {
         ("inner", _) => NetworkDatum::Inner(InnerConstraints { points, photos, attitudes, radius, scale }),
@@ -35,23 +35,23 @@ fn row_of(datum: &NetworkDatum) -> DatumRow {
     (name.to_owned(), points, photos, scale, attitudes, radius)
 }
 
-/// Adjusted unknowns, those held, points and photos left out, ordering, datum, whether control was given up for it.
+/// Adjusted unknowns, fixed unknowns, excluded points and photos, ordering, datum, whether control was released for it.
 type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<DatumRow>, bool);
 
-/// A network where its adjustment has converged, until the first that asks takes it: its memory is that of the adjustment.
+/// Converged network, which uses the memory of the adjustment; the first query takes ownership.
 pub type Kept = Arc<Mutex<Option<Box<Converged>>>>;
 
-/// Where an adjustment has ended.
+/// Final state of an adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockState {
     pub state: State,
     pub kept: Kept,
-    /// None of copies and of what was read.
+    /// None for copies and unpickled states.
     pub joint: Option<Arc<Joint>>,
 }
 
 impl BlockState {
-    /// What the adjustment has kept, the first time; none of copies and of what was read.
+    /// Removes and returns the converged network at the first call; None for copies and unpickled states.
     pub fn take_kept(&self) -> Option<Box<Converged>> {
         self.kept.lock().ok().and_then(|mut kept| kept.take())
     }
@@ -79,7 +79,7 @@ impl BlockState {
         joint.map(|joint| matrix(py, joint.cofactors.clone(), true)).transpose()
     }
 
-    /// So that results are copied and sent to other processes.
+    /// Pickling support for copies and for other processes.
     fn __getnewargs__(&self) -> StateRow {
         let State { unknowns, held, collapsed, loose, ordering, datum, released } = self.state.clone();
         let datum = datum.as_ref().map(row_of);

@@ -1,4 +1,4 @@
-//! The rules of steps, for whoever adjusts in parts; their documentation is in `_photocore.pyi`.
+//! Step rules for partitioned adjustments; the documentation is in `_photocore.pyi`.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ pub fn step_rules() -> BTreeMap<&'static str, f64> {
     rules
 }
 
-/// What a full step is by its length and by the damping and length of those before.
+/// Classifies a full step by its length and by the damping and lengths of previous steps.
 #[pyfunction]
 #[pyo3(signature = (taken, change, *, chord, unknowns, tolerance))]
 pub fn judge_full_step(

@@ -1,4 +1,4 @@
-//! The groups of observations of a network.
+//! Test groups of the observations of a network.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use numpy::PyArray1;
 use photocore::network::{Subject, Suspects};
 use pyo3::prelude::*;
 
-/// The groups of observations that are tested together.
+/// Groups of observations that are tested together.
 #[pyclass(module = "photogram._photocore", frozen)]
 pub struct NetworkSuspects(pub(super) Arc<Suspects>);
 
-/// The number of a kind, and the index.
+/// Returns the number of the type, and the index.
 pub(super) fn subject(subject: Subject) -> (u8, i64) {
     let (kind, index) = match subject {
         Subject::Image(index) => (0, index),

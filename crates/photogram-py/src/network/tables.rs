@@ -1,11 +1,11 @@
-//! What an adjustment has found of points and images, in columns.
+//! Columns of adjusted points and image observations.
 
 use photocore::Threads;
 use photocore::adjustment::Observed;
 use photocore::network::{AdjustedPoint, Solution};
 use rayon::Scope;
 
-/// A solution whose points and images stand in columns: made on all threads, before Python waits for it.
+/// Solution with points and image observations in columns, built in parallel without the GIL.
 pub struct Told {
     pub solution: Solution,
     pub point_positions: Vec<[f64; 3]>,
@@ -21,12 +21,12 @@ pub struct Told {
 }
 
 impl Told {
-    /// Takes the columns out of a solution, which has no points and images any more. What was left out is NaN.
+    /// Moves points and image observations of a solution into columns. Excluded ones are NaN.
     pub fn new(solution: Solution, pool: &Threads) -> Self {
         pool.install(|| Self::on_pool(solution))
     }
 
-    /// The same without what stands for so many records on trajectories: the last photos, which have the last camera.
+    /// Creates the columns without trajectory records: the last `records` photos, with the last camera.
     pub fn without_records(mut solution: Solution, records: usize, pool: &Threads) -> Self {
         solution.photos.truncate(solution.photos.len() - records);
         if records > 0 {
@@ -68,7 +68,7 @@ impl Told {
     }
 }
 
-/// Fills a column with one part of everything that takes part, and `missing` of all else, on one of the threads.
+/// Fills a column with one part of all used items, and with `missing` for the others, as a parallel task.
 fn fill<'s, T: Sync, P: Copy + Send + 's>(
     scope: &Scope<'s>,
     column: &'s mut Vec<P>,

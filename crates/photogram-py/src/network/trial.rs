@@ -1,4 +1,4 @@
-//! A network tried without some of its observations.
+//! Outlier session: a network adjusted without some of its observations.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use photocore::adjustment::Loss;
@@ -15,18 +15,18 @@ use crate::options::named_loss;
 use crate::solution::status_name;
 use crate::work::{Workers, watched};
 
-/// A network tried without some of its observations.
+/// Network that is adjusted without some of its observations.
 #[pyclass(module = "photogram._photocore")]
 pub struct NetworkTrial {
     trial: Trial,
     images: usize,
-    /// Photos without those that stand for records.
+    /// Number of photos without trajectory records.
     photos: usize,
     threads: usize,
     refused: Refused,
 }
 
-/// Status, iterations, weighted sum of squares, degrees of freedom, points that ran into a station.
+/// Status, iterations, weighted sum of squares, degrees of freedom, points that collapsed into a station.
 type OutcomeRow = (&'static str, usize, f64, i64, Vec<usize>);
 
 fn outcome_row(outcome: Outcome) -> OutcomeRow {
@@ -34,10 +34,10 @@ fn outcome_row(outcome: Outcome) -> OutcomeRow {
     (status_name(status), iterations, sum_of_squares, degrees_of_freedom, collapsed)
 }
 
-/// Statistic, rows that are out, error and its standard deviation of each.
+/// Statistic, excluded rows, error and standard deviation of the error per row.
 type PredictionRow = (f64, Vec<usize>, Vec<f64>, Vec<f64>);
 
-/// A hypothesis as a dictionary; see the stub.
+/// Converts a hypothesis to a dictionary; see the stub.
 fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>> {
     let row = PyDict::new(py);
     let (kind, index, component) = match own.about {
@@ -65,7 +65,7 @@ fn hypothesis_row(py: Python<'_>, own: Hypothesis) -> PyResult<Bound<'_, PyDict>
     row.set_item("mdb", judged.mdb)?;
     row.set_item("error", judged.error)?;
     row.set_item("bias_to_noise", judged.bias_to_noise)?;
-    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change));
+    let effect = own.effect.map(|own| (own.points, own.others, own.ratio, own.at, own.change, own.checks));
     row.set_item("effect", effect)?;
     Ok(row)
 }
@@ -76,12 +76,12 @@ impl NetworkTrial {
     }
 }
 
-/// The unknown that is moved most: its kind, index and component, by how much, and that in its standard deviation.
+/// Unknown with the largest change: type, index, component, change, and change in standard deviations.
 type MovedRow = (&'static str, usize, usize, f64, f64);
 
-/// Prepares a network for trials without some of its observations, from where its adjustment has ended or from the start.
+/// Prepares a network for trials without some of its observations, from its final or its initial state.
 ///
-/// * `kept`: whether the state is of this very network, so that what its adjustment has kept may be taken.
+/// * `kept`: whether the state belongs to this network, so that its converged adjustment can be reused.
 pub fn tried(
     py: Python<'_>,
     (network, options, records): (&Network, &Options, usize),
@@ -187,7 +187,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, centre, estimated, detection, limit, effects))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -198,6 +198,7 @@ impl NetworkTrial {
         control_sets: Vec<Option<usize>>,
         readouts: Vec<Option<[f64; 3]>>,
         widths: Vec<f64>,
+        checks: Vec<usize>,
         centre: Option<[f64; 3]>,
         estimated: Option<(f64, f64)>,
         detection: (f64, f64),
@@ -212,6 +213,7 @@ impl NetworkTrial {
             control_sets,
             readouts,
             widths,
+            checks,
             centre,
             estimated,
             detection,

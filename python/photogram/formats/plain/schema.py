@@ -1,4 +1,4 @@
-"""The tables of the plain project, each declared once; docs/formats/plain-tables.md describes their columns."""
+"""The tables of the plain project, each declared once (docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 

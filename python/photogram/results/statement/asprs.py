@@ -11,28 +11,13 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.statement.request import invalid
 from photogram.statistics.freedom import rmse_interval
 
 ENOUGH = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
-POINTS_BY_AREA = (
-    (1_000.0, 30),
-    (2_000.0, 40),
-    (3_000.0, 50),
-    (4_000.0, 60),
-    (5_000.0, 70),
-    (6_000.0, 80),
-    (7_000.0, 90),
-    (8_000.0, 100),
-    (9_000.0, 110),
-    (math.inf, 120),
-)
-"""Check points up to an area in km2 (table C.1): least and most are confirmed, the steps between are not."""
+MOST_STEPS = 10  # Of 1,000 km2, beyond which the number of check points stays
 MEAN_SHARE, MOST_TIMES = 0.25, 3.0
 """Of a class: a mean, and a difference, beyond which are to be investigated (7.2)."""
 
@@ -65,16 +50,12 @@ class Remark:
     point: int | None = None  # Row of the difference; None for a mean
 
 
-def points_asked_for(area: float | None) -> int:
+def points_asked_for(area: float) -> int:
     """Return how many check points an area (km2) asks for, for each of NVA and VVA (7.13, table C.1).
 
-    None for an area that is not known: the least.
+    Ten more for every 1,000 km2. Least and most are confirmed, the steps between are not.
     """
-    if area is None:
-        return POINTS_BY_AREA[0][1]
-    if not area >= 0:
-        raise invalid("area", "error.not-negative", area)
-    return next(count for most, count in POINTS_BY_AREA if area <= most)
+    return ENOUGH + 10 * (math.ceil(min(max(area / 1000.0, 1.0), MOST_STEPS)) - 1)
 
 
 def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
@@ -84,8 +65,6 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
     the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
     """
-    if not survey >= 0:
-        raise invalid("survey", "error.not-negative", survey)
     rest = (found - survey) * (found + survey)
     return Accuracy(
         count,
@@ -108,7 +87,7 @@ def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accurac
 
 
 def verdict(figure: Accuracy | None, limit: float) -> str:
-    """Return what can be said of a class, in the linear unit; refuse one that is not positive.
+    """Return what can be said of a class, in the linear unit.
 
     `missed` where the figure is larger. Else, by the upper end of its interval, `met with confidence` or
     `met`; with fewer than 30 points `produced to meet` or `not decided` in their places. `not tested` without
@@ -116,7 +95,7 @@ def verdict(figure: Accuracy | None, limit: float) -> str:
     """
     if figure is None:
         return "not tested"
-    if figure.rmse > _class(limit):
+    if figure.rmse > limit:
         return "missed"
     sure = figure.upper <= limit
     if figure.count < ENOUGH:
@@ -136,7 +115,7 @@ def survey_good_enough(survey: float, limit: float) -> bool:
 
     RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
     """
-    return survey <= _class(limit) / 2
+    return survey <= limit / 2
 
 
 def control_good_enough(
@@ -148,12 +127,11 @@ def control_good_enough(
     Half of the horizontal class holds in plan, and half of the vertical one in height; the whole horizontal
     one where heights are no product.
     """
-    limit = _class(class_h) if class_v is None else _class(class_v) / 2
-    return plan <= _class(class_h) / 2, height <= limit
+    return plan <= class_h / 2, height <= (class_h if class_v is None else class_v / 2)
 
 
 def remarks(
-    differences: ArrayLike, class_h: float | None = None, class_v: float | None = None
+    differences: Floats, class_h: float | None = None, class_v: float | None = None
 ) -> tuple[Remark, ...]:
     """Return what is to be investigated before a class is stated (7.2); nothing is removed for it.
 
@@ -161,14 +139,11 @@ def remarks(
     the class is that over the root of 2. `differences` are (n, 3) east, north, height: adjusted minus given,
     in the linear unit; NaN where nothing is given. Classes are None where none is asked for.
     """
-    found = numbers("differences", differences, missing=True)
-    if found.ndim != 2 or found.shape[1] != 3:
-        raise invalid("differences", "error.shape", shape="(n, 3)", actual=str(found.shape))
-    axis = None if class_h is None else _class(class_h) / math.sqrt(2)
-    limits = {"e": axis, "n": axis, "h": None if class_v is None else _class(class_v)}
+    axis = None if class_h is None else class_h / math.sqrt(2)
+    limits = {"e": axis, "n": axis, "h": class_v}
     return tuple(
         remark
-        for (component, limit), column in zip(limits.items(), found.T, strict=True)
+        for (component, limit), column in zip(limits.items(), differences.T, strict=True)
         if limit is not None
         for remark in _beyond(component, limit, column)
     )
@@ -182,9 +157,3 @@ def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
         yield Remark("mean", component, mean, MEAN_SHARE * limit)
     for row in known[np.abs(values[known]) > MOST_TIMES * limit].tolist():
         yield Remark("difference", component, float(values[row]), MOST_TIMES * limit, row)
-
-
-def _class(limit: float) -> float:
-    if not 0 < limit < math.inf:
-        raise invalid("class", "error.positive", limit)
-    return limit

@@ -46,8 +46,6 @@ EXACT = 5000  # Rows up to which degrees of freedom are computed without estimat
 
 @dataclass(frozen=True)
 class Source:
-    """A group of observations and what it contributes."""
-
     level: str  # `kind`, `strip`, `camera`, `photo`, `point` or `parameter`
     subject: Phrase | str  # Its name; of parameters as a message
     number: int  # Number of rows
@@ -71,8 +69,6 @@ class Source:
 
 @dataclass(frozen=True)
 class Single:
-    """A single observation."""
-
     observation: tuple[str, ...]  # Kind, names, component
     sd: float  # A priori, in its unit
     sensitivity: float  # df/dl: units of the quantity for one of the observation
@@ -83,8 +79,6 @@ class Single:
 
 @dataclass(frozen=True)
 class Freedom:
-    """Effective degrees of freedom of a standard deviation."""
-
     basis: str  # Basis of standard deviations: `given`, `unit variance`, `components`
     used: float  # Degrees of freedom for k; infinite for given weights
     common: float  # Degrees of freedom of the unit variance
@@ -97,8 +91,6 @@ class Freedom:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The budget of a quantity."""
-
     # Requested text, its phrase, unit of the value
     quantity: str
     subject: Phrase
@@ -119,7 +111,6 @@ class Budget:
         return self.k * self.sd
 
     def at(self, level: str) -> list[Source]:
-        """Return the sources of a level."""
         return [each for each in self.sources if each.level == level]
 
 
@@ -353,7 +344,6 @@ class Rows:
 
 
 def kind_of(label: str) -> str:
-    """Return what people call a kind of observations."""
     return {"position": "gnss"}.get(label, label)
 
 

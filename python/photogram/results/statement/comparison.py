@@ -72,11 +72,6 @@ class Compared:
         return np.asarray(self.product + self.survey)
 
     @property
-    def survey_variances(self) -> Floats:
-        """(n, 3) of the survey against the datum, which counts what cancels in the differences, too."""
-        return np.asarray(self.survey_sd**2 + self.common_sd**2)
-
-    @property
     def counted(self) -> Bools:
         """(n, 3) which differences count: heights in vegetation are stated apart."""
         rows = np.isfinite(self.differences)
@@ -101,7 +96,6 @@ class Compared:
         return np.asarray(matrix.reshape(n, 3, n, 3)[range(n), :, range(n), :])
 
     def some(self, keep: Bools) -> Compared:
-        """Return some of the points."""
         rows = np.repeat(keep, 3)
         grid = np.ix_(rows, rows)
         return replace(
@@ -152,6 +146,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
     for name in asked.vegetated:
         if name not in block.point_ids:
             raise InputError(unknown_name("check point", name, names))
+    unused = (result.point_kinds == "check") & ~result.used_points
     return Compared(
         names=names,
         vegetated=np.array([name in asked.vegetated for name in names], dtype=bool),
@@ -165,7 +160,13 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
         common_sd=np.array(asked.survey_common_sd),
         scale=result.covariance_scale,
         second=result.freedom_of_scale,
-        not_usable=tuple(_not_usable(result)),
+        not_usable=tuple(
+            (name, "no images" if why == NOT_PHOTOGRAPHED else why)
+            for name, why in (
+                (name, result.dropped.get(name, "left out"))
+                for name in np.array(block.point_ids, dtype=object)[unused]
+            )
+        ),
         known=len(checks.rows),
         step=step,
     )
@@ -289,14 +290,6 @@ def _check_apart(block: Block, rows: Indices) -> None:
             )
 
 
-def _not_usable(result: Result) -> list[tuple[str, str]]:
-    """Return known points that took no part, with the reason."""
-    known = (result.point_kinds == "check") & ~result.used_points
-    names = [result.block.point_ids[row] for row in np.flatnonzero(known).tolist()]
-    reasons = ((name, result.dropped.get(name, "left out")) for name in names)
-    return [(name, "no images" if why == NOT_PHOTOGRAPHED else why) for name, why in reasons]
-
-
 @dataclass(frozen=True)
 class System:
     """A system of coordinates for people."""
@@ -308,8 +301,6 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Points that were given."""
-
     # n names; `control` or `check`
     names: tuple[str, ...]
     kinds: tuple[str, ...]
@@ -326,7 +317,11 @@ NOTHING = Survey((), (), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), N
 def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
     """Return control and check points of a block, in a system or in the block's own axes."""
     block = result.block
-    own = own_system(result) if system is None else system
+    if system is None:  # The axes of the block, longitudes and latitudes in degrees
+        axes = point_axes(block)
+        factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
+        x, y, z = ((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
+        system = System("", (x, y, z), lambda positions: positions * factors)
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
     kinds = result.point_kinds.copy()
     positions, sd = block.point_positions.copy(), block.point_sd.copy()
@@ -342,19 +337,11 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
     return Survey(
         names=tuple(block.point_ids[row] for row in rows.tolist()),
         kinds=tuple(str(kinds[row]) for row in rows.tolist()),
-        positions=_carried(own, positions[rows]),
+        positions=_carried(system, positions[rows]),
         sd=np.where(np.isfinite(sd[rows]), sd[rows], np.nan),
-        checks=_carried(own, found.given),
-        system=own,
+        checks=_carried(system, found.given),
+        system=system,
     )
-
-
-def own_system(result: Result) -> System:
-    """Return the axes of a block themselves: longitudes and latitudes in degrees."""
-    axes = point_axes(result.block)
-    factors = np.array([np.degrees(1.0) if axis.angle else 1.0 for axis in axes])
-    named = tuple((axis.name, "deg" if axis.angle else axis.unit) for axis in axes)
-    return System("", (named[0], named[1], named[2]), lambda positions: positions * factors)
 
 
 def _carried(system: System, positions: Floats) -> Floats:

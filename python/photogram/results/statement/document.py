@@ -6,7 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from photogram import _photocore
+from photogram.arguments.types import Bools, Floats
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.statement.budget import Budget, kind_of
@@ -24,7 +27,6 @@ if TYPE_CHECKING:
 
 
 def statement_members(found: Statement) -> dict[str, Any]:
-    """Return the members of the document."""
     asked, result, standards = found.asked, found.result, found.standards
     unit = result.block.linear_unit
     return {
@@ -84,25 +86,28 @@ def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
         for k, name in enumerate(grouping.groups.names)
     }
     for unknown in result.unknowns:
-        _add(found, unknown.kind, unknown.given.deviations, unknown.redundancy, unknown.standardized)
+        sd, w = unknown.given.deviations, unknown.standardized  # w = v / (sd sqrt(r))
+        _add(found, unknown.kind, (sd > 0) & np.isfinite(sd), unknown.redundancy, w**2 * unknown.redundancy)
     for camera in result.cameras:
-        weighted = camera.weighted
-        sd = camera.given.deviations[weighted]
-        own = camera.redundancy[weighted]
-        v = camera.given.values[weighted] - camera.values[weighted]
-        if weighted:
-            count, r, q = found.get("camera", (0, 0.0, 0.0))
-            found["camera"] = (count + len(weighted), r + float(own.sum()), q + float(((v / sd) ** 2).sum()))
+        weighted = np.isin(np.arange(len(camera.names)), camera.weighted)
+        with np.errstate(all="ignore"):
+            squares = ((camera.given.values - camera.values) / camera.given.deviations) ** 2
+        _add(found, "camera", weighted, camera.redundancy, squares)
     return found
 
 
-def _add(found: dict[str, tuple[int, float, float]], kind: str, sd: Any, redundancy: Any, w: Any) -> None:
-    """Add weighted components of a common unknown: w = v / (sd sqrt(r))."""
-    for deviation, r, value in zip(sd.tolist(), redundancy.tolist(), w.tolist(), strict=True):
-        if 0 < deviation < float("inf"):
-            count, total, squares = found.get(kind, (0, 0.0, 0.0))
-            square = value**2 * r if value == value else 0.0
-            found[kind] = (count + 1, total + r, squares + square)
+def _add(
+    found: dict[str, tuple[int, float, float]],
+    kind: str,
+    weighted: Bools,
+    redundancy: Floats,
+    squares: Floats,
+) -> None:
+    """Add the weighted components of a camera or common unknown."""
+    if weighted.any():
+        count, r, q = found.get(kind, (0, 0.0, 0.0))
+        total = float(np.nansum(squares[weighted]))
+        found[kind] = (count + int(weighted.sum()), r + float(redundancy[weighted].sum()), q + total)
 
 
 def _adjustment(result: Result) -> dict[str, Any]:
@@ -126,7 +131,6 @@ def _adjustment(result: Result) -> dict[str, Any]:
 
 
 def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
-    """Return the figures of check points; None where there are none."""
     if found is None:
         return None
     parts = [found.parts[each] for each in ("e", "n", "h")]
@@ -172,7 +176,8 @@ def _prediction(found: Prediction | None) -> dict[str, Any] | None:
 
 def budget_member(found: Budget) -> dict[str, Any]:
     """Return a budget: contributions are variances in the square of its unit."""
-    freedom = found.freedom
+    freedom, name = found.freedom, f"k{100 * found.coverage:g}_components"
+    own = (("joint", freedom.joint), ("welch_satterthwaite", freedom.welch_satterthwaite))
     return {
         **members(found, "unit", "value", "cofactor", "sd", "coverage", "k", "expanded"),
         "by_kind": {
@@ -198,17 +203,11 @@ def budget_member(found: Budget) -> dict[str, Any]:
             "nu_of_kind": freedom.of_kind,
             "components_joint": freedom.joint,
             "components_welch_satterthwaite": freedom.welch_satterthwaite,
-            **_factors(found),
+            **{
+                f"{name}_{what}": coverage_factor(found.coverage, nu, truncated=False) if nu > 0 else math.nan
+                for what, nu in own
+            },
         },
-    }
-
-
-def _factors(found: Budget) -> dict[str, float]:
-    name = f"k{100 * found.coverage:g}_components"
-    own = (("joint", found.freedom.joint), ("welch_satterthwaite", found.freedom.welch_satterthwaite))
-    return {
-        f"{name}_{what}": coverage_factor(found.coverage, nu, truncated=False) if nu > 0 else math.nan
-        for what, nu in own
     }
 
 

@@ -53,8 +53,6 @@ class Sized:
 
 @dataclass(frozen=True)
 class Radius:
-    """A radius of a probability from a sample."""
-
     # k = ceil(p n), and the k-th smallest: NaN without points
     order: int
     sample: float
@@ -66,8 +64,6 @@ class Radius:
 
 @dataclass(frozen=True, eq=False)
 class Figures:
-    """All figures of check points."""
-
     n: int  # Number of points
     parts: dict[str, Sized | None]  # By `e`, `n`, `h`, `plan`, `all`
     # In plan (radial) and height; 1: of differences, 2: of the survey
@@ -118,7 +114,16 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
     sizes = dict(zip(PARTS, (*d.T, plan, np.sqrt((d**2).sum(axis=1))), strict=True))
     in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
-    survey, moments = found.survey_variances, _moments(d[in_plan, :2])
+    # Of the survey against the datum: what cancels in the differences counts, too.
+    survey, own = found.survey_sd**2 + found.common_sd**2, d[in_plan, :2]
+    moments = own.T @ own / len(own) if len(own) else np.full((2, 2), np.nan)
+    of_moments, finite = dict[str, float](), np.isfinite(moments).all()
+    for p in PROBABILITIES:
+        circular = float(circular_error(moments[np.newaxis], p)[0]) if finite else math.nan
+        linear = root_mean(heights**2) * critical_normal(1.0 - p)
+        of_moments |= {f"ce{round(100 * p)}": circular, f"le{round(100 * p)}": linear}
+    blocks = found.blocks(found.product)
+    ellipses, sd = blocks[in_plan, :2, :2], np.sqrt(blocks[in_height, 2, 2])
     tests = point_tests(found)
     return Figures(
         n=len(found),
@@ -133,8 +138,11 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
         inside=_inside(tests, in_height),
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
         moments=moments,
-        of_moments=_of_moments(moments, root_mean(heights**2)),
-        mixture=_mixture(found, in_plan, in_height),
+        of_moments=of_moments,
+        mixture={
+            "ce90": mixture_circular(ellipses, 0.9) if len(ellipses) else math.nan,
+            "le90": mixture_linear(sd, 0.9) if len(sd) else math.nan,
+        },
         surface=surface(found),
     )
 
@@ -174,34 +182,8 @@ def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
     found: dict[str, Radius | None] = {}
     for p in PROBABILITIES:
         for name, values in (("ce", plan), ("le", heights)):
-            key = f"{name}{round(100 * p)}"
-            if not len(values):
-                found[key] = None
-                continue
-            upper = upper_order(len(values), p)
+            upper = upper_order(len(values), p) if len(values) else None
             largest = None if upper is None else float(np.sort(values)[upper - 1])
-            found[key] = Radius(*sample_radius(values, p), upper, largest)
+            own = Radius(*sample_radius(values, p), upper, largest) if len(values) else None
+            found[f"{name}{round(100 * p)}"] = own
     return found
-
-
-def _moments(plan: Floats) -> Floats:
-    return plan.T @ plan / len(plan) if len(plan) else np.full((2, 2), np.nan)
-
-
-def _of_moments(moments: Floats, height: float) -> dict[str, float]:
-    found = {}
-    for p in PROBABILITIES:
-        name = str(round(100 * p))
-        known = np.isfinite(moments).all()
-        found[f"ce{name}"] = float(circular_error(moments[np.newaxis], p)[0]) if known else math.nan
-        found[f"le{name}"] = height * critical_normal(1.0 - p)
-    return found
-
-
-def _mixture(found: Compared, in_plan: np.ndarray, in_height: np.ndarray) -> dict[str, float]:
-    own = found.blocks(found.product)
-    plan, heights = own[in_plan, :2, :2], np.sqrt(own[in_height, 2, 2])
-    return {
-        "ce90": mixture_circular(plan, 0.9) if len(plan) else math.nan,
-        "le90": mixture_linear(heights, 0.9) if len(heights) else math.nan,
-    }

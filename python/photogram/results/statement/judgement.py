@@ -10,10 +10,9 @@ import numpy as np
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.statement.asprs import wording
 from photogram.results.statement.budget import budget_line
-from photogram.results.statement.comparison import Compared
-from photogram.results.statement.figures import Figures, Sized
+from photogram.results.statement.figures import Figures
 from photogram.results.statement.grounds import Grounds, Said, assumptions
-from photogram.results.statement.honest import LEVEL, Bias, PointTests, Prediction, Surface
+from photogram.results.statement.honest import LEVEL, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Asprs, Lengths
@@ -38,8 +37,6 @@ _CASES = {
 
 @dataclass(frozen=True)
 class Judged:
-    """What a statement says."""
-
     # Exit code, severity of the headline
     exit: int
     tone: Tone
@@ -52,8 +49,6 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """The evidence of the rules of a statement."""
-
     found: Grounds
     strict: bool
     control: Sequence[LeftOut]  # control points that disagree with the rest of the block
@@ -63,19 +58,16 @@ class _Evidence:
 
     @property
     def missed(self) -> bool:
-        """Whether the required accuracy is missed."""
         lengths = self.found.standards.lengths
         return "missed" in self.classes or (lengths is not None and lengths.test.met is False)
 
     @property
     def met(self) -> bool:
-        """Whether the required accuracy of lengths is met."""
         lengths = self.found.standards.lengths
         return lengths is not None and bool(lengths.test.met)
 
     @property
     def classes(self) -> list[str]:
-        """The verdicts on accuracy classes."""
         asprs = self.found.standards.asprs
         return [] if asprs is None else list(asprs.verdicts.values())
 
@@ -86,8 +78,6 @@ class _Evidence:
 
 
 def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
-    """Return a rule of a statement with the headline of a name."""
-
     def message(e: _Evidence) -> Phrase | None:
         if not holds(e):
             return None
@@ -308,8 +298,12 @@ def _remarks(found: Grounds) -> list[str]:
         said += _layout(texts, found.layout)
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
-    if shift is not None and heights is not None and _two_heights(found.compared, shift, heights):
-        said.append(texts("bias.heights", mean=shift.mean, sd=heights.sd))
+    if shift is not None and heights is not None and heights.n > 2:
+        # Two kinds of heights: all differences have one sign, are far from 0, and alike.
+        signs = np.sign(found.compared.differences[found.compared.counted[:, 2], 2])
+        alike = heights.sd < abs(shift.mean) / 3
+        if abs(signs.sum()) == len(signs) and abs(shift.z) > HEIGHT_KINDS and alike:
+            said.append(texts("bias.heights", mean=shift.mean, sd=heights.sd))
     return said
 
 
@@ -361,10 +355,3 @@ def _layout(texts: Texts, found: Layout) -> list[str]:
         (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
     ]
     return [texts(f"layout.{name}", **fields) for holds, name, fields in remarks if holds]
-
-
-def _two_heights(found: Compared, shift: Bias, own: Sized) -> bool:
-    """Return whether heights of two kinds may have been compared: all of one sign, far from 0, and alike."""
-    heights = found.differences[found.counted[:, 2], 2]
-    one_sign = bool((heights > 0).all() or (heights < 0).all())
-    return own.n > 2 and one_sign and abs(shift.z) > HEIGHT_KINDS and own.sd < abs(shift.mean) / 3

@@ -9,14 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
-from photogram.results.statement.request import invalid
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
 FAR = 1 / 3  # Distance from check points as a part of the diagonal
@@ -50,48 +47,33 @@ class Layout:
         return not self.least_spacing < SPACING_ASKED
 
 
-def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
-    """Return how check points lie in a block.
+def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
+    """Return how check points lie in a block; None if the positions of the block are at one place in plan.
 
-    `points` are (n, 3) east, north, height of the check points, n at least 1, a height that is not known NaN;
-    `extent` (m, 3) positions of all that the block has: its box and its hull are the block's; `control` (k,
-    3), perhaps none. Other shapes, no point, positions in plan that are not finite, or all at one place, are
-    refused.
+    `points` are (n, 3) east, north, height of the check points, n at least 1, NaN for unknown heights;
+    `extent` (m, 3) are the positions of the block, whose box and hull are the block's; `control` (k, 3).
     """
-    own, block, held = _plan("points", points, 1), _plan("extent", extent, 1), _plan("control", control, 0)
-    low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
+    own, block = points[:, :2], extent[:, :2]
+    low, high = block.min(axis=0), block.max(axis=0)
     diagonal = math.hypot(*(high - low))
     if not diagonal > 0:
-        raise invalid("extent", "request.identical-positions")
-    above = own[:, :2] > (low + high) / 2
+        return None
+    above = own > (low + high) / 2
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
     return Layout(
         len(own),
         diagonal,
         (float(quadrants[0]), float(quadrants[1]), float(quadrants[2]), float(quadrants[3])),
-        _least_spacing(own[:, :2]) / diagonal,
-        _far(own[:, :2], block[:, :2], FAR * diagonal),
-        _heights(own[:, 2], block[:, 2]),
-        int(outside(own[:, :2], hull(held[:, :2])).sum()) if len(held) else len(own),
+        _least_spacing(own) / diagonal,
+        _far(own, block, FAR * diagonal),
+        _heights(points[:, 2], extent[:, 2]),
+        int(outside(own, hull(control[:, :2])).sum()) if len(control) else len(own),
     )
 
 
-def area_in_plan(positions: ArrayLike) -> float:
+def area_in_plan(positions: Floats) -> float:
     """Return the area of the hull of (n, 2) or (n, 3) positions in plan, in the square of their unit."""
-    return area(hull(_plan("positions", positions, 1)[:, :2]))
-
-
-def _plan(name: str, given: ArrayLike, least: int) -> Floats:
-    """Return (n, 2 or more) positions that are finite in plan."""
-    found = numbers(name, given, missing=True)
-    if found.ndim != 2 or found.shape[1] not in (2, 3):
-        raise invalid(name, "error.shape", shape="(n, 3)", actual=str(found.shape))
-    if len(found) < least:
-        raise invalid(name, "error.empty")
-    bad = ~np.isfinite(found[:, :2]).all(axis=1)
-    if bad.any():
-        raise invalid(f"{name}[{np.argmax(bad)}]", "error.finite", found[bad][0, :2].tolist())
-    return found
+    return area(hull(positions[:, :2])) if len(positions) else 0.0
 
 
 def _least_spacing(plan: Floats) -> float:

@@ -11,16 +11,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import frozen, indices, is_covariance, names, numbers, shaped
-from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.statement.request import invalid
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
-from photogram.words import phrase
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
@@ -62,12 +58,10 @@ class LengthTest:
 
     @property
     def largest(self) -> float:
-        """Size of the largest error."""
         return float(np.abs(self.errors).max())
 
     @property
     def rms(self) -> float:
-        """Root mean square of the errors."""
         return math.sqrt(float(np.mean(self.errors**2)))
 
     @property
@@ -96,73 +90,54 @@ class LengthTest:
         return not self.off_diagonal > ALONG
 
 
-def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLike) -> tuple[Floats, Floats]:
+def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[Floats, Floats]:
     """Return (m,) distances between points, and their (m, m) joint covariance J C J'.
 
-    `positions` are (p, 3), `covariance` is (3 p, 3 p), point by point, cross blocks included, `pairs` are (m,
-    2) rows of the points of each length. Two points at one place are refused.
+    `positions` are (p, 3), `joint` is their (3 p, 3 p) covariance, `pairs` are (m, 2) rows of the points of
+    each length. Two points at one place are refused.
     """
-    own = numbers("positions", positions)
-    if own.ndim != 2 or own.shape[1] != 3:
-        raise invalid("positions", "error.shape", shape="(p, 3)", actual=str(own.shape))
-    joint = shaped("covariance", covariance, (own.size, own.size))
-    ends = numbers("pairs", pairs)
-    if ends.ndim != 2 or ends.shape[1] != 2:
-        raise invalid("pairs", "error.shape", shape="(m, 2)", actual=str(ends.shape))
-    count = len(ends)
-    first, second = (
-        indices(f"pairs[:, {end}]", np.asarray(pairs)[:, end], count, len(own)) for end in (0, 1)
-    )
-    steps = own[second] - own[first]
+    first, second = pairs.T
+    steps = positions[second] - positions[first]
     found = np.linalg.norm(steps, axis=1)
     if not (found > 0).all():
-        raise invalid(f"pairs[{np.argmin(found > 0)}]", "request.identical-positions")
-    along = steps / found[:, np.newaxis]
-    gradient = np.zeros((count, len(own), 3))
-    rows = np.arange(count)
+        raise invalid(f"lengths[{np.argmin(found > 0)}]", "request.identical-positions")
+    along, rows = steps / found[:, np.newaxis], np.arange(len(pairs))
+    gradient = np.zeros((len(pairs), *positions.shape))
     gradient[rows, second] += along
     gradient[rows, first] -= along
-    flat = gradient.reshape(count, own.size)
+    flat = gradient.reshape(len(pairs), -1)
     return found, np.asarray(flat @ joint @ flat.T)
 
 
-def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
-    """Return the smallest angle between lengths and the four diagonals of a box, radians.
+def angle_to_diagonal(steps: Floats, extent: Floats) -> float:
+    """Return the smallest angle between (m, 3) steps and the four diagonals of a box of (3,) extent, radians.
 
-    `steps` are (m, 3) from the one end of each length to the other, none zero; `extent` is (3,) of the box
-    along the same axes.
+    No step is zero.
     """
-    own, box = numbers("steps", steps), shaped("extent", extent, (3,))
-    if own.ndim != 2 or own.shape[1] != 3 or not len(own):
-        raise invalid("steps", "error.shape", shape="(m, 3)", actual=str(own.shape))
-    sizes = np.linalg.norm(own, axis=1) * float(np.linalg.norm(box))
-    if not (sizes > 0).all():
-        raise invalid("steps", "request.identical-positions")
+    sizes = np.linalg.norm(steps, axis=1) * float(np.linalg.norm(extent))
     # Of the four diagonals the one whose components have the signs of the step is the nearest.
-    nearest = float((np.abs(own) @ np.abs(box) / sizes).max())
-    return math.acos(min(nearest, 1.0))
+    return math.acos(min(float((np.abs(steps) @ np.abs(extent) / sizes).max()), 1.0))
 
 
-def at_reference(lengths: ArrayLike, temperatures: ArrayLike, expansion: float) -> Floats:
+def at_reference(lengths: Floats, temperatures: Floats, expansion: float) -> Floats:
     """Return what (m,) lengths of a body at some temperatures (deg C) are at 20 degrees Celsius.
 
     `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 of steel. One that makes a length
     of zero is refused.
     """
-    own = numbers("lengths", lengths)
-    grown = 1 + expansion * (shaped("temperatures", temperatures, own.shape) - REFERENCE)
+    grown = 1 + expansion * (temperatures - REFERENCE)
     if not (np.isfinite(grown) & (grown > 0)).all():
         raise invalid("expansion", "request.expansion", expansion)
-    return own / grown
+    return lengths / grown
 
 
 def length_test(
-    measured: ArrayLike,
-    calibrated: ArrayLike,
+    measured: Floats,
+    calibrated: Floats,
     *,
-    covariance: ArrayLike,
-    sd: ArrayLike,
-    lines: Sequence[object],
+    covariance: Floats,
+    sd: Floats,
+    lines: Sequence[str],
     limit: Limit | None = None,
     diagonal: float = math.nan,
     off_diagonal: float = math.nan,
@@ -171,40 +146,22 @@ def length_test(
     """Test (m,) measured lengths against calibrated ones, both at 20 degrees (:func:`at_reference`).
 
     `covariance` is the (m, m) joint one of the measured ones (:func:`measured_lengths`), `sd` are (m,)
-    standard deviations of the calibrated ones, `lines` (m,) names of the lines on which they lie. `diagonal`
-    and `off_diagonal` are of the volume that was measured: its diagonal, and the smallest angle between a
-    length and it (:func:`angle_to_diagonal`); NaN if unknown. `freedom` are degrees of freedom
-    with which the unit weight of the covariance was estimated. Arrays of other shapes, and what is no length,
-    are refused.
+    standard deviations of the calibrated ones, `lines` (m,) names of their lines. `diagonal` and
+    `off_diagonal` are of the measured volume: its diagonal, and the smallest angle between a length and it
+    (:func:`angle_to_diagonal`); NaN if unknown. `freedom` are degrees of freedom of the estimated unit weight
+    of the covariance.
     """
-    own = numbers("measured", measured)
-    if own.ndim != 1 or not own.size:
-        raise invalid("measured", "error.shape", shape="(m,)", actual=str(own.shape))
-    given = shaped("calibrated", calibrated, own.shape)
-    joint, deviations = shaped("covariance", covariance, 2 * own.shape), shaped("sd", sd, own.shape)
-    for name, values in (("measured", own), ("calibrated", given), ("sd", deviations)):
-        bad = ~(np.isfinite(values) & (values >= 0))
-        if bad.any():
-            raise invalid(f"{name}[{np.argmax(bad)}]", "error.not-negative", float(values[bad][0]))
-    if not is_covariance(joint, singular=True):
-        raise InputError(phrase("error.covariance-singular"))
-    on = names("lines", lines)
-    if len(on) != own.size:
-        raise invalid("lines", "error.count", count=own.size, actual=len(on))
-    errors = own - given
-    found = agreement(
-        errors[:, np.newaxis], joint, deviations[:, np.newaxis, np.newaxis] ** 2, second=freedom
-    )
+    errors = measured - calibrated
+    found = agreement(errors[:, np.newaxis], covariance, sd[:, np.newaxis, np.newaxis] ** 2, second=freedom)
     spread = found.sd[:, 0]
-    normalised = np.divide(errors, spread, out=np.full(own.shape, math.nan), where=spread > 0)
     return LengthTest(
-        frozen(errors),
-        frozen(spread),
-        frozen(normalised),
-        None if limit is None else frozen(limit.of(given)),
-        found.together,
-        len(set(on)),
-        min(on.count(each) for each in set(on)),
-        float(given.max()) / diagonal,
-        off_diagonal,
+        errors=errors,
+        sd=spread,
+        normalised=np.divide(errors, spread, out=np.full(errors.shape, math.nan), where=spread > 0),
+        limits=None if limit is None else limit.of(calibrated),
+        together=found.together,
+        lines=len(set(lines)),
+        least=min(lines.count(each) for each in set(lines)),
+        longest=float(calibrated.max()) / diagonal,
+        off_diagonal=off_diagonal,
     )

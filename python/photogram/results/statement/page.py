@@ -11,8 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
-from photogram.results.features import Features, unit_deviations
-from photogram.results.features_report import through
+from photogram.results.features import Features, through, unit_deviations
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.comparison import control_places, in_order
 from photogram.results.statement.document import kinds_of
@@ -26,7 +25,6 @@ from photogram.results.statement.tables import (
     check_points,
     decimals_for,
     left_out_points,
-    localized,
     removed_observations,
     test_lengths,
 )
@@ -297,7 +295,6 @@ _CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with 
 
 @np.errstate(over="ignore", invalid="ignore")
 def statement_document(statement: Statement) -> Document:
-    """Return the page of a statement, for the browser and for paper."""
     texts, asked, judged = statement.texts, statement.asked, statement.judged
     names = ("project", "client", "firm", "surveyor")
     head = [Fact(texts(f"page.{name}"), own) for name in names if (own := getattr(asked, name))]
@@ -307,15 +304,15 @@ def statement_document(statement: Statement) -> Document:
     mark = texts(f"mark.{tone or 'good'}")
     assumed = Remarks([text for _, text in judged.assumptions], 40)
     remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
+    sketch = partial(differences, statement.compared, control_places(statement.result.block), texts)
+    drawing = Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)
     return Document(
         what=texts("page.what"),
         title=asked.title or statement.result.block.title,
         judgements=[Judgement(mark, statement.headline, [text for _, text in judged.sentences], tone)],
         sections=[
-            Section(
-                "figures", texts("page.figures"), [*localized(texts, _figures(statement)), *_notes(statement)]
-            ),
-            Section("assumptions", texts("page.assumptions"), [assumed, _map(statement)]),
+            Section("figures", texts("page.figures"), [*_figures(statement), *_notes(statement)]),
+            Section("assumptions", texts("page.assumptions"), [assumed, drawing]),
             Section("remarks", texts("page.remarks"), remarks),
             Section("signature", "", [Text(texts("page.signature"))]),
             *annexes(statement),
@@ -326,6 +323,7 @@ def statement_document(statement: Statement) -> Document:
         contents=texts("page.contents"),
         more=texts("page.more", count="{}"),
         numbers=texts("page.numbers", number="{number}", total="{total}"),
+        numeral=texts.numeral,
     )
 
 
@@ -345,14 +343,18 @@ def _figures(statement: Statement) -> list[Part]:
         " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)
         for *_, predicted in shown
     ]
+    # Of parts that standards have: RMSE of the survey, and combined with that of the differences.
+    of_parts = {"plan": (own.rmse_h2, own.rmse_h), "h": (own.rmse_v2, own.rmse_v)}
+    of_parts["all"] = math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
+    surveys = [of_parts.get(part, (math.nan, math.nan)) for part, *_ in shown]
     quantities = [
         columns.text("component", [texts(f"component.{part}") for part, *_ in shown]),
         columns.number("n", [sized.n for _, sized, _ in shown]),
         *(number(key, [getattr(sized, key) for _, sized, _ in shown]) for key in ("mean", "sd", "rmse")),
         columns.text("interval", intervals),
         number("predicted", [predicted.predicted_rmse for *_, predicted in shown]),
-        number("survey", [_survey_rmse(own, part)[0] for part, *_ in shown]),
-        number("combined", [_survey_rmse(own, part)[1] for part, *_ in shown]),
+        number("survey", [survey for survey, _ in surveys]),
+        number("combined", [combined for _, combined in surveys]),
         number("largest", [sized.largest for _, sized, _ in shown]),
         columns.text("point", [sized.point for _, sized, _ in shown]),
     ]
@@ -370,17 +372,6 @@ def _figures(statement: Statement) -> list[Part]:
     return [Table("figures", texts("table.figures", unit=texts.unit), quantities)]
 
 
-def _survey_rmse(own: Figures, part: str) -> tuple[float, float]:
-    """Return RMSE of the survey, and combined with what was statement, of parts that standards have."""
-    if part == "plan":
-        return own.rmse_h2, own.rmse_h
-    if part == "h":
-        return own.rmse_v2, own.rmse_v
-    if part == "all":
-        return math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
-    return math.nan, math.nan
-
-
 def _notes(statement: Statement) -> list[Text]:
     """Return what the sum of squares of the ASPRS means."""
     texts, of_all, asprs = statement.texts, statement.of_all, statement.standards.asprs
@@ -394,9 +385,3 @@ def _notes(statement: Statement) -> list[Text]:
         own = math.nan if predicted is None else predicted.predicted_rmse_of_product
         fields[f"predicted_{name}"] = texts.length(own)
     return [Text(f"{texts('asprs.footnote')} {texts('asprs.product', **fields)}")]
-
-
-def _map(statement: Statement) -> Drawing:
-    texts, control = statement.texts, control_places(statement.result.block)
-    sketch = partial(differences, statement.compared, control, texts)
-    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)

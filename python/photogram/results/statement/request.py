@@ -189,10 +189,6 @@ def _limit(name: str, value: Any) -> tuple[float, float, float]:
     return values[0], values[1], values[2]
 
 
-def _lengths(name: str, value: Any) -> tuple[Mapping[str, Any], ...]:
-    return tuple(_length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value)))
-
-
 def _length(name: str, value: Any) -> dict[str, Any]:
     row = _mapping(name, value)
     for key in ("line", "from", "to", "length", "sd"):
@@ -200,13 +196,12 @@ def _length(name: str, value: Any) -> dict[str, Any]:
             raise invalid(name, "error.missing", name=key)
     line, first, last = names(name, [row[key] for key in ("line", "from", "to")])
     figures = {key: number(f"{name} {key}", row[key]) for key in ("length", "sd")}
+    for key, value in figures.items():
+        if not 0 <= value < math.inf:
+            raise invalid(f"{name} {key}", "error.not-negative", value)
     if row.get("temperature") is not None:
         figures["temperature"] = number(f"{name} temperature", row["temperature"])
     return {"line": line, "from": first, "to": last, **figures}
-
-
-def _quantities(name: str, value: Any) -> tuple[Any, ...]:
-    return (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
 
 
 def _components(name: str, value: object) -> object:
@@ -225,10 +220,14 @@ _CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
     "survey_common_sd": _three,
     "survey_common_in_control": truth_value,
     "text": _by_name(_text),
-    "budgets": _quantities,
+    "budgets": lambda name, value: (
+        (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
+    ),
     "coverage": number,
     "components": _components,
-    "lengths": _lengths,
+    "lengths": lambda name, value: tuple(
+        _length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value))
+    ),
     "limit": _limit,
     "expansion": number,
 }

@@ -13,9 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -35,7 +33,7 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.quantities import unknown
-from photogram.results.statement.request import Asked, invalid, lengths_in
+from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
 from photogram.words import phrase
@@ -83,7 +81,6 @@ class Asprs:
     left_out: Mapping[str, float]  # RMSE of control predicted by the others, `h` and `v`; NaN without
 
     def member(self, asked: Asked, metre: float) -> dict[str, Any]:
-        """Return what the JSON document has; `metre` is the linear unit in metres."""
         found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
         found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
         for name, each in self.figures.items():
@@ -115,7 +112,6 @@ class Nssda:
 
     @property
     def enough(self) -> bool:
-        """Whether there are as many check points as are asked for."""
         return self.count >= ENOUGH
 
     @property
@@ -126,8 +122,6 @@ class Nssda:
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """Calibrated lengths: which they are, and their test."""
-
     lines: Sequence[str]
     ends: Sequence[tuple[str, str]]
     calibrated: Floats
@@ -147,7 +141,6 @@ class Standards:
 
     @property
     def nssda_member(self) -> dict[str, Any] | None:
-        """What the JSON document has of the NSSDA."""
         if self.nssda is None:
             return None
         more = {"accuracy_r_unequal": "accuracy_r", "ce95": "ce95", "accuracy_z": "accuracy_z"}
@@ -168,7 +161,7 @@ def standards(
         asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
         if "asprs-2023" in asked.standards
         else None,
-        nssda=_nssda(of_all),
+        nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
         lengths=lengths,
         iso_19157=_iso(result, asked, of_all, lengths) if "iso-19157" in asked.standards else [],
     )
@@ -192,6 +185,7 @@ def _asprs(
     verdicts = {name: asprs.verdict(figures[name], size) for name, size in classes.items()}
     counts = [0 if own is None else own.count for own in (figures["h"], figures["v"])]
     plan, height = _control_rmse(result)
+    d = np.array([each.difference for each in left_out]).reshape(-1, 3)
     control: dict[str, bool] = {}
     if "h" in classes:
         good = asprs.control_good_enough(plan, height, classes["h"], classes.get("v"))
@@ -214,7 +208,7 @@ def _asprs(
         else asprs.remarks(
             np.where(found.counted, found.differences, np.nan), classes.get("h"), classes.get("v")
         ),
-        left_out=_left_out(left_out),
+        left_out={"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)},
     )
 
 
@@ -246,41 +240,21 @@ def _control_rmse(result: Result) -> tuple[float, float]:
     return root_mean(squares[:, :2].sum(axis=1)), root_mean(squares[:, 2])
 
 
-def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
-    if not found:
-        return {"h": math.nan, "v": math.nan}
-    d = np.array([each.difference for each in found])
-    return {"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)}
-
-
-def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
+def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     """Return the accuracy of `count` check points at 95 %.
 
     `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
-    on its diagonal; None where there are none in plan. `rmse_z` is that of the heights, in the linear unit;
-    None where there are none.
+    on its diagonal. `rmse_z` is that of the heights, in the linear unit. Both are NaN if there are none.
     """
-    if rmse_z is not None and not rmse_z >= 0:
-        raise invalid("rmse_z", "error.not-negative", rmse_z)
-    vertical = None if rmse_z is None else VERTICAL * rmse_z
-    if moments is None:
+    vertical = VERTICAL * rmse_z if math.isfinite(rmse_z) else None
+    if not np.isfinite(moments).all():
         return Nssda(count, None, None, None, None, vertical)
-    matrix = numbers("moments", moments)
-    if matrix.shape != (2, 2):
-        raise invalid("moments", "error.shape", shape="(2, 2)", actual=str(matrix.shape))
-    ce95 = float(circular_error(matrix[np.newaxis], 0.95)[0])
-    small, large = sorted(math.sqrt(each) for each in np.diag(matrix).tolist())
+    ce95 = float(circular_error(moments[np.newaxis], 0.95)[0])
+    small, large = sorted(math.sqrt(each) for each in np.diag(moments).tolist())
     ratio = small / large if large > 0 else 1.0
     mean = EITHER * (small + large) / 2
     equal = RADIAL * math.hypot(small, large)
     return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
-
-
-def _nssda(of_all: Figures | None) -> Nssda | None:
-    if of_all is None:
-        return None
-    moments = of_all.moments if np.isfinite(of_all.moments).all() else None
-    return nssda(moments, of_all.rmse_v1 if math.isfinite(of_all.rmse_v1) else None, of_all.n)
 
 
 def _lengths(result: Result, asked: Asked) -> Lengths:

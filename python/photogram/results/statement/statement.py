@@ -18,7 +18,6 @@ from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import (
     NOTHING,
-    Compared,
     Survey,
     System,
     compared,
@@ -29,7 +28,7 @@ from photogram.results.statement.document import budget_member, figures_member, 
 from photogram.results.statement.figures import figures
 from photogram.results.statement.grounds import Grounds, removed_observations
 from photogram.results.statement.judgement import Judged, judged
-from photogram.results.statement.layout import Layout, layout
+from photogram.results.statement.layout import layout
 from photogram.results.statement.leave_one_out import leave_one_out
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
@@ -41,8 +40,6 @@ from photogram.show.page import Document
 from photogram.show.quantity import records
 from photogram.show.run import InputFile
 from photogram.words import Phrase, phrase
-
-__all__ = ["Statement", "statement"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -254,6 +251,9 @@ def statement(
     taken_apart = budgets(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
+    # As they were given, those with both coordinates in plan.
+    checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
+    control = control_places(result.block)
     grounds = Grounds(
         result=result,
         asked=options,
@@ -265,7 +265,7 @@ def statement(
         left_out=tuple(left_out),
         taken_apart=tuple(taken_apart),
         standards=standards(result, options, found, of_all, of_vegetated, left_out),
-        layout=_layout(result, found),
+        layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
         removed=removed_observations(result, removed),
     )
     return Statement(
@@ -275,18 +275,6 @@ def statement(
         inputs=tuple(inputs),
         command=command,
     )
-
-
-def _layout(result: Result, found: Compared) -> Layout | None:
-    """Return how the check points lie in the box of control and check points as they were given."""
-    whole = np.isfinite(found.given[:, :2]).all(axis=1)
-    if not whole.any():
-        return None
-    checks, control = found.given_places[whole], control_places(result.block)
-    every = np.concatenate([checks, control]) if len(control) else checks
-    if not np.ptp(every[:, :2], axis=0).any():
-        return None
-    return layout(checks, every, control)
 
 
 check_arguments(globals(), ["statement"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,8 @@ from photogram.results.statement.budget import Budget
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
-from photogram.show.cells import written
-from photogram.show.page import Cell, Column, Part, Section, decimals_of
-from photogram.show.quantity import Axis, Quantity, Table, frame
+from photogram.show.page import Part, Section, decimals_of
+from photogram.show.quantity import Axis, Quantity, Table, column, frame, members
 
 if TYPE_CHECKING:
     from photogram import Statement
@@ -29,7 +27,7 @@ decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
 
 
 class Columns:
-    """Columns with heads in the language of a statement."""
+    """Columns with heads in the language of a statement; a name in files is also that in JSON documents."""
 
     def __init__(self, texts: Texts) -> None:
         self.texts = texts
@@ -38,54 +36,29 @@ class Columns:
         """Return the head of a column; text without a sentence stays."""
         return self.texts(f"column.{key}") if self.texts.has(f"column.{key}") else key
 
-    def text(self, key: str, values: Sequence[str], **more: Any) -> Quantity:
-        """Return a column of texts."""
-        return Quantity([*values], kind="name", head=self.head(key), **more)
+    def text(self, key: str, values: Sequence[str], name: str | None = None, **more: Any) -> Quantity:
+        return Quantity([*values], kind="name", name=name, member=name or "", head=self.head(key), **more)
 
     def number(
         self, key: str, values: Any, decimals: int | None = None, unit: str = "", **more: Any
     ) -> Quantity:
         """Return a column of numbers: in fixed point, or with significant figures."""
-        return Quantity(
-            values,
-            (Axis.of("", unit),) if unit else (),
-            **{"kind": "deviation" if unit else "number", "head": self.head(key), **more},
-            decimals=decimals,
-        )
+        own = {"kind": "deviation" if unit else "number", "head": self.head(key), "decimals": decimals}
+        axes = (Axis.of("", unit),) if unit else ()
+        return Quantity(values, axes, **{**own, "member": more.get("name", ""), **more})
 
     def directions(self, key: str, values: Floats, decimals: int, unit: str = "", **more: Any) -> Quantity:
         """Return columns for east, north and height of (n, 3) values."""
+        own = {"head": f"{self.head(key)} {{}}", "decimals": decimals, "member": more.get("name", "")}
         axes = tuple(
             Axis(name, unit, small=unit, label=self.texts(f"component.{name}")) for name in DIRECTIONS
         )
-        head = f"{self.head(key)} {{}}"
-        return Quantity(np.reshape(values, (-1, 3)), axes, "deviation", head=head, decimals=decimals, **more)
+        return Quantity(np.reshape(values, (-1, 3)), axes, "deviation", **{**own, **more})
 
 
 def annex(texts: Texts, letter: str, parts: Sequence[Part], intro: str = "") -> Section:
-    """Return an annex with numbers as the language writes them, without empty tables."""
-    return Section(f"annex-{letter}", texts(f"annex.{letter}"), localized(texts, parts), intro, annex=True)
-
-
-def localized(texts: Texts, parts: Sequence[Part]) -> list[Part]:
-    """Return parts of a page with numbers as the language writes them, without empty tables."""
-    found: list[Part] = []
-    for part in parts:
-        if not isinstance(part, Table):
-            found.append(part)
-        elif part.visible:
-            table = written(part)
-            rows = [[_localized(texts, *pair) for pair in row] for row in table.cells()]
-            found.append(replace(table, rows=rows))
-    return found
-
-
-def _localized(texts: Texts, column: Column, cell: Cell) -> Cell:
-    value = cell.sorts if isinstance(cell.value, str) else cell.value
-    if value is None:
-        return cell
-    sorts = value if math.isfinite(value) else None
-    return replace(cell, value=texts.numeral(column.written(cell.value)), sorts=sorts)
+    """Return an annex with the title and the key of its letter."""
+    return Section(f"annex-{letter}", texts(f"annex.{letter}"), parts, intro, annex=True)
 
 
 def check_points(statement: Statement) -> Table:
@@ -106,8 +79,8 @@ def check_points(statement: Statement) -> Table:
     covers = ["vegetated" if each else "open" for each in own.vegetated]
     plain, axes = partial(Quantity, kind="name"), tuple(map(Axis, DIRECTIONS))
     quantities = [
-        columns.text("point", names, name="point", member="point", marked=left_out),
-        plain(covers, name="cover", member="cover"),
+        columns.text("point", names, name="point", marked=left_out),
+        column("cover", covers, kind="name"),
         columns.text("cover", [texts(f"cover.{cover}") for cover in covers]),
         Quantity(own.given, member="given"),
         Quantity(statement.survey.checks, tuple(map(Axis, ("east", "north", "up"))), name=""),
@@ -115,20 +88,13 @@ def check_points(statement: Statement) -> Table:
         columns.directions("sd", sd, decimals, unit, name="sd", member="sd_predicted"),
         Quantity(adjusted, axes, "deviation", "sd_adjusted", "sd_adjusted"),
         Quantity(own.survey_sd, axes, "deviation", "sd_survey", "sd_survey"),
-        columns.directions("normalised", normalised, 1, name="normalised", member="normalised"),
-        columns.number("T", T, 1, name="T", member="T"),
-        columns.number("p", p, kind="probability", name="p", member="p", marked=p < limit),
-        columns.number(
-            "others",
-            others,
-            1,
-            name="T_from_the_others",
-            member="T_from_the_others",
-            marked=p_others < limit,
-        ),
+        columns.directions("normalised", normalised, 1, name="normalised"),
+        columns.number("T", T, 1, name="T"),
+        columns.number("p", p, kind="probability", name="p", marked=p < limit),
+        columns.number("others", others, 1, name="T_from_the_others", marked=p_others < limit),
         Quantity(p_others, member="p_from_the_others"),
-        columns.number("CE90", ce90, decimals, unit, name="ce90_predicted", member="ce90_predicted"),
-        columns.number("LE90", le90, decimals, unit, name="le90_predicted", member="le90_predicted"),
+        columns.number("CE90", ce90, decimals, unit, name="ce90_predicted"),
+        columns.number("LE90", le90, decimals, unit, name="le90_predicted"),
         plain(["no" if each else "yes" for each in left_out], name="used"),
         plain([statement.asked.without.get(name, "") for name in names], name="reason"),
     ]
@@ -136,7 +102,6 @@ def check_points(statement: Statement) -> Table:
 
 
 def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
-    """Return control points predicted by the others."""
     columns, unit = Columns(texts), texts.unit
     sd, difference = (np.array([getattr(each, name) for each in own]) for name in ("sd", "difference"))
     p, decimals = np.array([each.p for each in own]), decimals_for(sd)
@@ -145,14 +110,14 @@ def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
         name: [getattr(each, name) for each in own] for name in ("covariance", "redundancy", "eigenvalues")
     }
     quantities = [
-        columns.text("point", [each.point for each in own], name="point", member="point"),
+        columns.text("point", [each.point for each in own], name="point"),
         columns.directions(
             "difference", difference, decimals, unit, name="d", member="predicted_minus_survey"
         ),
-        columns.directions("sd", sd, decimals, unit, name="sd", member="sd"),
-        columns.number("T", [each.T for each in own], 1, name="T", member="T"),
-        Quantity([each.rank for each in own], name="rank", member="rank"),
-        columns.number("p", p, kind="probability", name="p", member="p", marked=p < limit_of(own)),
+        columns.directions("sd", sd, decimals, unit, name="sd"),
+        columns.number("T", [each.T for each in own], 1, name="T"),
+        column("rank", [each.rank for each in own]),
+        columns.number("p", p, kind="probability", name="p", marked=p < limit_of(own)),
         Quantity(least, name="least_eigenvalue"),
         *(Quantity(values, member=name) for name, values in only.items()),
     ]
@@ -165,7 +130,7 @@ def removed_observations(statement: Statement) -> Table:
     reasons, shown = [each.reason for each in statement.removed], MAX_REMOVED_OBSERVATIONS
     quantities = [
         Quantity([each.name for each in statement.removed], kind="name", name="observation", member="name"),
-        Quantity(reasons, kind="name", name="reason", member="reason"),
+        column("reason", reasons, kind="name"),
         columns.text("observation", [texts.text(each.subject) for each in statement.removed]),
         columns.text("reason", [texts(f"removed.{reason}") for reason in reasons]),
     ]
@@ -175,19 +140,15 @@ def removed_observations(statement: Statement) -> Table:
 
 
 def test_lengths(texts: Texts, own: Lengths) -> Table:
-    """Return calibrated lengths with their errors."""
     columns, test, decimals = Columns(texts), own.test, decimals_for(own.test.sd)
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
     limits = np.full(len(own.lines), math.nan) if test.limits is None else test.limits
     labels = [f"{line}: {' – '.join(ends)}" for line, ends in zip(own.lines, own.ends, strict=True)]
     quantities = [
         columns.text("line", labels),
-        *(
-            Quantity([*values], kind="name", member=name)
-            for name, values in zip(
-                ("line", "from", "to"), (own.lines, *np.transpose(own.ends).tolist()), strict=True
-            )
-        ),
+        Quantity([*own.lines], kind="name", member="line"),
+        Quantity([first for first, _ in own.ends], kind="name", member="from"),
+        Quantity([last for _, last in own.ends], kind="name", member="to"),
         number("length", own.calibrated, member="calibrated"),
         number("error", test.errors, member="error"),
         number("sd", test.sd, member="sd"),
@@ -220,23 +181,21 @@ def files_of_statement(statement: Statement) -> dict[str, bytes]:
 
 
 def _budget_file(budgets: Sequence[Budget]) -> bytes:
-    rows: list[tuple[Any, ...]] = []
+    rows: list[dict[str, Any]] = []
     for each in budgets:
-        head = (each.quantity, each.unit, each.value, each.sd)
+        head = {"quantity": each.quantity, "unit": each.unit, "value": each.value, "u": each.sd}
         basis = "estimated" if each.freedom.basis == "components" else "given"
         for own in each.sources:
-            nu = each.freedom.of_kind.get(own.name, math.nan) if own.level == "kind" else math.nan
-            named = basis if own.name in each.freedom.of_kind or basis == "given" else "given"
-            rows.append(
-                (*head, own.level, own.name, own.number, own.u, own.share, math.nan, math.nan, nu, named)
-            )
+            dof = each.freedom.of_kind.get(own.name, math.nan) if own.level == "kind" else math.nan
+            named = basis if own.name in each.freedom.of_kind else "given"
+            found = members(own, "level", "number", "share", source="name", u_k="u")
+            rows.append({**head, **found, "dof": dof, "taken_from": named})
         for one in each.largest:
-            source = " ".join(one.observation)
-            u = math.sqrt(one.contribution)
-            alone = (1, u, one.share, one.sensitivity, one.sd, math.nan, basis)
-            rows.append((*head, "observation", source, *alone))
+            found = {"level": "observation", "source": " ".join(one.observation), "number": 1}
+            found |= {"u_k": math.sqrt(one.contribution), **members(one, "share", "sensitivity", "sd")}
+            rows.append({**head, **found, "taken_from": basis})
     names = (
         *("quantity", "unit", "value", "u", "level", "source", "number", "u_k", "share"),
         *("sensitivity", "sd", "dof", "taken_from"),
     )
-    return csv_text({name: [row[k] for row in rows] for k, name in enumerate(names)}, [])
+    return csv_text({name: [row.get(name, math.nan) for row in rows] for name in names}, [])

@@ -81,7 +81,6 @@ class Texts(Words):
         return self.number(float(value), 0) if isinstance(value, int) else self.significant(value)
 
     def number(self, value: float, decimals: int) -> str:
-        """Return a number with so many decimals."""
         if not math.isfinite(value):
             return NOTHING if math.isnan(value) else "∞" if value > 0 else "-∞"
         return self.numeral(fixed(value, decimals))
@@ -93,7 +92,6 @@ class Texts(Words):
         return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
 
     def probability(self, value: float) -> str:
-        """Return a probability."""
         return self.numeral(probability_written(value))
 
     def numeral(self, written: str) -> str:

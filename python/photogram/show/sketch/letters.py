@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -12,6 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 
 Box: TypeAlias = tuple[float, float, float, float]  # Left, low, right and high side
+NOWHERE = np.empty((0, 2))
 # Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. Of the letters that
 # pages have it is the widest, so that what fits with it fits with the others.
 _ASCII = (
@@ -52,27 +53,38 @@ def wrapped(text: str, size: float, room: float) -> list[str]:
     return lines
 
 
-def free_side(
-    size: tuple[float, float],
-    place: tuple[float, float],
-    gap: float,
-    taken: Sequence[Box],
-    places: Floats,
-    room: Box,
-) -> Box | None:
-    """Return the box of a name at one of eight sides of its place; None if no side is free.
+def free_names(
+    texts: Sequence[str], places: Floats, avoid: Floats, size: float, room: Box, taken: list[Box]
+) -> Iterator[tuple[int, Box]]:
+    """Yield the rows and the boxes of names that have room at one of eight sides of their places.
 
-    It has a distance `gap` from the place, is within `room`, and covers neither `taken` boxes nor `places`.
+    Boxes are within `room` and cover no place, none to `avoid`, and no other of the boxes that are `taken`,
+    to which they are added; `size` of letters.
     """
-    (width, height), (x, y) = size, place
-    across = (x + gap, x - width / 2, x - gap - width)
-    up = (y + gap, y - height / 2, y - gap - height)
-    for i, j in ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2)):
-        box = left, low, right, high = across[i], up[j], across[i] + width, up[j] + height
+    obstacles, gap, high = np.concatenate([places, avoid]), 4.0 / 7.0 * size, 8.0 / 7.0 * size
+    for row, (text, (x, y)) in enumerate(zip(texts, places.tolist(), strict=True)):
+        wide = width(text, size) + 0.8 / 7.0 * size
+        across, up = (x + gap, x - wide / 2, x - gap - wide), (y + gap, y - high / 2, y - gap - high)
+        sides = ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2))
+        boxes = [(across[i], up[j], across[i] + wide, up[j] + high) for i, j in sides]
+        if box := first_free(boxes, room, taken, obstacles):
+            yield row, box
+
+
+def first_free(
+    boxes: Iterable[Box], room: Box, taken: list[Box], places: Floats = NOWHERE, gap: float = 0.0
+) -> Box | None:
+    """Return the first box within `room` that covers no place and has a gap from the boxes that are taken.
+
+    It is added to them.
+    """
+    for left, low, right, high in boxes:
         inside = room[0] <= left and right <= room[2] and room[1] <= low and high <= room[3]
-        hit = ((places > [left, low]) & (places < [right, high])).all(axis=1).any()
-        if inside and not hit and not any(overlap(box, other) for other in taken):
-            return box
+        if inside and not ((places > [left, low]) & (places < [right, high])).all(axis=1).any():
+            around = left - gap, low - gap, right + gap, high + gap
+            if not any(overlap(around, other) for other in taken):
+                taken.append((left, low, right, high))
+                return taken[-1]
     return None
 
 
@@ -93,6 +105,10 @@ class Ticks:
     texts: list[str]
     power: str = ""
 
+    def named(self, name: str) -> str:
+        """Return the name of the axis with the power of ten of its numbers."""
+        return f"{name} (× {self.power})".strip() if self.power else name
+
     def signed(self, decimal: str) -> Ticks:
         """Return the same with the decimal sign of a language."""
         return Ticks(self.values, [text.replace(".", decimal) for text in self.texts], self.power)
@@ -110,19 +126,18 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool
     if not extent > 0:
         return _written(np.array([low]), extent)
     least = extent / MAX_STEPS if across else max(extent / MAX_STEPS, 2.6 * size / max(length, 1e-9) * extent)
-    power = 10.0 ** math.floor(math.log10(least))
-    for step in (power * factor for factor in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)):
+    steps = 10.0 ** math.floor(math.log10(least)) * np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0])
+    for step in steps[steps >= least * (1 - 1e-9)].tolist():
         values = step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
         if len(values) < 2:
-            # An axis that is too short for two of these has its ends, or one of them.
-            ends = _written(np.array([low, high]), step / 10.0)
-            fit = not across or widest(ends.texts, size) + size < length
-            return ends if fit else _written(ends.values[:1], step / 10.0)
-        found = _written(values, step)
-        fits = not across or widest(found.texts, size) + 1.6 * size < step / extent * length
-        if step >= least * (1 - 1e-9) and fits:
             break
-    return found
+        found = _written(values, step)
+        if not across or widest(found.texts, size) + 1.6 * size < step / extent * length:
+            return found
+    # An axis that is too short for two of these has its ends, or one of them.
+    ends = _written(np.array([low, high]), step / 10.0)
+    fit = not across or widest(ends.texts, size) + size < length
+    return ends if fit else _written(ends.values[:1], step / 10.0)
 
 
 def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:

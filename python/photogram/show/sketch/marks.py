@@ -9,9 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.show.sketch.letters import NOWHERE
 from photogram.show.style import BLUE, INK, VERMILION
-
-NOWHERE = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -269,6 +268,11 @@ class Panel:
     log_up: bool = False
     shades: Shades | None = None  # Colour bar of the panel
     decimal: str = "."  # Decimal sign
+
+    @property
+    def labelled(self) -> list[Labelled]:
+        """Marks in the legend."""
+        return [mark for mark in self.marks if isinstance(mark, Labelled) and mark.label]
 
     def even(self, places: Floats) -> Floats:
         """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""

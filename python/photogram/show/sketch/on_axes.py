@@ -10,9 +10,9 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NOTE
-from photogram.show.sketch.letters import Box, free_side, width
+from photogram.show.sketch.letters import free_names
 from photogram.show.sketch.marks import Panel, Sketch
-from photogram.show.style import FAINT, INK, ORDERED, signed, styled
+from photogram.show.style import FAINT, INK, styled
 from photogram.words import phrase
 
 MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
@@ -129,10 +129,12 @@ def _colour_bar(axes: list[Any], shades: marks.Shades) -> None:
 
 
 def _colours(shades: marks.Shades) -> dict[str, Any]:
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
+    places, colours = marks.stops(shades.map)
+    steps = [*zip(places.tolist(), (colours / 255.0).tolist(), strict=True)]
     norm = (LogNorm if shades.log else Normalize)(shades.low, shades.high)
-    return {"cmap": signed() if shades.map == "signed" else ORDERED, "norm": norm}
+    return {"cmap": LinearSegmentedColormap.from_list(shades.map, steps), "norm": norm}
 
 
 def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
@@ -142,21 +144,15 @@ def _names(drawn: Sequence[tuple[Any, Panel]]) -> None:
     for axes, _ in named[:1] * 2:
         lay_out(axes.figure)
     for axes, mark in named:
-        point = axes.figure.dpi / 72.0
-        room: Box = axes.get_window_extent().extents
-        taken: list[Box] = []
-        at = axes.transData.transform(mark.places)
-        obstacles = np.concatenate([at, axes.transData.transform(mark.avoid)])
-        rows = zip(mark.places.tolist(), at.tolist(), mark.texts, mark.colours, strict=True)
-        for place, (x, y), text, colour in rows:
-            size = point * (width(text, NAME) + 2.0), point * (NAME + 2.0)
-            if box := free_side(size, (x, y), 4.0 * point, taken, obstacles, room):
-                taken.append(box)
-                shift = (box[0] - x) / point + 1.0, (box[1] - y) / point + 2.0
-                look = {"textcoords": "offset points", "fontsize": NAME, "color": colour}
-                name = axes.annotate(text, place, shift, **look)
-                name.set_in_layout(False)
-                name.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
+        point, at = axes.figure.dpi / 72.0, axes.transData.transform(mark.places)
+        room, avoid = axes.get_window_extent().extents, axes.transData.transform(mark.avoid)
+        # The boxes that matplotlib draws are wider than the words.
+        for row, box in free_names(mark.texts, at, avoid, 1.1 * NAME * point, room, []):
+            shift = (box[0] - at[row, 0]) / point + 0.4, (box[1] - at[row, 1]) / point + 1.8
+            look = {"textcoords": "offset points", "fontsize": NAME, "color": mark.colours[row]}
+            name = axes.annotate(mark.texts[row], mark.places[row], shift, **look)
+            name.set_in_layout(False)
+            name.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
 
 
 def lay_out(whole: Any) -> None:

@@ -6,35 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.show.sketch.layout import (
-    BAR_LINE,
-    COLOUR_BAR,
-    GAP,
-    HEAD,
-    HEAD_LINE,
-    LABEL,
-    LEGEND,
-    LEGEND_LINE,
-    NOTE,
-    NOTE_LINE,
-    NUMBER,
-    SWATCH,
-    TITLE,
-    TITLE_LINE,
-    Placed,
-    above,
-    below,
-    below_axis,
-    heading,
-    labelled,
-    laid_out,
-    legend_box,
-    low_end,
-    named_axis,
-    right_end,
-    right_side,
-)
-from photogram.show.sketch.letters import Box, Ticks, ticks, widest, width
+from photogram.show.sketch import layout
+from photogram.show.sketch.layout import COLOUR_BAR, GAP, LABEL, LEGEND, LEGEND_LINE, NUMBER, SWATCH, Placed
+from photogram.show.sketch.letters import Box, ticks, widest, width
 from photogram.show.sketch.marks import Labelled, Panel, Shades, Sketch, hexadecimal, stops
 from photogram.show.sketch.svg_marks import (
     Attributes,
@@ -43,14 +17,17 @@ from photogram.show.sketch.svg_marks import (
     names,
     number,
     path,
+    place,
     sample,
     svg,
     text,
+    upwards,
 )
 from photogram.show.style import FAINT, INK, SETTINGS
 
 TICK_LENGTH = 3.5
 LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
+NAMED: Attributes = {"font_size": LABEL, "text_anchor": "middle"}
 
 
 def svg_of(sketch: Sketch, name: str, title: str) -> str:
@@ -58,155 +35,132 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
 
     Identifiers of its parts begin with `name`; `title` describes it for readers who cannot see it.
     """
-    panels = laid_out(sketch)
+    panels = layout.laid_out(sketch)
     if not panels:
         return ""
     parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
-    wide, high = max(map(right_end, panels)), max(map(low_end, panels))
+    wide, high = (max(ends) for ends in zip(*(placed.end for placed in panels), strict=True))
     if sketch.shades is not None:
         parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
-        wide = max(wide, max(map(right_side, panels)) + GAP + COLOUR_BAR)
-    if said := heading(sketch):
+        wide = max(wide, max(placed.right_side for placed in panels) + GAP + COLOUR_BAR)
+    if heading := layout.heading(sketch):
         x = min(each.box[0] for each in panels)
-        lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(said))
-        parts.append(element("g", {"fill": INK, "font_size": HEAD}, lines))
-        wide = max(wide, x + widest(said, HEAD))
-    look: Attributes = {"font_family": LETTERS, "font_size": NUMBER, "fill": "none"}
+        lines = "".join(text(x, layout.HEAD_LINE * (k + 0.75), line) for k, line in enumerate(heading))
+        parts.append(element("g", lines, fill=INK, font_size=layout.HEAD))
+        wide = max(wide, x + widest(heading, layout.HEAD))
+    content = element("g", "".join(parts), font_family=LETTERS, font_size=NUMBER, fill="none")
     size = f'viewBox="0 0 {wide + 2:.0f} {high + 2:.0f}" width="{96 / 72 * (wide + 2):.0f}"'
-    head = element("svg", {"role": "img", "aria_label": title}).removesuffix("/>")
-    return f'{head} xmlns="http://www.w3.org/2000/svg" {size}>{element("g", look, "".join(parts))}</svg>'
+    head = element("svg", role="img", aria_label=title).removesuffix("/>")
+    return f'{head} xmlns="http://www.w3.org/2000/svg" {size}>{content}</svg>'
 
 
 def _panel(placed: Placed, name: str) -> str:
-    left, top, right, low = placed.box
-    window: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
-    clip = element("clipPath", {"id": f"{name}-clip"}, element("rect", window))
-    marks = "".join(svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer))
+    panel, (left, _, _, low) = placed.panel, placed.box
+    clip = element("clipPath", element("rect", **place(*placed.box)), id=f"{name}-clip")
+    marks = "".join(svg(mark, placed) for mark in sorted(panel.marks, key=lambda each: each.layer))
     legend, taken = _legend(placed)
-    inside = element("g", {"clip_path": f"url(#{name}-clip)"}, marks) if marks else ""
+    inside = element("g", marks, clip_path=f"url(#{name}-clip)") if marks else ""
     written = levels_written(placed, taken)
-    words = [_axes(placed), _above(placed), written, legend, names(placed, taken), _notes(placed)]
-    bar = _colour_bar(placed.panel.shades, f"{name}-shades", [placed]) if placed.panel.shades else ""
-    return clip + inside + element("g", {"fill": INK}, "".join(words)) + bar
+    words = [_axes(placed), _above(placed), written, legend, names(placed, taken)]
+    if placed.notes:
+        heights = (low + placed.below + layout.NOTE_LINE * (k + 0.8) for k in range(len(placed.notes)))
+        lines = (text(left, y, line) for y, line in zip(heights, placed.notes, strict=True))
+        words.append(element("g", "".join(lines), font_size=layout.NOTE))
+    bar = _colour_bar(panel.shades, f"{name}-shades", [placed]) if panel.shades else ""
+    return clip + inside + element("g", "".join(words), fill=INK) + bar
 
 
 def _axes(placed: Placed) -> str:
     panel, (left, top, right, low) = placed.panel, placed.box
-    over = placed.at(
-        np.column_stack([placed.across.values, np.full(len(placed.across.values), panel.limits[0, 1])])
-    )
-    beside = placed.at(
-        np.column_stack([np.full(len(placed.up.values), panel.limits[0, 0]), placed.up.values])
-    )
+    x, y = panel.limits[0].tolist()
+    over = placed.at(np.column_stack(np.broadcast_arrays(placed.across.values, y)))[:, 0].tolist()
+    beside = placed.at(np.column_stack(np.broadcast_arrays(x, placed.up.values)))[:, 1].tolist()
     found = []
     if not panel.bare:
         lines = f"M{number(left)} {number(top)}V{number(low)}H{number(right)}"
-        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK_LENGTH}" for x in over[:, 0].tolist())
-        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK_LENGTH}" for y in beside[:, 1].tolist())
+        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK_LENGTH}" for x in over)
+        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK_LENGTH}" for y in beside)
         found.append(path(lines, fill="none", stroke=FAINT, stroke_width=0.8))
     if placed.numbered:
-        found.append(_across(placed.across, over[:, 0].tolist(), low, turned=panel.turned))
-    heights = (beside[:, 1] + 0.36 * NUMBER).tolist()
-    numbers = (text(left - 6.0, y, each) for y, each in zip(heights, placed.up.texts, strict=True))
-    found.append(element("g", {"text_anchor": "end"}, "".join(numbers)))
-    middle: Attributes = {"text_anchor": "middle", "font_size": LABEL}
+        found.append(_across(placed, over))
+    rows = zip(beside, placed.up.texts, strict=True)
+    numbers = "".join(text(left - 6.0, y + 0.36 * NUMBER, each) for y, each in rows)
+    found.append(element("g", numbers, text_anchor="end"))
     if panel.across:
-        down = low + below_axis(panel, placed.numbered) - 5.0
-        found.append(
-            text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
-        )
-    if up := named_axis(panel.up, placed.up.power):
-        x = left - 12.0 - placed.beside
-        y = 0.5 * (top + low)
-        found.append(text(x, y, up, **middle, transform=f"rotate(-90 {number(x)} {number(y)})"))
+        name, down = placed.across.named(panel.across), low + placed.axis_below - 5.0
+        found.append(text(0.5 * (left + right), down, name, **NAMED))
+    if name := placed.up.named(panel.up):
+        x, y = left - 12.0 - placed.beside, 0.5 * (top + low)
+        found.append(text(x, y, name, **NAMED, transform=upwards(x, y)))
     return "".join(found)
 
 
-def _across(given: Ticks, places: Sequence[float], low: float, *, turned: bool) -> str:
+def _across(placed: Placed, places: Sequence[float]) -> str:
     """Return numbers or names below an axis."""
-    if not turned:
-        written = (text(x, low + NUMBER + 4.0, each) for x, each in zip(places, given.texts, strict=True))
-        return element("g", {"text_anchor": "middle"}, "".join(written))
-    written = (
-        text(x, low + 5.0, each, transform=f"rotate(-90 {number(x)} {number(low + 5.0)})", dy=0.36 * NUMBER)
-        for x, each in zip(places, given.texts, strict=True)
-    )
-    return element("g", {"text_anchor": "end"}, "".join(written))
+    rows, low = zip(places, placed.across.texts, strict=True), placed.box[3]
+    if not placed.panel.turned:
+        level = "".join(text(x, low + NUMBER + 4.0, each) for x, each in rows)
+        return element("g", level, text_anchor="middle")
+    y = low + 5.0
+    turned = "".join(text(x, y, each, transform=upwards(x, y), dy=0.36 * NUMBER) for x, each in rows)
+    return element("g", turned, text_anchor="end")
 
 
 def _above(placed: Placed) -> str:
-    panel, (left, top, right, _) = placed.panel, placed.box
-    y = top - above(panel, placed.title)
-    found = []
-    for line in placed.title:
-        y += TITLE_LINE
-        found.append(text(left, y - 3.0, line, font_size=TITLE))
-    scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
-    for row, (length, colour, said) in enumerate(panel.bars):
-        y, end = top - 8.0 - BAR_LINE * (len(panel.bars) - 1 - row), left + scale * length
+    """Return title and scale bars over a box."""
+    panel, (left, top, _, _) = placed.panel, placed.box
+    first, found = top - placed.above - 3.0, []
+    for k, line in enumerate(placed.title, 1):
+        found.append(text(left, first + layout.TITLE_LINE * k, line, font_size=layout.TITLE))
+    for row, (length, colour, name) in enumerate(reversed(panel.bars)):
+        y, end = top - 8.0 - layout.BAR_LINE * row, left + placed.scale * length
         found.append(path(f"M{number(left)} {number(y)}H{number(end)}", stroke=colour, stroke_width=2.5))
-        found.append(text(end + 5.0, y + 0.36 * LEGEND, said, font_size=LEGEND))
+        found.append(text(end + 5.0, y + 0.36 * LEGEND, name, font_size=LEGEND))
     return "".join(found)
 
 
-def _notes(placed: Placed) -> str:
-    y = placed.box[3] + below(placed.panel, placed.numbered)
-    lines = (text(placed.box[0], y + NOTE_LINE * (k + 0.8), each) for k, each in enumerate(placed.notes))
-    return element("g", {"font_size": NOTE}, "".join(lines)) if placed.notes else ""
-
-
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    marks = labelled(placed.panel)
-    if not placed.panel.legend or not marks:
+    """Return a legend and the boxes that it covers."""
+    marks, where = placed.panel.labelled, placed.panel.legend
+    if not where or not marks:
         return "", []
-    if placed.panel.legend == "above":
+    if where == "above":
         found, x, y = [], placed.box[2], placed.box[1] - 6.0 - 0.5 * LEGEND_LINE
         for mark in reversed(marks):
             x -= SWATCH + 6.0 + width(mark.label, LEGEND) + GAP
             found.append(_entry(mark, x, y))
         return "".join(found), []
-    box = legend_box(placed)
-    entries = (_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks))
-    ground: Attributes = {"x": box[0], "y": box[1], "width": box[2] - box[0], "height": box[3] - box[1]}
-    behind = (
-        element("rect", {**ground, "fill": "white", "opacity": 0.85})
-        if placed.panel.legend not in ("beside", "below")
-        else ""
-    )
-    return behind + "".join(entries), [box]
+    box = placed.legend
+    entries = [_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks)]
+    if where not in ("beside", "below"):
+        entries.insert(0, element("rect", **place(*box), fill="white", opacity=0.85))
+    return "".join(entries), [box]
 
 
 def _entry(mark: Labelled, x: float, y: float) -> str:
     """Return a sample of a mark and its name, their middle at a height."""
-    panel = Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]]))
-    none = Ticks(np.empty(0), [])
-    own = Placed(panel, (x, y - 4.0, x + SWATCH, y + 4.0), none, none, False, [], [])
-    said = text(x + SWATCH + 6.0, y + 0.36 * LEGEND, mark.label, font_size=LEGEND)
-    return element("g", {"fill": "none"}, svg(sample(mark), own)) + said
+    own = Placed(Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]])), (x, y - 4.0, x + SWATCH, y + 4.0))
+    name = text(x + SWATCH + 6.0, y + 0.36 * LEGEND, mark.label, font_size=LEGEND)
+    return element("g", svg(sample(mark), own), fill="none") + name
 
 
 def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     """Return a bar of colours with numbers beside it, at the right of panels."""
     top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
-    left = max(map(right_side, beside)) + GAP
+    left = max(each.right_side for each in beside) + GAP
     right = left + 9.0
-    places, colours = stops(shades.map)
     steps = (
-        element("stop", {"offset": place, "stop_color": hexadecimal(colour.astype(np.int64))})
-        for place, colour in zip(places.tolist(), colours, strict=True)
+        element("stop", offset=where, stop_color=hexadecimal(colour.astype(np.int64)))
+        for where, colour in zip(*stops(shades.map), strict=True)
     )
-    upwards: Attributes = {"id": name, "x1": 0.0, "x2": 0.0, "y1": 1.0, "y2": 0.0}
-    found = [element("linearGradient", upwards, "".join(steps))]
-    ground: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
-    found.append(element("rect", {**ground, "fill": f"url(#{name})"}))
-    ends = np.array([shades.low, shades.high])
-    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(beside[0].panel.decimal)
+    found = [element("linearGradient", "".join(steps), id=name, x1=0.0, x2=0.0, y1=1.0, y2=0.0)]
+    found.append(element("rect", **place(left, top, right, low), fill=f"url(#{name})"))
+    ends, decimal = np.array([shades.low, shades.high]), beside[0].panel.decimal
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(decimal)
     heights = low - shades.parts(given.values) * (low - top)
-    for y, said in zip(heights.tolist(), given.texts, strict=True):
+    for y, value in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK_LENGTH}", stroke=FAINT, stroke_width=0.8))
-        found.append(text(right + 6.0, y + 0.36 * NUMBER, said, fill=INK))
+        found.append(text(right + 6.0, y + 0.36 * NUMBER, value, fill=INK))
     x, y = left + COLOUR_BAR - 8.0, 0.5 * (top + low)
-    turned = f"rotate(-90 {number(x)} {number(y)})"
-    look: Attributes = {"fill": INK, "font_size": LABEL, "text_anchor": "middle", "transform": turned}
-    found.append(text(x, y, shades.label, **look))
+    found.append(text(x, y, shades.label, **NAMED, fill=INK, transform=upwards(x, y)))
     return "".join(found)

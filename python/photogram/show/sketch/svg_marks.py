@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from functools import singledispatch
+from collections.abc import Iterator
 from html import escape
 from typing import Any, TypeAlias
 
@@ -13,47 +13,39 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
+from photogram.show.sketch import marks
 from photogram.show.sketch.layout import NAME, NUMBER, Placed
-from photogram.show.sketch.letters import Box, free_side, overlap, width
-from photogram.show.sketch.marks import (
-    Arrows,
-    Contours,
-    Ellipses,
-    Labelled,
-    Level,
-    Line,
-    Mark,
-    Markers,
-    Mesh,
-    Names,
-    Polygons,
-    Shades,
-    Texts,
-    hexadecimal,
-    rgb,
-)
+from photogram.show.sketch.letters import Box, first_free, free_names, width
+from photogram.show.sketch.marks import Labelled, Shades, hexadecimal, rgb
+from photogram.show.style import need
 
+Attributes: TypeAlias = dict[str, str | float]
 COLOURS_OF_MAP = 48
 MIN_LABELLED_LENGTH = 30.0  # Points of a line on which its level is written
 MIN_GAP = 4.0  # Points between levels that are written
 MAX_EXACT_PLACES = 300  # Lines of more places have coordinates in tenths of a point, others in hundredths
 MAX_COORDINATE = 1e5  # Points
 DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}  # Strokes and gaps in widths of the line
-# Directions of the corners of a star from the top, outer and inner in turn
-STAR = np.stack([np.sin(np.pi / 5 * np.arange(10)), -np.cos(np.pi / 5 * np.arange(10))], axis=1)
+_POINTS = np.pi / 5 * np.arange(10)
+# Corners of signs in halves of their size; a star has outer and inner corners in turn.
+CORNERS = {
+    "^": np.array([[0.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    "s": np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    "D": np.sqrt(2.0) * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
+    "*": np.resize([1.0, 0.38], (10, 1)) * np.stack([np.sin(_POINTS), -np.cos(_POINTS)], axis=1),
+}
 # Of words over other things
-HALO: dict[str, str | float] = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
-Attributes: TypeAlias = dict[str, str | float]
+HALO: Attributes = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
 
 
-def element(name: str, attributes: Attributes, content: str = "") -> str:
-    """Return an element; attributes that say nothing are left out."""
-    said = "".join(
+def element(name: str, content: str = "", /, **attributes: str | float) -> str:
+    """Return an element without attributes that are empty."""
+    written = "".join(
         f' {key.replace("_", "-")}="{escape(value) if isinstance(value, str) else number(value)}"'
         for key, value in attributes.items()
         if value != ""
     )
-    return f"<{name}{said}>{content}</{name}>" if content else f"<{name}{said}/>"
+    return f"<{name}{written}>{content}</{name}>" if content else f"<{name}{written}/>"
 
 
 def number(value: float) -> str:
@@ -63,12 +55,22 @@ def number(value: float) -> str:
 
 def text(x: float, y: float, words: str, **attributes: str | float) -> str:
     """Return words whose line begins at a place, or as `text_anchor` says."""
-    return element("text", {"x": x, "y": y, **attributes}, escape(words))
+    return element("text", escape(words), x=x, y=y, **attributes)
 
 
 def path(data: str, **attributes: str | float) -> str:
     """Return a path; nothing where it has no data."""
-    return element("path", {"d": data, **attributes}) if data else ""
+    return element("path", d=data, **attributes) if data else ""
+
+
+def place(left: float, top: float, right: float, low: float) -> Attributes:
+    """Return the attributes of a rectangle."""
+    return {"x": left, "y": top, "width": right - left, "height": low - top}
+
+
+def upwards(x: float, y: float) -> str:
+    """Return the rotation of words that are read upwards from a place."""
+    return f"rotate(-90 {number(x)} {number(y)})"
 
 
 def joined(places: Floats, end: str = "") -> str:
@@ -84,14 +86,38 @@ def _each(places: Floats, sign: str) -> str:
     return "".join(f"M{x} {y}{sign}" for x, y in found)
 
 
-@singledispatch
-def svg(mark: Mark, placed: Placed) -> str:
-    """Return a mark on a panel."""
-    raise TypeError(f"cannot draw {type(mark).__name__}")
+def svg(mark: marks.Mark, placed: Placed) -> str:
+    """Return a mark on a panel; `Names` come last, and are not cut at the sides of the panel."""
+    match mark:
+        case marks.Markers():
+            return _markers(mark, placed)
+        case marks.Line():
+            at, look = placed.at(mark.places), {**_stroke(mark, mark.dash), "opacity": _opacity(mark)}
+            return path("".join(map(joined, at if at.ndim > 2 else [at])), **look, stroke_linejoin="round")
+        case marks.Level():
+            height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
+            data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
+            return path(data, **_stroke(mark, mark.dash))
+        case marks.Arrows():
+            return _arrows(mark, placed)
+        case marks.Polygons():
+            return _polygons(mark, placed)
+        case marks.Ellipses():
+            return _ellipses(mark, placed)
+        case marks.Mesh():
+            return _mesh(mark, placed)
+        case marks.Contours():
+            return _contours(mark, placed)
+        case marks.Texts():
+            rows = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
+            found = [text(x, y + 0.36 * mark.size, words, fill=colour) for (x, y), words, colour in rows]
+            return element("g", "".join(found), font_size=mark.size, text_anchor=mark.anchor)
+        case marks.Names():
+            return ""
+    raise TypeError(f"the renderer for SVG does not draw {type(mark).__name__}")
 
 
-@svg.register(Markers)
-def _markers(mark: Markers, placed: Placed) -> str:
+def _markers(mark: marks.Markers, placed: Placed) -> str:
     low, high = np.sort(placed.panel.limits, axis=0)
     inside = ((mark.places >= low) & (mark.places <= high)).all(axis=1)
     at = placed.at(mark.places[inside])
@@ -106,60 +132,35 @@ def _markers(mark: Markers, placed: Placed) -> str:
     return "".join(found)
 
 
-def _signs(mark: Markers, at: Floats, colour: str) -> str:
-    size, half = mark.size, number(0.5 * mark.size)
-    opacity: str | float = mark.opacity if mark.opacity < 1 else ""
+def _signs(mark: marks.Markers, at: Floats, colour: str) -> str:
+    size, half = number(mark.size), number(0.5 * mark.size)
+    look: Attributes = {"stroke": colour, "stroke_width": mark.edge, "opacity": _opacity(mark)}
     if mark.shape == "." or (mark.shape == "o" and not mark.face):
         # Half of the size and an outline: what matplotlib makes of a `.`.
-        across = size if mark.shape == "o" else 0.5 * size + mark.edge
-        look: Attributes = {"stroke": colour, "stroke_width": across, "stroke_linecap": "round"}
-        return path(_each(at, "h0"), **look, opacity=opacity)
+        look["stroke_width"] = mark.size if mark.shape == "o" else 0.5 * mark.size + mark.edge
+        return path(_each(at, "h0"), **look, stroke_linecap="round")
+    start = np.array([-0.5 * mark.size, 0.0])
     if mark.shape == "+":
-        data = _each(at - [0.5 * size, 0.0], f"h{number(size)}m-{half}-{half}v{number(size)}")
-        return path(data, stroke=colour, stroke_width=mark.edge, opacity=opacity)
-    diagonal = number(np.sqrt(0.5) * size)
-    star = np.tile([0.5 * size, 0.19 * size], 5)[:, np.newaxis] * STAR
-    corners = "".join(f"l{x:.2f} {y:.2f}" for x, y in np.diff(star, axis=0).tolist())
-    shift, sign = {
-        "*": (star[0], f"{corners}z"),
-        "o": (
-            [-0.5 * size, 0.0],
-            f"a{half} {half} 0 1 0 {number(size)} 0a{half} {half} 0 1 0 -{number(size)} 0z",
-        ),
-        "^": ([0.0, -0.5 * size], f"l{half} {number(size)}h-{number(size)}z"),
-        "s": ([-0.5 * size, -0.5 * size], f"h{number(size)}v{number(size)}h-{number(size)}z"),
-        "D": (
-            [0.0, -np.sqrt(0.5) * size],
-            f"l{diagonal} {diagonal}l-{diagonal} {diagonal}l-{diagonal}-{diagonal}z",
-        ),
-    }[mark.shape]
-    look = {"fill": mark.face or colour, "stroke": colour, "stroke_width": mark.edge, "opacity": opacity}
-    return path(_each(at + shift, sign), **look)
+        return path(_each(at + start, f"h{size}m-{half}-{half}v{size}"), **look)
+    if mark.shape == "o":
+        sign = f"a{half} {half} 0 1 0 {size} 0a{half} {half} 0 1 0 -{size} 0z"
+    else:
+        start, *_ = corners = 0.5 * mark.size * CORNERS[mark.shape]
+        steps = np.diff(corners, axis=0).tolist()
+        sign = "".join(f"l{number(x)} {number(y)}" for x, y in steps) + "z"
+    return path(_each(at + start, sign), fill=mark.face or colour, **look)
 
 
-def _stroke(colour: str, wide: float, dash: str = "") -> Attributes:
-    dashes = " ".join(number(wide * each) for each in DASHES[dash]) if dash else ""
-    return {"stroke": colour, "stroke_width": wide, "stroke_dasharray": dashes}
+def _opacity(mark: marks.Markers | marks.Line) -> str | float:
+    return mark.opacity if mark.opacity < 1 else ""
 
 
-@svg.register(Line)
-def _line(mark: Line, placed: Placed) -> str:
-    opacity: str | float = mark.opacity if mark.opacity < 1 else ""
-    look = _stroke(mark.colour, mark.width, mark.dash)
-    if mark.places.ndim > 2:
-        return path("".join(map(joined, placed.at(mark.places))), **look, opacity=opacity)
-    return path(joined(placed.at(mark.places)), **look, opacity=opacity, stroke_linejoin="round")
+def _stroke(mark: marks.Line | marks.Level | marks.Ellipses, dash: str = "") -> Attributes:
+    dashes = " ".join(number(mark.width * each) for each in DASHES.get(dash, ()))
+    return {"stroke": mark.colour, "stroke_width": mark.width, "stroke_dasharray": dashes}
 
 
-@svg.register(Level)
-def _level(mark: Level, placed: Placed) -> str:
-    height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
-    data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
-    return path(data, **_stroke(mark.colour, mark.width, mark.dash))
-
-
-@svg.register(Arrows)
-def _arrows(mark: Arrows, placed: Placed) -> str:
+def _arrows(mark: marks.Arrows, placed: Placed) -> str:
     thick = mark.width * (placed.box[2] - placed.box[0])
     tails, ends = placed.at(mark.places), placed.at(mark.places + mark.vectors)
     lengths = np.hypot(*(ends - tails).T)
@@ -181,33 +182,22 @@ def _arrows(mark: Arrows, placed: Placed) -> str:
     return "".join(found)
 
 
-@svg.register(Polygons)
-def _polygons(mark: Polygons, placed: Placed) -> str:
+def _polygons(mark: marks.Polygons, placed: Placed) -> str:
     outlines = [joined(each, "z") for each in placed.at(mark.places)]
     if not mark.edge:
         return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
-    look: Attributes = {
-        "fill": mark.face,
-        "fill_opacity": f"{mark.face_opacity:.3g}",
-        "stroke": mark.edge,
-        "stroke_opacity": mark.edge_opacity,
-        "stroke_width": mark.width,
-    }
+    inside: Attributes = {"fill": mark.face, "fill_opacity": f"{mark.face_opacity:.3g}"}
+    edge: Attributes = {"stroke": mark.edge, "stroke_opacity": mark.edge_opacity, "stroke_width": mark.width}
     # Each by itself: where many lie over each other, it is darker.
-    return element("g", look, "".join(map(path, outlines)))
+    return element("g", "".join(map(path, outlines)), **inside, **edge)
 
 
-@svg.register(Ellipses)
-def _ellipses(mark: Ellipses, placed: Placed) -> str:
-    turn = np.radians(mark.angles)[:, np.newaxis]
+def _ellipses(mark: marks.Ellipses, placed: Placed) -> str:
+    turn, middle = np.radians(mark.angles)[:, np.newaxis], placed.at(mark.places)
     along, across = (
-        semi[:, np.newaxis] * np.column_stack(ways)
-        for semi, ways in zip(
-            mark.semi_axes.T, ((np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))), strict=True
-        )
+        placed.at(mark.places + semi[:, np.newaxis] * np.hstack([np.cos(angle), np.sin(angle)])) - middle
+        for semi, angle in zip(mark.semi_axes.T, (turn, turn + np.pi / 2), strict=True)
     )
-    middle = placed.at(mark.places)
-    along, across = placed.at(mark.places + along) - middle, placed.at(mark.places + across) - middle
     turned = np.degrees(np.arctan2(along[:, 1], along[:, 0]))
     rows = np.column_stack([middle + along, np.hypot(*along.T), np.hypot(*across.T), turned, -2 * along])
     data = "".join(
@@ -215,27 +205,22 @@ def _ellipses(mark: Ellipses, placed: Placed) -> str:
         f"a{a:.2f} {b:.2f} {angle:.1f} 1 0 {-u:.2f} {-v:.2f}z"
         for x, y, a, b, angle, u, v in rows.tolist()
     )
-    if mark.fill:
-        return path(data, fill=mark.colour, opacity=mark.fill)
-    return path(data, **_stroke(mark.colour, mark.width))
+    return path(data, fill=mark.colour, opacity=mark.fill) if mark.fill else path(data, **_stroke(mark))
 
 
-@svg.register(Mesh)
-def _mesh(mark: Mesh, placed: Placed) -> str:
+def _mesh(mark: marks.Mesh, placed: Placed) -> str:
     (x, y), (to_x, to_y) = placed.at(mark.corners).tolist()
     values = mark.values[:: 1 if y < to_y else -1, :: 1 if x < to_x else -1]
     there = np.isfinite(values)
     colours = rgb(mark.shades, np.where(there, values, mark.shades.low))
     content = _png(np.concatenate([colours, 255 * there[:, :, np.newaxis]], axis=2))
-    place: Attributes = {
-        "x": min(x, to_x),
-        "y": min(y, to_y),
-        "width": abs(to_x - x),
-        "height": abs(to_y - y),
-    }
-    look: Attributes = {"preserveAspectRatio": "none", "style": "image-rendering:pixelated"}
-    address = f"data:image/png;base64,{base64.b64encode(content).decode()}"
-    return element("image", {**place, **look, "href": address})
+    return element(
+        "image",
+        **place(min(x, to_x), min(y, to_y), max(x, to_x), max(y, to_y)),
+        preserveAspectRatio="none",
+        style="image-rendering:pixelated",
+        href=f"data:image/png;base64,{base64.b64encode(content).decode()}",
+    )
 
 
 def _png(pixels: Indices) -> bytes:
@@ -251,70 +236,41 @@ def _png(pixels: Indices) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
-@svg.register(Texts)
-def _texts(mark: Texts, placed: Placed) -> str:
-    words = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
-    found = (text(x, y + 0.36 * mark.size, said, fill=colour) for (x, y), said, colour in words)
-    return element("g", {"font_size": mark.size, "text_anchor": mark.anchor}, "".join(found))
-
-
-@svg.register(Names)
-def _later(mark: Names, placed: Placed) -> str:
-    """Return nothing: names come last, and are not cut at the sides of the panel."""
-    return ""
-
-
 def names(placed: Placed, taken: list[Box]) -> str:
     """Return the names on a panel, which keep clear of each other and of boxes that are taken."""
-    found = []
     left, top, right, low = placed.box
     # As if upwards: names are tried above their places first.
-    taken = [(box[0], -box[3], box[2], -box[1]) for box in taken]
+    found, taken = [], [(box[0], -box[3], box[2], -box[1]) for box in taken]
     for mark in placed.panel.marks:
-        if not isinstance(mark, Names):
-            continue
-        at, avoid = (placed.at(each) * [1.0, -1.0] for each in (mark.places, mark.avoid))
-        obstacles, room = np.concatenate([at, avoid]), (left, -low, right, -top)
-        for place, said, colour in zip(at.tolist(), mark.texts, mark.colours, strict=True):
-            size = (width(said, NAME) + 0.8, NAME + 1.0)
-            box = free_side(size, (place[0], place[1]), 4.0, taken, obstacles, room)
-            if box is not None:
-                taken.append(box)
-                found.append(text(box[0] + 0.4, -box[1] - 1.8, said, fill=colour))
-    return element("g", {"font_size": NAME, "stroke_width": 1.6, **HALO}, "".join(found)) if found else ""
+        if isinstance(mark, marks.Names):
+            at, avoid = (placed.at(each) * [1.0, -1.0] for each in (mark.places, mark.avoid))
+            for row, box in free_names(mark.texts, at, avoid, NAME, (left, -low, right, -top), taken):
+                found.append(text(box[0] + 0.4, -box[1] - 1.8, mark.texts[row], fill=mark.colours[row]))
+    return element("g", "".join(found), font_size=NAME, stroke_width=1.6, **HALO) if found else ""
 
 
 def sample(mark: Labelled) -> Labelled:
     """Return what a legend shows of a mark, on a panel of 16 by 8 points."""
     line = np.array([[0.0, 4.0], [16.0, 4.0]])
-    if isinstance(mark, Markers):
+    if isinstance(mark, marks.Markers):
         return replace(mark, places=np.array([[8.0, 4.0]]), size=max(mark.size, 4.0), values=None)
-    if isinstance(mark, Line):
+    if isinstance(mark, marks.Line):
         return replace(mark, places=line if mark.places.ndim == 2 else line[np.newaxis])
-    if isinstance(mark, Arrows):
+    if isinstance(mark, marks.Arrows):
         return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3 / 16.0)
-    assert isinstance(mark, Polygons)
+    assert isinstance(mark, marks.Polygons)
     return replace(mark, places=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
 
 
-def _generator(mark: Contours) -> Any:
-    try:
-        from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
-    except ModuleNotFoundError:
-        message = "contours need contourpy: pip install 'photogram[report]'"
-        raise ModuleNotFoundError(message, name="contourpy") from None
+def _generator(mark: marks.Contours) -> Any:
+    need("contourpy", "contours", "report")
+    from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
 
-    return contour_generator(
-        mark.across,
-        mark.up,
-        np.ma.masked_invalid(mark.values),
-        fill_type=FillType.OuterOffset,
-        line_type=LineType.Separate,
-    )
+    kinds: Any = {"fill_type": FillType.OuterOffset, "line_type": LineType.Separate}
+    return contour_generator(mark.across, mark.up, np.ma.masked_invalid(mark.values), **kinds)
 
 
-@svg.register(Contours)
-def _contours(mark: Contours, placed: Placed) -> str:
+def _contours(mark: marks.Contours, placed: Placed) -> str:
     made, bounds, found = _generator(mark), mark.bounds, []
     below, beyond = np.nanmin(mark.values) - 1.0, max(np.nanmax(mark.values), bounds[-1]) + 1.0
     middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
@@ -335,30 +291,21 @@ def _contours(mark: Contours, placed: Placed) -> str:
 def levels_written(placed: Placed, taken: list[Box]) -> str:
     """Return the levels of contours on their lines; the room that they take is added to what is taken."""
     found = []
-    for mark in placed.panel.marks:
-        if not isinstance(mark, Contours):
-            continue
+    for mark in (each for each in placed.panel.marks if isinstance(each, marks.Contours)):
         made = _generator(mark)
         for level in mark.levels.tolist():
-            said = f"{level:g}".replace("-", "−")
+            written = f"{level:g}".replace("-", "−")
             for line in made.lines(level):
-                if (box := _free(placed.at(line), width(said, NUMBER), placed.box, taken)) is not None:
-                    taken.append(box)
-                    found.append(text(0.5 * (box[0] + box[2]), box[3] - 0.14 * NUMBER, said))
-    look = {"font_size": NUMBER, "text_anchor": "middle", "stroke_width": 2.0, **HALO}
-    return element("g", look, "".join(found)) if found else ""
+                boxes = _along(placed.at(line), width(written, NUMBER))
+                if box := first_free(boxes, placed.box, taken, gap=MIN_GAP):
+                    found.append(text(0.5 * (box[0] + box[2]), box[3] - 0.14 * NUMBER, written))
+    look: Attributes = {"font_size": NUMBER, "text_anchor": "middle", "stroke_width": 2.0, **HALO}
+    return element("g", "".join(found), **look) if found else ""
 
 
-def _free(line: Floats, wide: float, room: Box, taken: list[Box]) -> Box | None:
-    """Return a box in the middle of a line, or nearer to its ends, that is within the room and free."""
+def _along(line: Floats, wide: float) -> Iterator[Box]:
+    """Yield boxes in the middle of a line and nearer to its ends; none of a short line."""
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    if lengths[-1] < MIN_LABELLED_LENGTH:
-        return None
-    for part in (0.5, 0.3, 0.7, 0.15, 0.85):
+    for part in (0.5, 0.3, 0.7, 0.15, 0.85) if lengths[-1] >= MIN_LABELLED_LENGTH else ():
         x, y = (float(np.interp(part * lengths[-1], lengths, own)) for own in line.T)
-        box = x - 0.5 * wide, y - 0.5 * NUMBER, x + 0.5 * wide, y + 0.5 * NUMBER
-        around = box[0] - MIN_GAP, box[1] - MIN_GAP, box[2] + MIN_GAP, box[3] + MIN_GAP
-        inside = room[0] < box[0] and box[2] < room[2] and room[1] < box[1] and box[3] < room[3]
-        if inside and not any(overlap(around, other) for other in taken):
-            return box
-    return None
+        yield x - 0.5 * wide, y - 0.5 * NUMBER, x + 0.5 * wide, y + 0.5 * NUMBER

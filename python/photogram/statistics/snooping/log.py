@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.words import Phrase, phrase
 
-__all__ = ["Removal", "Rival", "Round"]
-
 
 @dataclass(frozen=True)
 class Rival:

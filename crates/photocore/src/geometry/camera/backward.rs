@@ -1,14 +1,14 @@
-//! Backward cameras: what is measured is corrected, and compared with the central perspective.
+//! Backward cameras: measured positions are corrected and compared with the central perspective.
 
 use super::inverse::{Matrix2, RadialLimit, inverted, times};
 use super::model::{CameraModel, Image, LensDirection, Unit};
 use super::perspective::Perspective;
 use crate::geometry::Vector3;
 
-/// A measured position as a lens corrects it, with the partials of that; the first index is x or y.
+/// Corrected position and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Corrected<P> {
-    /// g.
+    /// g, the corrected position.
     pub xy: [f64; 2],
     /// With respect to the measured position.
     pub by_measured: Matrix2,
@@ -22,7 +22,7 @@ pub struct Corrected<P> {
 /// residual = g(measured) - c (u1, u2) / u3
 /// ```
 ///
-/// Every such type is a [`CameraModel`]. Where an image is asked for, it is the measured position that g takes to c (u1, u2) / u3.
+/// Every such type is a [`CameraModel`]. Its image of u is the measured position whose correction g equals c (u1, u2) / u3.
 pub trait BackwardModel: Copy {
     /// See [`CameraModel::Parameters`].
     type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
@@ -44,16 +44,16 @@ pub trait BackwardModel: Copy {
     /// See [`CameraModel::parameters`].
     fn parameters(&self) -> Self::Parameters;
 
-    /// c, negative for the positive plane.
+    /// Returns c, negative for the positive plane.
     fn principal_distance(&self) -> f64;
 
-    /// g with its partials.
+    /// Returns g with its partials.
     fn correct(&self, measured: [f64; 2]) -> Corrected<Self::Parameters>;
 
-    /// The measured position that g takes to the given one.
+    /// Returns the measured position with the given corrected position (inverse of g).
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]>;
 
-    /// See [`CameraModel::radius`]; of the measured position alone.
+    /// See [`CameraModel::radius`]; a function of the measured position.
     fn radius(&self, measured: [f64; 2]) -> f64;
 
     /// See [`CameraModel::fold`].
@@ -89,7 +89,7 @@ impl<T: BackwardModel> CameraModel for T {
         self.measured(self.perspective().image(u)).unwrap_or([f64::NAN; 2])
     }
 
-    /// The derivatives of the inverse: those of c u/u3 - g = 0.
+    /// The derivatives of the inverse follow from c u/u3 - g = 0.
     fn linearize(&self, u: &Vector3) -> Image<Self::Parameters> {
         let xy = self.image(u);
         let (_, Image { by_u: [x, y], by_parameters, .. }, by_measured) = self.compared(u, xy);
@@ -109,7 +109,7 @@ impl<T: BackwardModel> CameraModel for T {
         (residual, image)
     }
 
-    /// None where the correction turns over: there it says nothing.
+    /// None if the correction is not one-to-one at the position.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
         let Corrected { xy, by_measured: [[a, b], [c, d]], .. } = self.correct(xy);
         let positive = a > 0.0 && a * d - 0.25 * (b + c) * (b + c) > 0.0;
@@ -133,13 +133,13 @@ impl<T: BackwardModel> CameraModel for T {
     }
 }
 
-/// What all of them share.
+/// Functions common to all backward cameras.
 trait Compared: BackwardModel {
     fn perspective(&self) -> Perspective {
         Perspective { principal_distance: self.principal_distance() }
     }
 
-    /// g - c u/u3, the partials of c u/u3 - g, and those of g by the measured position.
+    /// Returns g - c u/u3, the partials of c u/u3 - g, and the partials of g with respect to the measured position.
     #[inline(always)]
     fn compared(
         &self,

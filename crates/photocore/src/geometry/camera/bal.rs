@@ -1,4 +1,4 @@
-//! The camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
+//! Camera of Bundler and of "Bundle Adjustment in the Large" (Agarwal, Snavely, Seitz and Szeliski 2010).
 
 use super::inverse::{RadialFactor, RadialLimit};
 use super::model::{CameraModel, Image, Unit};
@@ -22,7 +22,7 @@ pub struct Bal {
 }
 
 impl Bal {
-    /// 1 + k1 q + k2 q^2, q being |p|^2.
+    /// Returns 1 + k1 q + k2 q^2 with q = |p|^2.
     fn radial_factor(&self, square: f64) -> f64 {
         1.0 + square * (self.radial[0] + square * self.radial[1])
     }
@@ -68,7 +68,7 @@ impl CameraModel for Bal {
         let radial = self.radial_factor(square);
         let slope = 2.0 * (self.radial[0] + 2.0 * square * self.radial[1]);
         let row = |own: usize| {
-            // With respect to p, then to u; depth falls as u3 rises.
+            // With respect to p, then to u; depth decreases with increasing u3.
             let mut by_p = [f * slope * p[own] * p[0], f * slope * p[own] * p[1]];
             by_p[own] += f * radial;
             let along = by_p[0] * p[0] + by_p[1] * p[1];

@@ -1,11 +1,11 @@
-//! The camera of photogrammetric calibration certificates: Brown (1971), on measured coordinates.
+//! Camera of photogrammetric calibration certificates: Brown (1971), as a function of measured coordinates.
 
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
 use super::model::{Unit, parameters};
 use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 
-/// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.
+/// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, to which they are added.
 ///
 /// ```text
 /// X = (x - xp)(1 + b1) + (y - yp) b2,    Y = y - yp,    r^2 = X^2 + Y^2
@@ -15,8 +15,8 @@ use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 /// residual = g - c (u1, u2) / u3
 /// ```
 ///
-/// x to the right, y up. r0 is zero unless the radial terms are balanced, and never an unknown. With AFTER, X = x - xp, and b1 X + b2 Y
-/// is added to gx (Fraser 1997): affinity beside the terms of the lens.
+/// x points to the right, y up. r0 is zero unless the radial terms are balanced; it is always fixed. With AFTER, X = x - xp, and b1 X + b2
+/// Y is added to gx (Fraser 1997): affinity and the lens terms are added independently.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,17 +33,17 @@ pub struct BrownCorrection<const AFTER: bool> {
 
 /// [`BrownCorrection`] with affinity and shear first.
 pub type Brown = BrownCorrection<false>;
-/// [`BrownCorrection`] with affinity and shear beside the terms of the lens.
+/// [`BrownCorrection`] with affinity and shear added to the lens terms.
 pub type BrownAffinityAfter = BrownCorrection<true>;
 
 impl<const AFTER: bool> BrownCorrection<AFTER> {
-    /// What affinity and shear do to the argument of the lens, and what they add to its value.
+    /// Returns the affinity and shear of the argument of the lens, and the affinity and shear added to its value.
     #[inline(always)]
     fn affine(&self) -> ([f64; 2], [f64; 2]) {
         if AFTER { ([0.0; 2], self.affinity) } else { (self.affinity, [0.0; 2]) }
     }
 
-    /// A measured position from the principal point, and as the argument of the lens.
+    /// Returns a measured position relative to the principal point, and the same position as argument of the lens.
     #[inline(always)]
     fn place(&self, measured: [f64; 2]) -> ([f64; 2], [f64; 2]) {
         let [dx, dy] = [measured[0] - self.principal_point[0], measured[1] - self.principal_point[1]];
@@ -52,7 +52,7 @@ impl<const AFTER: bool> BrownCorrection<AFTER> {
     }
 }
 
-/// Radial terms that vanish at a radius r0, and tangential ones.
+/// Radial terms that vanish at a radius r0, and tangential terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrownTerms {
     /// K1, K2, K3.
@@ -64,10 +64,10 @@ pub struct BrownTerms {
 }
 
 impl BrownTerms {
-    /// What its lens has.
+    /// Nonzero terms of the lens.
     pub(super) const TERMS: Terms = Terms { powers: [3, 0], prism: false };
 
-    /// The lens that they are: 1 + R is its radial factor.
+    /// Returns the lens with the radial factor 1 + R.
     #[inline(always)]
     pub(super) fn lens(&self) -> RadialTangential {
         let ([k1, k2, k3], at) = (self.radial, self.balance * self.balance);
@@ -77,7 +77,7 @@ impl BrownTerms {
         RadialTangential { radial, tangential: self.tangential, prism: [[0.0; 2]; 2] }
     }
 
-    /// Partials of where a place goes by K1, K2, K3, P1, P2.
+    /// Returns the partials of the distorted position with respect to K1, K2, K3, P1, P2.
     #[inline(always)]
     pub(super) fn partials(&self, bent: &Bent, place: [f64; 2]) -> [[f64; 2]; 5] {
         let square = self.balance * self.balance;
@@ -137,7 +137,7 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
         let by_affinity = |along: [f64; 2]| along.map(|d| if AFTER { [d, 0.0] } else { [xx * d, yx * d] });
         let [by_b1, by_b2] = by_affinity([dx, dy]);
         let [k1, k2, k3, p1, p2] = self.terms.partials(&bent, place);
-        // r0 is never free.
+        // r0 is always fixed.
         let row = |k: usize| {
             let [to_x, to_y] = by_measured[k];
             [0.0, -to_x, -to_y, k1[k], k2[k], k3[k], p1[k], p2[k], by_b1[k], by_b2[k], 0.0]

@@ -1,4 +1,4 @@
-//! Brown's terms on ideal coordinates, as AICON has them.
+//! Brown's terms as functions of ideal coordinates, as in AICON.
 
 use super::brown::BrownTerms;
 use super::inverse::Matrix2;
@@ -8,7 +8,7 @@ use super::perspective::Perspective;
 use super::radial_tangential::Bent;
 use crate::geometry::Vector3;
 
-/// Radial terms that may be balanced, tangential ones, affinity and shear, forward: functions of ideal coordinates.
+/// Radial terms (optionally balanced), tangential terms, affinity and shear, forward: functions of ideal coordinates.
 ///
 /// ```text
 /// X = c u1/u3,    Y = c u2/u3,    r^2 = X^2 + Y^2
@@ -17,7 +17,7 @@ use crate::geometry::Vector3;
 /// y = yp + Y + Y R + B2 (r^2 + 2 Y^2) + 2 B1 X Y
 /// ```
 ///
-/// x to the right, y up. r0 is never an unknown.
+/// x points to the right, y up. r0 is always fixed.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ impl BrownForward {
         Perspective { principal_distance: self.principal_distance }
     }
 
-    /// The lens at an ideal place; its value with affinity and shear, and its partials with these.
+    /// Returns the lens at an ideal position, its value with affinity and shear, and the partials of this value.
     fn bent(&self, place: [f64; 2]) -> (Bent, [f64; 2], Matrix2) {
         let (bent, [c1, c2]) = (self.terms.lens().bend(place), self.affinity);
         let [by_x, by_y] = bent.by_place;
@@ -83,7 +83,7 @@ impl CameraModel for BrownForward {
         let (bent, [x, y], by_place) = self.bent(place);
         let by_distance = times(&by_place, by_parameters.map(|[by_c]| by_c));
         let by_terms = self.terms.partials(&bent, place);
-        // r0 is never free.
+        // r0 is always fixed.
         let row = |k: usize| {
             let [a1, a2, a3, b1, b2] = by_terms.map(|by| by[k]);
             let point = [f64::from(k == 0), f64::from(k == 1)];

@@ -1,17 +1,17 @@
-//! The camera of JPL whose lens has an axis of its own: CAHVOR (Gennery 2006, "Generalized camera calibration including fish-eye lenses").
+//! JPL camera CAHVOR with a separate optical axis of the lens (Gennery 2006, "Generalized camera calibration including fish-eye lenses").
 
 use super::inverse::{RadialFactor, RadialLimit};
 use super::model::{CameraModel, Image, Unit, parameters};
 use crate::geometry::{Matrix3, Vector3};
 
-/// Rays bend about the unit vector o, which the angles a and b (radians) turn off the axis of the picture, to the right and down:
+/// Rays are bent about the unit vector o. The angles a and b (radians) rotate o off the axis of the image, to the right and down:
 ///
 /// ```text
 /// o = (cos b sin a, sin b, cos b cos a),    w = v . o,    t = |v|^2 / w^2 - 1,    mu = r0 + r1 t + r2 t^2
 /// V = (1 + mu) v - mu w o,                  image = (fx V1/V3 + cx, fy V2/V3 + cy)
 /// ```
 ///
-/// with v = (u1, -u2, -u3). What is along o stays, what is across becomes 1 + mu times as long; t is the square of its tangent.
+/// with v = (u1, -u2, -u3). The component along o is unchanged, the component across o is scaled by 1 + mu; t is its squared tangent.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,25 +20,25 @@ pub struct Cahvor {
     pub parameters: [f64; 9],
 }
 
-/// A ray and what the lens makes of it.
+/// A ray before and after the lens.
 struct Bent {
     /// v and V.
     ray: Vector3,
     bent: Vector3,
-    /// w, t, mu and its derivative by t.
+    /// w, t, mu and dmu/dt.
     along: f64,
     square: f64,
     factor: f64,
     slope: f64,
 }
 
-/// A point of the photo's axes in those of vision, and back.
+/// Converts a vector between photo axes and vision axes.
 fn turned(u: &Vector3) -> Vector3 {
     Vector3::new(u.x, -u.y, -u.z)
 }
 
 impl Cahvor {
-    /// o, and its derivatives by the angles.
+    /// Returns o and its derivatives with respect to the angles.
     fn axis(&self) -> [Vector3; 3] {
         let [(sa, ca), (sb, cb)] = [4, 5].map(|k: usize| self.parameters[k].sin_cos());
         [
@@ -64,7 +64,7 @@ impl Cahvor {
         Bent { ray, bent, along, square, factor, slope: r1 + 2.0 * square * r2 }
     }
 
-    /// The image of V with what a change of V makes of it.
+    /// Returns the image of V and its gradients with respect to V.
     fn seen(&self, bent: &Vector3) -> ([f64; 2], [Vector3; 2]) {
         let [fx, fy, cx, cy, ..] = self.parameters;
         let (x, y) = (bent.x / bent.z, bent.y / bent.z);
@@ -144,7 +144,7 @@ impl CameraModel for Cahvor {
         (ray.z > 0.0).then(|| turned(&ray.normalize()))
     }
 
-    /// In front of the image, and of the plane across o: t says nothing of the sign of w.
+    /// In front of the image plane and of the plane across o: t is independent of the sign of w.
     fn faces(&self, u: &Vector3) -> bool {
         let found = self.bent(u, &self.axis()[0]);
         u.z <= 0.0 && found.along > 0.0 && found.bent.z > 0.0

@@ -1,18 +1,18 @@
-//! The whole sphere in one picture.
+//! Camera with the whole sphere in one image.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
-/// EQUIRECTANGULAR of COLMAP: longitude and latitude in a picture of w by h pixels, which are never unknowns.
+/// EQUIRECTANGULAR of COLMAP: longitude and latitude in an image of w by h pixels, which are always fixed.
 ///
 /// ```text
 /// (X, Y, Z) = (u1, -u2, -u3)
 /// image = (w (1/2 + atan2(X, Z) / 2 pi), h (1/2 + atan2(Y, hypot(X, Z)) / pi))
 /// ```
 ///
-/// The first column follows the last: residuals of columns are at most w/2.
+/// The first column continues the last: residuals of columns are at most w/2.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +70,7 @@ impl CameraModel for Equirectangular {
         true
     }
 
-    /// None above or below the picture.
+    /// None above or below the image.
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [w, h] = self.size;
         let (longitude, latitude) = ((x / w - 0.5) * TAU, (y / h - 0.5) * PI);

@@ -1,47 +1,47 @@
-//! The way back through a lens: where its radial part is one-to-one, and Newton's method in one and two dimensions.
+//! Inversion of lens models: the one-to-one range of the radial part, and Newton's method in one and two dimensions.
 
-/// A matrix of two rows.
+/// 2 x 2 matrix, row by row.
 pub type Matrix2 = [[f64; 2]; 2];
 
-/// Steps of Newton's method at the most.
+/// Maximum number of Newton steps.
 const STEPS: usize = 50;
-/// A step so small a fraction of the value is the last.
+/// Relative step size that ends the iteration.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// What a way back may be wrong by where rounding ends it, as a fraction of its size.
+/// Accepted relative error if rounding ends the iteration.
 const REACHED: f64 = 1e-9;
-/// A radial part that surely rises up to so many times the radius of a place needs no search for where it ends.
+/// A radial factor that provably increases up to this multiple of a radius needs no search for its limit.
 const BEYOND: f64 = 1.25;
 
-/// Up to where the radial part of a lens is one-to-one.
+/// Limit of the one-to-one range of the radial part of a lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadialLimit {
-    /// The radius that the lens is a function of; infinite where only its image ends.
+    /// Undistorted radius at the limit; infinite if only the image radius is bounded.
     pub radius: f64,
-    /// What it becomes.
+    /// Distorted radius at the limit.
     pub distorted: f64,
 }
 
-/// Those of the longest N and D.
+/// Highest powers of N and D.
 pub const ALL_POWERS: [usize; 2] = [6, 3];
 
-/// s(q) = N(q) / D(q) of the square q of a radius r, which becomes r s.
+/// s(q) = N(q) / D(q) of the square q of a radius r; the distorted radius is r s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadialFactor {
-    /// Coefficients of N by the power of q, from the constant on.
+    /// Coefficients of N in ascending powers of q.
     pub numerator: [f64; 7],
-    /// Those of D.
+    /// Coefficients of D in ascending powers of q.
     pub denominator: [f64; 4],
 }
 
 impl RadialFactor {
-    /// 1.
+    /// s = 1.
     pub const NONE: Self = {
         let (mut numerator, mut denominator) = ([0.0; 7], [0.0; 4]);
         (numerator[0], denominator[0]) = (1.0, 1.0);
         Self { numerator, denominator }
     };
 
-    /// 1 + k1 q + k2 q^2 + ...; terms beyond the sixth do not count.
+    /// Returns 1 + k1 q + k2 q^2 + ...; terms beyond the sixth are ignored.
     pub fn polynomial(terms: &[f64]) -> Self {
         let numerator = std::array::from_fn(|i| match i.checked_sub(1) {
             None => 1.0,
@@ -50,7 +50,7 @@ impl RadialFactor {
         Self { numerator, denominator: [1.0, 0.0, 0.0, 0.0] }
     }
 
-    /// N, D and their derivatives by q; coefficients beyond the given powers are zero.
+    /// Returns N, D and their derivatives with respect to q; coefficients beyond the given powers are zero.
     #[inline(always)]
     pub fn at(&self, q: f64, [numerator, denominator]: [usize; 2]) -> [f64; 4] {
         let (n, by_n) = horner(&self.numerator[..=numerator], q);
@@ -58,19 +58,19 @@ impl RadialFactor {
         [n, d, by_n, by_d]
     }
 
-    /// The powers beyond which the coefficients of N and D are zero.
+    /// Returns the highest powers of N and D with nonzero coefficients.
     fn powers(&self) -> [usize; 2] {
         let last = |coefficients: &[f64]| coefficients.iter().rposition(|&c| c != 0.0).unwrap_or_default();
         [last(&self.numerator), last(&self.denominator)]
     }
 
-    /// s.
+    /// Returns s.
     pub fn value(&self, q: f64) -> f64 {
         let [n, d, ..] = self.at(q, ALL_POWERS);
         n / d
     }
 
-    /// D^2 d(r s)/dr = N D + 2 q (N' D - N D'): the lens is one-to-one while this and D are positive.
+    /// Returns D^2 d(r s)/dr = N D + 2 q (N' D - N D'): the lens is one-to-one while this and D are positive.
     #[inline(always)]
     fn slope(&self, [numerator, denominator]: [usize; 2]) -> [f64; 10] {
         let mut slope = [0.0; 10];
@@ -82,20 +82,20 @@ impl RadialFactor {
         slope
     }
 
-    /// Up to where r s is one-to-one; None where it is so everywhere.
+    /// Returns the limit of the one-to-one range of r s; None if it is unlimited.
     pub fn limit(&self) -> Option<RadialLimit> {
         let ends = [first_root(&self.slope(self.powers())), first_root(&self.denominator)];
         let q = ends.into_iter().flatten().reduce(f64::min)?;
         Some(RadialLimit { radius: q.sqrt(), distorted: q.sqrt() * self.value(q).abs() })
     }
 
-    /// The radius from which on r s no longer rises; infinite where it always does.
+    /// Returns the radius at which r s stops increasing; infinite if it always increases.
     pub fn fold(&self) -> f64 {
         self.limit().map_or(f64::INFINITY, |limit| limit.radius)
     }
 
-    /// Whether r s rises up to a radius of the given square because what the negative terms take away by then leaves something: most
-    /// lenses need no root. Coefficients beyond the given powers are zero.
+    /// Returns whether r s provably increases up to a radius of the given square, by a lower bound from the negative terms. Most lenses
+    /// need no root search. Coefficients beyond the given powers are zero.
     #[inline(always)]
     fn surely_rises(&self, q: f64, powers: [usize; 2]) -> bool {
         let [numerator, denominator] = powers;
@@ -103,8 +103,8 @@ impl RadialFactor {
         lower_bound(slope, q) > 0.0 && lower_bound(&self.denominator[..=denominator], q) > 0.0
     }
 
-    /// About which part of a distorted radius of the given square the radius is that becomes it: one step of Newton's method; None unless
-    /// that radius surely lies within [`BEYOND`] times what this says, and r s rises up to there.
+    /// Returns the approximate ratio of undistorted to distorted radius by one Newton step from the squared distorted radius. None unless
+    /// the solution is provably within [`BEYOND`] times this ratio, and r s increases up to there.
     #[inline(always)]
     fn nearly(&self, distorted: f64, powers: [usize; 2]) -> Option<f64> {
         let [n, d, by_n, by_d] = self.at(distorted, powers);
@@ -115,7 +115,7 @@ impl RadialFactor {
         within.then_some(ratio)
     }
 
-    /// The radius that becomes the given one; None where there is none before the limit.
+    /// Returns the radius of a distorted radius; None if the one-to-one range does not contain it.
     pub fn invert(&self, distorted: f64) -> Option<f64> {
         if !distorted.is_finite() {
             return None;
@@ -131,7 +131,7 @@ impl RadialFactor {
         }
     }
 
-    /// Newton's method for the radius, kept between what is too small and too large by bisection.
+    /// Newton's method for the radius, bracketed by bisection.
     fn newton(&self, distorted: f64, limit: f64) -> Option<f64> {
         let powers = self.powers();
         let (mut low, mut high) = (0.0f64, limit);
@@ -154,13 +154,13 @@ impl RadialFactor {
                 return Some(radius);
             }
         }
-        // Where the curve is flat, rounding moves the radius by more than its last digits.
+        // In flat parts of the curve rounding changes the radius by more than its last digits.
         let apart = radius * self.value(radius * radius) - distorted;
         (apart.abs() <= REACHED * distorted).then_some(radius)
     }
 }
 
-/// A polynomial and its derivative, without products with zero: a compiler may not leave these out.
+/// Evaluates a polynomial and its derivative without products with zero, which a compiler may not remove.
 #[inline(always)]
 fn horner(coefficients: &[f64], x: f64) -> (f64, f64) {
     let Some((&last, rest)) = coefficients.split_last() else { return (0.0, 0.0) };
@@ -168,19 +168,19 @@ fn horner(coefficients: &[f64], x: f64) -> (f64, f64) {
     rest.iter().rev().fold((last * x + next, last), |(value, slope), c| (value * x + c, slope * x + value))
 }
 
-/// What a polynomial is nowhere less than from zero to x: its constant and its negative terms at x.
+/// Returns a lower bound of a polynomial between zero and x: its positive constant and its negative terms at x.
 #[inline(always)]
 fn lower_bound(coefficients: &[f64], x: f64) -> f64 {
     let terms = coefficients.iter().rev().fold(0.0, |value, c| value * x + c.min(0.0));
     terms + coefficients[0].max(0.0)
 }
 
-/// The smallest positive root where a polynomial changes sign.
+/// Returns the smallest positive root with a sign change of a polynomial.
 fn first_root(coefficients: &[f64]) -> Option<f64> {
     positive_roots(coefficients).first().copied()
 }
 
-/// The positive roots where a polynomial changes sign, ascending: one between neighbouring roots of its derivative.
+/// Returns the positive roots with a sign change, ascending: at most one between neighbouring roots of the derivative.
 fn positive_roots(coefficients: &[f64]) -> Vec<f64> {
     let used = coefficients.iter().rposition(|&c| c != 0.0).unwrap_or_default();
     if used == 0 || !coefficients.iter().all(|c| c.is_finite()) {
@@ -189,7 +189,7 @@ fn positive_roots(coefficients: &[f64]) -> Vec<f64> {
     let own = &coefficients[..=used];
     let value = |x: f64| horner(own, x).0;
     let derivative: Vec<f64> = (1..=used).map(|i| i as f64 * own[i]).collect();
-    // No root is larger than this (Fujiwara 1916).
+    // Upper bound of all roots (Fujiwara 1916).
     let term = |i: usize| (own[i] / own[used]).abs().powf(((used - i) as f64).recip());
     let bound = 2.0 * (0..used).map(term).fold(0.0, f64::max);
     let mut ends = positive_roots(&derivative);
@@ -206,7 +206,7 @@ fn positive_roots(coefficients: &[f64]) -> Vec<f64> {
     roots
 }
 
-/// Where a function changes sign between two ends.
+/// Returns the root of a function between two bounds by bisection.
 fn bisected(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let sign = value(low) < 0.0;
     loop {
@@ -218,21 +218,21 @@ fn bisected(mut low: f64, mut high: f64, value: impl Fn(f64) -> f64) -> f64 {
     }
 }
 
-/// The inverse of a matrix; not finite where there is none.
+/// Returns the inverse of a matrix; not finite for a singular matrix.
 #[inline(always)]
 pub fn inverted([[a, b], [c, d]]: Matrix2) -> Matrix2 {
     let determinant = a * d - b * c;
     [[d / determinant, -b / determinant], [-c / determinant, a / determinant]]
 }
 
-/// A matrix times a vector.
+/// Returns the product of a matrix and a vector.
 #[inline(always)]
 pub fn times([x, y]: &Matrix2, v: [f64; 2]) -> [f64; 2] {
     [x[0] * v[0] + x[1] * v[1], y[0] * v[0] + y[1] * v[1]]
 }
 
-/// The place that a map (its value and partials) takes to `target`, by Newton's method from `start`; None where there is none near, or
-/// where the map has turned over on the way.
+/// Returns the argument for which a map (its value and partials) equals `target`, by Newton's method from `start`. None without
+/// convergence, or if the determinant becomes negative on the way.
 #[inline(always)]
 pub fn way_back(
     start: [f64; 2],
@@ -254,7 +254,7 @@ pub fn way_back(
         let step = [by[1][1] * x - by[0][1] * y, by[0][0] * y - by[1][0] * x];
         at = [at[0] + step[0], at[1] + step[1]];
         let [square, size] = [step, at].map(square_of);
-        // A step leaves its square times how much the map bends: as much as the step before has shown, and as a lens does anyway.
+        // Expected error after a step: its square times the curvature, estimated from the previous step or assumed as for typical lenses.
         let (rounding, shown) = (ROUNDING * ROUNDING * size, if square > before { square } else { before });
         if square * square <= rounding * size && square * square * square <= rounding * shown * shown {
             return Some(at);
@@ -268,8 +268,8 @@ pub fn way_back(
     None
 }
 
-/// The place that a lens (its value and partials) takes to `target`: from what its radial part alone says, along the direction of that.
-/// Coefficients of that part beyond the given powers are zero.
+/// Returns the argument for which a lens (its value and partials) equals `target`. The initial value inverts the radial part along the
+/// direction of `target`. Coefficients of that part beyond the given powers are zero.
 #[inline(always)]
 pub fn from_radial(
     radial: &RadialFactor,
@@ -288,7 +288,7 @@ pub fn from_radial(
     from_limited(*radial, target, lens)
 }
 
-/// The same of a lens whose radial part may end before: by value, so that what is hardly ever called keeps nothing in memory.
+/// Handles lenses with a limited radial part; passed by value, so that this rarely called function forces no variable into memory.
 #[cold]
 #[inline(never)]
 fn from_limited(

@@ -1,4 +1,4 @@
-//! Backward cameras whose residuals lie in the measured image: errors of measured coordinates have the weights that they are given.
+//! Backward cameras with residuals in the measured image, so that weights refer to measured coordinates.
 
 use super::backward::BackwardModel;
 use super::brown::{Brown, BrownAffinityAfter};
@@ -8,17 +8,17 @@ use super::on_comparator::OnComparator;
 use super::orthogonal::{Ebner, Gruen};
 use crate::geometry::Vector3;
 
-/// A backward camera that is compared where it is measured: residual = measured - the image that it has of u.
+/// Backward camera with the residual in measured coordinates: measured position - modelled image of u.
 ///
-/// To first order this is D^-1 (g(measured) - c (u1, u2) / u3) with D = dg/d(measured), and its weight that of the residual in the
-/// corrected image with the covariance D S D^T. Least squares of what is left, the image being found by Newton's method, has no bias: with
-/// D S D^T as weights that move with the parameters it would.
+/// To first order the residual is D^-1 (g(measured) - c (u1, u2) / u3) with D = dg/d(measured). It corresponds to a residual in the
+/// corrected image with the covariance D S D^T. The image follows from Newton's method. The estimates are unbiased, unlike with weights D S
+/// D^T that vary with the parameters.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured<C>(pub C);
 
-/// A model with a name for its measured form.
+/// Model with a name for its measured form.
 trait Named: BackwardModel {
     const MEASURED: &'static str;
 }
@@ -35,15 +35,15 @@ macro_rules! measured {
 }
 
 measured! {
-    /// [`Brown`], compared where it is measured.
+    /// [`Brown`] with residuals in measured coordinates.
     BrownMeasured = Brown, "brown_measured";
-    /// [`BrownAffinityAfter`], the same.
+    /// [`BrownAffinityAfter`] with residuals in measured coordinates.
     BrownAffinityAfterMeasured = BrownAffinityAfter, "brown_affinity_after_measured";
-    /// [`Ebner`], the same.
+    /// [`Ebner`] with residuals in measured coordinates.
     EbnerMeasured = Ebner, "ebner_measured";
-    /// [`Gruen`], the same.
+    /// [`Gruen`] with residuals in measured coordinates.
     GruenMeasured = Gruen, "gruen_measured";
-    /// [`OnComparator`], the same.
+    /// [`OnComparator`] with residuals in measured coordinates.
     OnComparatorMeasured = OnComparator, "on_comparator_measured";
 }
 

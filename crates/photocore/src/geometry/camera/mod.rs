@@ -1,7 +1,6 @@
-//! Cameras: from a direction in the photo's axes to an image position, with all partials.
+//! Camera models: from a direction in the photo's axes to an image position, with all partials.
 //!
-//! Each camera is a type that implements [`CameraModel`] in a file of its own, or in one with others of its family, and a line of
-//! `cameras!` below.
+//! Each camera is a type that implements [`CameraModel`] in a file of its own or of its family, and a line of `cameras!` below.
 
 pub mod backward;
 pub(super) mod inverse;
@@ -30,8 +29,8 @@ macro_rules! cameras {
         cameras! { @kinds $d $($name)* $($($member)*)* }
     };
     (@kinds $d:tt $($name:ident)*) => {
-        /// A camera of any kind.
-        // Behind a pointer the 48 numbers of the largest would be looked up for each image.
+        /// Camera of any model.
+        // A boxed variant would add a pointer lookup per image for the 48 numbers of the largest model.
         #[allow(clippy::large_enum_variant)]
         #[derive(Debug, Clone, PartialEq)]
         pub enum Camera {
@@ -45,10 +44,10 @@ macro_rules! cameras {
         })*
 
         impl Camera {
-            /// What the models are called.
+            /// Names of the models.
             pub const NAMES: &'static [&'static str] = &[$(<$name as CameraModel>::NAME),*];
 
-            /// What is known of a model; None where none has the name.
+            /// Returns the description of a model; None for an unknown name.
             pub fn model(name: &str) -> Option<ModelFacts> {
                 fn facts<C: CameraModel>() -> ModelFacts {
                     ModelFacts { formula: C::FORMULA, parameters: C::PARAMETERS, constants: C::CONSTANTS, lens: C::LENS, down: C::DOWN }
@@ -59,7 +58,7 @@ macro_rules! cameras {
                 None
             }
 
-            /// The camera of the model that has the name; None where there is none, or it has not as many parameters.
+            /// Returns the camera of a model by name; None for an unknown name or a wrong number of parameters.
             pub fn named(name: &str, parameters: &[f64]) -> Option<Self> {
                 $(if name == <$name as CameraModel>::NAME {
                     return Some(<$name as CameraModel>::with_parameters(parameters.try_into().ok()?).into());
@@ -68,8 +67,8 @@ macro_rules! cameras {
             }
         }
 
-        /// An expression of a camera as its own type, compiled for each kind: what it calls is inlined, and nothing is looked up
-        /// behind the match.
+        /// Evaluates an expression with the camera as its own type, compiled per model: calls are inlined and the match is the only
+        /// dispatch.
         macro_rules! each_camera {
             ($d camera:expr, $d own:ident => $d body:expr) => {
                 match $d camera {
@@ -137,7 +136,7 @@ cameras! { $
 }
 
 impl Camera {
-    /// What its model is called.
+    /// Returns the name of the model.
     pub fn name(&self) -> &'static str {
         fn of<C: CameraModel>(_: &C) -> &'static str {
             C::NAME
@@ -145,7 +144,7 @@ impl Camera {
         each_camera!(self, camera => of(camera))
     }
 
-    /// What its parameters are called and measured in, in their order.
+    /// Returns the names and units of the parameters, in order.
     pub fn parameter_names(&self) -> &'static [(&'static str, Unit)] {
         fn of<C: CameraModel>(_: &C) -> &'static [(&'static str, Unit)] {
             C::PARAMETERS
@@ -153,7 +152,7 @@ impl Camera {
         each_camera!(self, camera => of(camera))
     }
 
-    /// How many of these, the last ones, are constants.
+    /// Returns the number of constants; they are the last parameters.
     pub fn constants(&self) -> usize {
         fn of<C: CameraModel>(_: &C) -> usize {
             C::CONSTANTS
@@ -161,7 +160,7 @@ impl Camera {
         each_camera!(self, camera => of(camera))
     }
 
-    /// The same camera with other parameters; None unless they are as many.
+    /// Returns the camera with other parameters; None if their number differs.
     pub fn with_parameters(&self, parameters: &[f64]) -> Option<Self> {
         each_camera!(self, camera => Some(camera.with_others(parameters.try_into().ok()?).into()))
     }
@@ -181,7 +180,7 @@ impl Camera {
         each_camera!(self, camera => camera.patch(u))
     }
 
-    /// Its parameters.
+    /// Returns the parameters.
     pub fn parameters(&self) -> Vec<f64> {
         each_camera!(self, camera => CameraModel::parameters(camera).as_ref().to_vec())
     }

@@ -1,4 +1,4 @@
-//! What each camera is and says.
+//! Interface of all camera models.
 
 use std::sync::Arc;
 
@@ -6,123 +6,123 @@ use super::inverse::RadialLimit;
 use super::knots::Patch;
 use crate::geometry::axes::Vector3;
 
-/// How a camera maps u, a point in the photo's axes (it looks along -z), to image coordinates.
+/// Mapping of u, a point in the photo's axes (the camera looks along -z), to image coordinates.
 ///
-/// Only the direction of u counts: (dx/du) u = 0.
+/// The image depends only on the direction of u: (dx/du) u = 0.
 ///
-/// A **forward** camera has a lens whose terms are functions of ideal coordinates: it maps u to what is measured. That of a **backward**
-/// one has terms that are functions of measured coordinates: it corrects what is measured, and compares that with the central perspective
-/// of u ([`super::backward::BackwardModel`]).
+/// The lens of a **forward** camera is a function of ideal coordinates: it maps u to the measured position. The lens of a **backward**
+/// camera is a function of measured coordinates: the corrected position is compared with the central perspective of u
+/// ([`super::backward::BackwardModel`]).
 pub trait CameraModel: Clone {
-    /// Its interior parameters, an array of numbers.
+    /// Array of the interior parameters.
     type Parameters: Copy + AsRef<[f64]> + AsMut<[f64]> + for<'a> TryFrom<&'a [f64]>;
 
-    /// What the model is called.
+    /// Name of the model.
     const NAME: &'static str;
-    /// What its parameters are called and measured in, in their order.
+    /// Names and units of the parameters, in order.
     const PARAMETERS: &'static [(&'static str, Unit)];
-    /// How many of the parameters, the last ones, are constants: never unknowns.
+    /// Number of constants: the last parameters, which are always fixed.
     const CONSTANTS: usize = 0;
-    /// The image of P, a point in the photo's axes, as documents say it.
+    /// Formula of the image of P, a point in the photo's axes, for documents.
     const FORMULA: &'static str;
-    /// What the terms of its lens are functions of.
+    /// Coordinates on which the lens terms depend.
     const LENS: LensDirection = LensDirection::Forward;
-    /// Whether the second image coordinate counts downwards, as rows of pixels do.
+    /// Whether the second image coordinate increases downwards, as pixel rows do.
     const DOWN: bool = false;
-    /// Whether the adjustment computes several images side by side: for cameras without branches.
+    /// Whether the adjustment evaluates several images in SIMD lanes: for cameras without branches.
     const IN_LANES: bool = false;
 
-    /// The camera with the given parameters.
+    /// Returns the camera with the given parameters.
     fn with_parameters(parameters: Self::Parameters) -> Self;
 
-    /// Its parameters.
+    /// Returns the parameters.
     fn parameters(&self) -> Self::Parameters;
 
-    /// The same camera with other parameters: what it has beside them stays.
+    /// Returns the camera with other parameters and the same knots.
     #[inline]
     fn with_others(&self, parameters: Self::Parameters) -> Self {
         Self::with_parameters(parameters)
     }
 
-    /// Its displacements at the knots of a spline, row by row; None of cameras without one.
+    /// Returns the displacements at the knots of a spline, row by row; None for cameras without a spline.
     fn knots(&self) -> Option<&[[f64; 2]]> {
         None
     }
 
-    /// The same camera with other displacements there; None unless it has as many.
+    /// Returns the camera with other displacements at the knots; None if their number differs.
     fn with_knots(&self, _knots: Arc<[[f64; 2]]>) -> Option<Self> {
         None
     }
 
-    /// The knots that the image of u depends on; None of cameras without them.
+    /// Returns the knots that affect the image of u; None for cameras without knots.
     #[inline]
     fn patch(&self, _u: &Vector3) -> Option<Patch> {
         None
     }
 
-    /// What a small angle near the axis is multiplied by, without sign: the principal distance in the unit of the image.
+    /// Returns the absolute image scale near the axis (image length per radian): the principal distance in the unit of the image.
     fn scale(&self) -> f64;
 
-    /// The image of u; not finite in the plane of the projection centre. What lies behind has the image that the formula gives.
+    /// Returns the image of u; not finite in the plane of the projection centre. Points behind the camera are not rejected.
     fn image(&self, u: &Vector3) -> [f64; 2];
 
-    /// The image with its partials.
+    /// Returns the image with its partials.
     fn linearize(&self, u: &Vector3) -> Image<Self::Parameters>;
 
-    /// Observed minus computed of a measured position, and what is computed with its partials: the image, or what a backward camera
-    /// compares with the corrected position.
+    /// Returns the residual of a measured position and the linearized computed value: the image or, for a backward camera, the central
+    /// perspective that is compared with the corrected position.
     #[inline(always)]
     fn compare(&self, u: &Vector3, measured: [f64; 2]) -> ([f64; 2], Image<Self::Parameters>) {
         let image = self.linearize(u);
         ([measured[0] - image.xy[0], measured[1] - image.xy[1]], image)
     }
 
-    /// The unit direction in the photo's axes, in front of the camera, of an image position; None where no direction has it.
+    /// Returns the unit direction, in the photo's axes and in front of the camera, of an image position; None outside of the model's range.
     fn direction(&self, xy: [f64; 2]) -> Option<Vector3>;
 
-    /// Whether a camera looks to where u is: in front of it, but for those that see more than half of the sphere.
+    /// Returns whether u is in the field of view: in front of the camera, unless the model covers more than a hemisphere.
     #[inline]
     fn faces(&self, u: &Vector3) -> bool {
         u.z <= 0.0
     }
 
-    /// Whether u, or what was measured of it, lies beyond where the radial part of the lens is one-to-one: its image is that of another
-    /// direction, too.
+    /// Returns whether u, or its measured position, is beyond the one-to-one range of the radial part of the lens. Another direction then
+    /// has the same image.
     fn folds(&self, u: &Vector3, measured: [f64; 2]) -> bool {
         self.radius(u, measured) > self.fold()
     }
 
-    /// The radius that the radial part of the lens is a function of.
+    /// Returns the radius on which the radial part of the lens depends.
     fn radius(&self, _u: &Vector3, _measured: [f64; 2]) -> f64 {
         0.0
     }
 
-    /// The radius from which on it folds back: infinite where it is one-to-one everywhere. It is the same for all images.
+    /// Returns the radius at which the radial part folds back; infinite if it is one-to-one. It is the same for all images.
     fn fold(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// What a measured position is corrected to; None of a forward camera.
+    /// Returns the corrected position of a measured one; None for a forward camera.
     fn correction(&self, _measured: [f64; 2]) -> Option<[f64; 2]> {
         None
     }
 
-    /// Up to where the radial part of the lens is one-to-one; None where it is so everywhere.
+    /// Returns the limit of the one-to-one range of the radial part of the lens; None if it is unlimited.
     fn radial_limit(&self) -> Option<RadialLimit> {
         None
     }
 }
 
-/// What the terms of a lens are functions of.
+/// Coordinates on which the terms of a lens depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LensDirection {
-    /// Of ideal coordinates.
+    /// Ideal coordinates.
     Forward,
-    /// Of measured coordinates.
+    /// Measured coordinates.
     Backward,
 }
 
-/// A model of cameras.
+/// Description of a camera model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModelFacts {
     /// [`CameraModel::FORMULA`].
@@ -137,7 +137,7 @@ pub struct ModelFacts {
     pub down: bool,
 }
 
-/// What parameters are called and measured in: names by their unit, in their order.
+/// Lists parameters by unit: names and units, in order.
 macro_rules! parameters {
     ($($unit:expr => $($name:literal)+;)+) => {
         &[$($(($name, $unit),)+)+]
@@ -145,18 +145,18 @@ macro_rules! parameters {
 }
 pub(super) use parameters;
 
-/// What a parameter of a camera is measured in.
+/// Unit of a camera parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// The unit of image coordinates.
+    /// Unit of image coordinates.
     Image,
-    /// The reciprocal of this power of it.
+    /// Reciprocal of this power of the image unit.
     PerImage(u8),
-    /// None: a number.
+    /// Dimensionless.
     One,
 }
 
-/// An image position and its partials; the first index is x or y.
+/// Image position and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<P> {
     /// x, y in the unit of the camera.
@@ -168,7 +168,7 @@ pub struct Image<P> {
 }
 
 impl<P: AsRef<[f64]>> Image<P> {
-    /// The same with the partials in a list.
+    /// Converts the partials to vectors of variable length.
     pub(crate) fn listed(self) -> Image<Vec<f64>> {
         let by_parameters = self.by_parameters.map(|row| row.as_ref().to_vec());
         Image { xy: self.xy, by_u: self.by_u, by_parameters }

@@ -1,4 +1,4 @@
-//! Brown's camera whose plates are measured on a comparator that is calibrated itself (NOAA TR NOS 57, equations 34 and 63).
+//! Brown's camera with plates measured on a calibrated comparator (NOAA TR NOS 57, equations 34 and 63).
 
 use super::backward::{BackwardModel, Corrected};
 use super::brown::BrownTerms;
@@ -19,8 +19,8 @@ const COUNT: usize = 33;
 /// residual = g - c (u1, u2) / u3
 /// ```
 ///
-/// x0, y0, the reading from which corrections count, and hx, hy, half the calibrated range, are never unknowns; xp, yp is the principal
-/// point from there, corrected.
+/// x0, y0 (origin of the corrections) and hx, hy (half the calibrated range) are always fixed; xp, yp is the corrected principal point
+/// relative to this origin.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,7 @@ pub struct OnComparator {
     pub principal_point: [f64; 2],
     /// K1, K2, K3, P1, P2; not balanced.
     pub terms: BrownTerms,
-    /// mx, my: scales less 1; lean: the angle between the y axis and the normal to the x axis, towards +x.
+    /// mx, my: scales minus 1; lean: the angle between the y axis and the normal to the x axis, towards +x.
     pub linear: [f64; 3],
     /// Coefficients of Px and Py.
     pub polynomials: [[f64; 9]; 2],

@@ -1,11 +1,11 @@
-//! The camera of OpenCV whose sensor is tilted (Scheimpflug).
+//! OpenCV camera with a tilted sensor (Scheimpflug).
 
 use super::inverse::{Matrix2, RadialLimit};
 use super::model::{CameraModel, Image, Unit, parameters};
 use super::vision::OpencvPinhole;
 use crate::geometry::{Matrix3, Vector3};
 
-/// [`OpencvPinhole`] with a sensor that is turned by `tau_x`, `tau_y` against the plane of the lens, as the documents of OpenCV have it:
+/// [`OpencvPinhole`] with a sensor rotated by `tau_x`, `tau_y` against the lens plane, as in the OpenCV documentation:
 ///
 /// ```text
 /// R = Ry(tau_y) Rx(tau_x),    h = [R33 0 -R13; 0 R33 -R23; 0 0 1] R (A, B, 1),    image = (fx h1/h3 + cx, fy h2/h3 + cy)
@@ -16,16 +16,16 @@ use crate::geometry::{Matrix3, Vector3};
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpencvTilted {
-    /// fx, fy, cx, cy and the terms of the lens.
+    /// fx, fy, cx, cy and the lens terms.
     pub lens: OpencvPinhole,
     /// `tau_x`, `tau_y` in radians.
     pub tilt: [f64; 2],
 }
 
-/// Parameters of [`OpencvPinhole`].
+/// Number of parameters of [`OpencvPinhole`].
 const LENS: usize = 16;
 
-/// The projective map of the tilt: where a place goes, with its partials by the place and by the angles.
+/// Projective map of the tilt: mapped position, and its partials with respect to the position and the angles.
 struct Tilted {
     xy: [f64; 2],
     by_place: Matrix2,
@@ -33,14 +33,14 @@ struct Tilted {
 }
 
 impl OpencvTilted {
-    /// The lens alone, of focal length 1.
+    /// Returns the lens with focal length 1.
     fn normalised(&self) -> OpencvPinhole {
         let mut parameters = self.lens.parameters;
         parameters[..4].copy_from_slice(&[1.0, 1.0, 0.0, 0.0]);
         OpencvPinhole { parameters }
     }
 
-    /// Rx, Ry and their derivatives by their angles.
+    /// Returns Rx, Ry and their derivatives with respect to their angles.
     fn rotations(&self) -> [[Matrix3; 2]; 2] {
         let [(sx, cx), (sy, cy)] = self.tilt.map(f64::sin_cos);
         let about_x = |o: f64, s: f64, c: f64| Matrix3::new(o, 0.0, 0.0, 0.0, c, s, 0.0, -s, c);
@@ -48,7 +48,7 @@ impl OpencvTilted {
         [[about_x(1.0, sx, cx), about_x(0.0, cx, -sx)], [about_y(1.0, sy, cy), about_y(0.0, cy, -sy)]]
     }
 
-    /// The matrix of the projective map.
+    /// Returns the matrix of the projective map.
     fn matrix(&self) -> Matrix3 {
         let [[x, _], [y, _]] = self.rotations();
         let r = y * x;
@@ -70,7 +70,7 @@ impl OpencvTilted {
     }
 }
 
-/// The matrix that takes what R has turned back to the sensor; its derivative with the derivative of R and 0 for `one`.
+/// Returns the matrix that projects rotated positions back to the sensor; its derivative with the derivative of R and 0 for `one`.
 fn sensor(r: &Matrix3, one: f64) -> Matrix3 {
     Matrix3::new(r[(2, 2)], 0.0, -r[(0, 2)], 0.0, r[(2, 2)], -r[(1, 2)], 0.0, 0.0, one)
 }
@@ -126,7 +126,7 @@ impl CameraModel for OpencvTilted {
         Image { xy: [fx * x + cx, fy * y + cy], by_u: [x_by_u, y_by_u], by_parameters: [by_x, by_y] }
     }
 
-    /// None where the sensor is tilted beyond the ray, too.
+    /// Also None if the sensor is tilted beyond the ray.
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [fx, fy, cx, cy] = std::array::from_fn(|k| self.lens.parameters[k]);
         let h = self.matrix().try_inverse()? * Vector3::new((x - cx) / fx, (y - cy) / fy, 1.0);
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_tilt_about_one_axis_is_a_keystone() {
-        // By hand, with tau_y = 0 and so R = Rx.
+        // Computed by hand, with tau_y = 0 and therefore R = Rx.
         let tau: f64 = 0.1;
         let (s, c) = tau.sin_cos();
         let mut camera = OpencvTilted::with_parameters([0.0; 18]);

@@ -1,16 +1,16 @@
-//! Corrections that are orthogonal over the format of the image: the 12 of Ebner (1976) and the 44 of Gruen (1978).
+//! Corrections that are orthogonal over the image format: the 12 of Ebner (1976) and the 44 of Gruen (1978).
 
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialLimit, way_back};
 use super::model::{Unit, parameters};
 
-/// P_0 to P_4 of one coordinate, and their derivatives.
+/// P_0 to P_4 of one coordinate, with derivatives.
 type Basis = [(f64, f64); 5];
 
-/// A parameter times a number is the factor of the product P_i(Y) P_j(X) in one component: (parameter, component, number, i, j).
+/// Term of a correction: (parameter, component, number, i, j). Parameter times number is the coefficient of P_i(Y) P_j(X).
 type Term = (usize, usize, f64, usize, usize);
 
-/// The terms of each component: the parameter, i and j, and the number where it is not one.
+/// Lists the terms of each component: parameter, i and j, and the number if it is not 1.
 macro_rules! terms {
     (@) => {
         1.0
@@ -25,23 +25,23 @@ macro_rules! terms {
 
 /// A set of orthogonal corrections.
 pub trait OrthogonalSet<const N: usize>: Copy {
-    /// What the camera is called.
+    /// Name of the camera.
     const NAME: &'static str;
     /// c, xp, yp, the corrections, b.
     const PARAMETERS: &'static [(&'static str, Unit)];
-    /// As documents say it.
+    /// Formula for documents.
     const FORMULA: &'static str;
-    /// What the corrections are, numbered from zero.
+    /// Terms of the corrections; parameters are numbered from zero.
     const TERMS: &'static [Term];
 
-    /// The polynomials of one coordinate over a format of half side b.
+    /// Returns the polynomials of one coordinate over a format with half side b.
     fn basis(x: f64, b: f64) -> Basis;
 }
 
-/// Corrections of a set, backward: functions of measured coordinates, which they are added to.
+/// Corrections of a set, backward: functions of measured coordinates, to which they are added.
 ///
-/// With X = x - xp, Y = y - yp, x to the right and y up, and b half the side of the used format, which is never an unknown. What shifts,
-/// rotations, scale and tilts of a vertical photo do is not among them.
+/// X = x - xp, Y = y - yp, x to the right and y up; b is half the side of the used format and always fixed. Effects of translation,
+/// rotation, scale and tilt of a vertical photo are excluded.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +51,9 @@ pub struct Orthogonal<S, const N: usize> {
     set: S,
 }
 
-/// [`Ebner12`] with c, xp, yp before and b behind.
+/// [`Ebner12`], preceded by c, xp, yp and followed by b.
 pub type Ebner = Orthogonal<Ebner12, 16>;
-/// [`Gruen44`] with c, xp, yp before and b behind.
+/// [`Gruen44`], preceded by c, xp, yp and followed by b.
 pub type Gruen = Orthogonal<Gruen44, 48>;
 
 /// Corrections orthogonal on the grid -b, 0, b.
@@ -138,7 +138,7 @@ impl OrthogonalSet<48> for Gruen44 {
     }
 }
 
-/// The first parameter that is a correction.
+/// Index of the first correction among the parameters.
 const FIRST: usize = 3;
 
 impl<S: OrthogonalSet<N> + Default, const N: usize> BackwardModel for Orthogonal<S, N>
@@ -184,7 +184,7 @@ where
         Corrected { xy, by_measured, by_parameters }
     }
 
-    /// The corrections are small: what is corrected is where it starts.
+    /// The corrections are small: the corrected position is the initial value.
     fn measured(&self, corrected: [f64; 2]) -> Option<[f64; 2]> {
         let start = [corrected[0] + self.parameters[1], corrected[1] + self.parameters[2]];
         way_back(start, corrected, |measured| {
@@ -193,7 +193,7 @@ where
         })
     }
 
-    /// They have no radial part.
+    /// The corrections contain no radial part.
     fn radius(&self, _: [f64; 2]) -> f64 {
         0.0
     }

@@ -1,10 +1,10 @@
-//! The central perspective without distortion.
+//! Central perspective without distortion.
 
 use super::model::{CameraModel, Image, Unit};
 use crate::geometry::Vector3;
 
-/// x = c u1/u3, y = c u2/u3, measured from the principal point. With either sign of c the camera looks along its -z axis (GIANT
-/// guide, sections 4 and 5 of its specification).
+/// x = c u1/u3, y = c u2/u3, relative to the principal point. With either sign of c the camera looks along its -z axis (GIANT guide,
+/// sections 4 and 5 of its specification).
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,8 +14,8 @@ pub struct Perspective {
 }
 
 impl Perspective {
-    /// The image with its partials with respect to u formed at an image position chosen from the computed one: x has the
-    /// gradient (c/u3, 0, -x/u3).
+    /// Returns the image and its partials with respect to u, evaluated at an image position chosen by `at`: x has the gradient (c/u3, 0,
+    /// -x/u3).
     #[inline(always)]
     pub fn linearize_at(&self, u: &Vector3, at: impl FnOnce([f64; 2]) -> [f64; 2]) -> Image<[f64; 1]> {
         let scale = self.principal_distance / u.z;

@@ -1,11 +1,11 @@
-//! The camera of a star plate (NOAA TR NOS 55, equations 38 to 41), as blocks take it.
+//! Star-plate camera (NOAA TR NOS 55, equations 38 to 41) for block adjustment.
 
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
 use super::model::{CameraModel, Image, Unit, parameters};
 use crate::geometry::plate_lens::{Decentering, Form, Kind, PlateLens, Plated};
 use crate::geometry::{Displacement, Vector3};
 
-/// A lens whose terms have a centre of their own, on ideal coordinates, before or after the scales of two axes that may be oblique.
+/// Lens with its own centre of distortion, in ideal coordinates, before or after the scales of two axes, which may be oblique.
 ///
 /// ```text
 /// (X, Y, Z) = (u1, -u2, -u3)
@@ -16,17 +16,17 @@ use crate::geometry::{Displacement, Vector3};
 /// y = yp + my q',    x = xp + mx p' - epsilon y
 /// ```
 ///
-/// x, y and the axis towards what is seen are right-handed. `c_y` is that of x where it is zero. c0, the principal distance of the form
-/// with distortion before scale, is never an unknown.
+/// x, y and the viewing axis are right-handed. If `c_y` is zero, it equals c. c0, the principal distance of the form with distortion before
+/// scale, is always fixed.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plate {
-    /// Its lens, with decentering in polar form.
+    /// Lens, with decentering in polar form.
     pub lens: PlateLens,
 }
 
-/// Where the parameters of a lens stand among those of the camera, which begin with c.
+/// Index of each lens parameter among the camera parameters, which begin with c.
 const PLACES: [usize; 13] = [12, 2, 3, 0, 1, 10, 11, 4, 5, 6, 7, 8, 9];
 const COUNT: usize = 14;
 
@@ -35,7 +35,7 @@ impl Plate {
         [-u.x / u.z, u.y / u.z]
     }
 
-    /// The offset from the centre of distortion, before the lens.
+    /// Returns the offset from the centre of distortion, before the lens.
     fn offset(&self, w: [f64; 2]) -> [f64; 2] {
         let (c, _) = self.lens.scales();
         let [_, _, _, _, _, dx, dy, ..] = *self.lens.interior();

@@ -1,4 +1,4 @@
-//! From rays to coordinates of size one, and back: what cameras of computer vision do before their lens.
+//! Projections of rays to dimensionless coordinates, and their inverses: the first stage of computer-vision cameras.
 //!
 //! Rays have axes of computer vision: x right, y down, z forward.
 
@@ -6,10 +6,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::inverse::{Matrix2, RadialLimit};
 
-/// Below this ratio of radius and depth series are better than quotients of small numbers.
+/// Ratio of radius and depth below which series are more accurate than quotients of small numbers.
 const SMALL: f64 = 1e-4;
 
-/// Where a ray goes; the first index of partials is a or b.
+/// Projected ray; the first index of partials is a or b.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
     /// a, b.
@@ -22,18 +22,18 @@ pub struct Seen {
 
 /// A projection with up to two parameters.
 pub trait RayProjection {
-    /// Where a ray goes.
+    /// Projects a ray.
     fn project(ray: [f64; 3], own: [f64; 2]) -> Seen;
 
-    /// A ray that goes there, of any length; None where there is none.
+    /// Returns a ray, of any length, with the given projection; None if no ray has it.
     fn ray(ab: [f64; 2], own: [f64; 2]) -> Option<[f64; 3]>;
 
-    /// Whether it looks to where a ray goes.
+    /// Returns whether a ray is in the field of view.
     fn faces([_, _, z]: [f64; 3], _own: [f64; 2]) -> bool {
         z >= 0.0
     }
 
-    /// Up to where it is one-to-one; the radius is X / Z.
+    /// Returns the limit of the one-to-one range; the radius is X / Z.
     fn limit(_own: [f64; 2]) -> Option<RadialLimit> {
         None
     }
@@ -86,13 +86,13 @@ impl RayProjection for Equidistant {
         (theta <= PI).then(|| [ratio * a, ratio * b, theta.cos()])
     }
 
-    /// All angles up to pi are seen.
+    /// All angles up to pi are visible.
     fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
         true
     }
 }
 
-/// (X, Y) 2 sin(theta / 2) / rho: equisolid, equal areas of the sky are equal areas of the image.
+/// (X, Y) 2 sin(theta / 2) / rho: equisolid, preserves areas of the sphere.
 #[derive(Debug, Clone, Copy)]
 pub struct Equisolid;
 
@@ -116,17 +116,17 @@ impl RayProjection for Equisolid {
         (quarter <= 1.0).then_some([cosine * a, cosine * b, 1.0 - 2.0 * quarter])
     }
 
-    /// All angles up to pi are seen.
+    /// All angles up to pi are visible.
     fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
         true
     }
 }
 
-/// (X, Y) 2 tan(theta / 2) / rho: stereographic, circles of the sky are circles of the image.
+/// (X, Y) 2 tan(theta / 2) / rho: stereographic, preserves circles of the sphere.
 #[derive(Debug, Clone, Copy)]
 pub struct Stereographic;
 
-/// alpha and beta of [`ExtendedUnified`] that make it stereographic: 2 tan(theta / 2) / rho = 1 / (d / 2 + Z / 2).
+/// alpha and beta of [`ExtendedUnified`] for the stereographic projection: 2 tan(theta / 2) / rho = 1 / (d / 2 + Z / 2).
 const STEREOGRAPHIC: [f64; 2] = [0.5, 1.0];
 
 impl RayProjection for Stereographic {
@@ -139,13 +139,13 @@ impl RayProjection for Stereographic {
         ExtendedUnified::ray(ab, STEREOGRAPHIC)
     }
 
-    /// All angles below pi are seen.
+    /// All angles below pi are visible.
     fn faces(_: [f64; 3], _: [f64; 2]) -> bool {
         true
     }
 }
 
-/// (X, Y) / Z times atan(2 r tan(omega / 2)) / (r omega), r being its length (Devernay and Faugeras 2001).
+/// (X, Y) / Z times atan(2 r tan(omega / 2)) / (r omega) with r = |(X, Y) / Z| (Devernay and Faugeras 2001).
 #[derive(Debug, Clone, Copy)]
 pub struct FieldOfView;
 
@@ -197,12 +197,12 @@ impl RayProjection for FieldOfView {
     }
 }
 
-/// (X, Y) 2 / (Z + sqrt(Z^2 - 4 k rho^2)): ideal = distorted / (1 + k r^2), r that of the distorted (Fitzgibbon 2001).
+/// (X, Y) 2 / (Z + sqrt(Z^2 - 4 k rho^2)): ideal = distorted / (1 + k r^2) with the distorted radius r (Fitzgibbon 2001).
 #[derive(Debug, Clone, Copy)]
 pub struct DivisionByRadius;
 
 impl RayProjection for DivisionByRadius {
-    /// Not finite where nothing is seen.
+    /// Not finite outside of the field of view.
     #[inline(always)]
     fn project([x, y, z]: [f64; 3], [k, _]: [f64; 2]) -> Seen {
         let square = x * x + y * y;
@@ -223,7 +223,7 @@ impl RayProjection for DivisionByRadius {
         (k * square < 1.0).then_some([a, b, 1.0 + k * square])
     }
 
-    /// With k below zero it sees more than half of the sphere.
+    /// With k < 0 the field of view exceeds a hemisphere.
     fn faces([x, y, z]: [f64; 3], [k, _]: [f64; 2]) -> bool {
         z + (z * z - 4.0 * k * (x * x + y * y)).sqrt() > 0.0
     }
@@ -270,7 +270,7 @@ impl RayProjection for ExtendedUnified {
         (inside >= 0.0 && depth.is_finite()).then_some([a, b, depth])
     }
 
-    /// Beyond its limit behind the camera two rays have one image.
+    /// Beyond the limit behind the camera two rays have the same image.
     fn faces([x, y, z]: [f64; 3], [alpha, beta]: [f64; 2]) -> bool {
         let d = (beta * (x * x + y * y) + z * z).sqrt();
         alpha * d + (1.0 - alpha) * z > 0.0 && (alpha <= 0.5 || alpha * z > -(1.0 - alpha) * d)

@@ -11,8 +11,8 @@ use crate::geometry::Vector3;
 /// p = (u1, -u2) / -u3,    image = (cx, cy) + f (1 + k1 |p|^2 + k2 |p|^4) p
 /// ```
 ///
-/// Image coordinates are pixels from the upper-left corner, column and row. It is the lens of [`Bal`] with y
-/// turned down. SIMPLE_RADIAL is this camera with k2 held at zero.
+/// Image coordinates are pixels from the upper-left corner, column and row. The lens is [`Bal`] with the y axis reversed. SIMPLE_RADIAL is
+/// this camera with k2 fixed at zero.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,13 +1,13 @@
-//! The terms of Brown (1966, 1971), Conrady (1919) and those who came after: radial, tangential, thin prism.
+//! Lens terms of Brown (1966, 1971), Conrady (1919) and their successors: radial, tangential, thin prism.
 //!
-//! A camera as a table of what its parameters are: a projection, a lens with radial, tangential and prism terms, focal lengths.
+//! A camera is a table of parameter roles: a projection, a lens with radial, tangential and prism terms, focal lengths.
 
 use super::inverse::{ALL_POWERS, Matrix2, RadialFactor, RadialLimit, from_radial};
 use super::model::{Image, Unit};
 use super::projections::{RayProjection, Seen};
 use crate::geometry::Vector3;
 
-/// The lens
+/// Lens with radial, tangential and thin-prism terms
 ///
 /// ```text
 /// q = a^2 + b^2
@@ -26,23 +26,23 @@ pub struct RadialTangential {
     pub prism: Matrix2,
 }
 
-/// Which terms of a lens may be other than zero.
+/// Lens terms that may be nonzero.
 #[derive(Debug, Clone, Copy)]
 pub struct Terms {
-    /// The highest powers of N and D.
+    /// Highest powers of N and D.
     pub powers: [usize; 2],
-    /// Whether there are terms of a thin prism.
+    /// Whether thin-prism terms exist.
     pub prism: bool,
 }
 
 impl Terms {
-    /// All of them.
+    /// All terms.
     pub const ALL: Self = Self { powers: ALL_POWERS, prism: true };
 }
-/// How tangential terms grow beyond their own powers: they are multiplied by 1 + p3 q + p4 q^2 (Brown 1966).
+/// p3, p4 of the profile 1 + p3 q + p4 q^2, which multiplies the tangential terms (Brown 1966).
 pub type Profile = [f64; 2];
 
-/// Where a place goes, with its partials by the place, and what those by the terms need.
+/// Distorted position with its partials, and intermediate results for the partials with respect to the terms.
 #[derive(Debug, Clone, Copy)]
 pub struct Bent {
     /// x, y.
@@ -57,18 +57,18 @@ pub struct Bent {
     factor: f64,
     /// 1 + p3 q + p4 q^2.
     profile: f64,
-    /// What the tangential terms would add without it; zero where there is none.
+    /// Tangential terms without the profile; zero for a lens without profile.
     decentring: [f64; 2],
 }
 
 impl RadialTangential {
-    /// Where a place goes.
+    /// Returns the distorted position.
     #[inline(always)]
     pub fn bend(&self, place: [f64; 2]) -> Bent {
         self.bend_by(place, Terms::ALL)
     }
 
-    /// The same of a lens of which it is known that all but some terms are zero.
+    /// Returns the distorted position of a lens with only the given terms.
     #[inline(always)]
     pub fn bend_by(&self, place: [f64; 2], terms: Terms) -> Bent {
         let [a, b] = place;
@@ -98,7 +98,7 @@ impl RadialTangential {
         Bent { xy, by_place, place, square, reciprocal, factor, profile: 1.0, decentring: [0.0; 2] }
     }
 
-    /// Where a place goes with tangential terms that have a profile.
+    /// Returns the distorted position of a lens with a tangential profile.
     #[inline(always)]
     pub fn bend_profiled(&self, place: [f64; 2], [p3, p4]: Profile, terms: Terms) -> Bent {
         let ([a, b], [t1, t2], bent) = (place, self.tangential, self.bend_by(place, terms));
@@ -122,7 +122,7 @@ impl RadialTangential {
     }
 }
 
-/// A positive power as products: what is called for it could not be part of a vector.
+/// Returns a positive power as products: unlike a function call they can be vectorized.
 #[inline(always)]
 pub fn power_of(x: f64, power: i32) -> f64 {
     let mut product = x;
@@ -133,20 +133,20 @@ pub fn power_of(x: f64, power: i32) -> f64 {
 }
 
 impl Bent {
-    /// By the coefficient of q^i in N.
+    /// Returns the partials with respect to the coefficient of q^i in N.
     #[inline(always)]
     pub fn by_numerator(&self, power: i32) -> [f64; 2] {
         let (scale, [a, b]) = (power_of(self.square, power) * self.reciprocal, self.place);
         [scale * a, scale * b]
     }
 
-    /// By the coefficient of q^i in D.
+    /// Returns the partials with respect to the coefficient of q^i in D.
     #[inline(always)]
     pub fn by_denominator(&self, power: i32) -> [f64; 2] {
         self.by_numerator(power).map(|value| -self.factor * value)
     }
 
-    /// By t1, t2.
+    /// Returns the partials with respect to t1, t2.
     #[inline(always)]
     pub fn by_tangential(&self) -> [[f64; 2]; 2] {
         let ([a, b], q) = (self.place, self.square);
@@ -154,40 +154,40 @@ impl Bent {
         [[profile * (q + 2.0 * a * a), cross], [cross, profile * (q + 2.0 * b * b)]]
     }
 
-    /// By p3, p4 of the profile.
+    /// Returns the partials with respect to p3, p4 of the profile.
     #[inline(always)]
     pub fn by_profile(&self) -> [[f64; 2]; 2] {
         let q = self.square;
         [q, q * q].map(|power| self.decentring.map(|value| power * value))
     }
 
-    /// By s1, s2, which only x has, as s3, s4 are those of y.
+    /// Returns the partials of x with respect to s1, s2, which equal the partials of y with respect to s3, s4.
     #[inline(always)]
     pub fn by_prism(&self) -> [f64; 2] {
         [self.square, self.square * self.square]
     }
 }
 
-/// What a parameter is.
+/// Role of a camera parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Both focal lengths; that of columns; that of rows.
+    /// Both focal lengths; the focal length of columns; of rows.
     F,
     Fx,
     Fy,
-    /// The principal point.
+    /// Principal point.
     Cx,
     Cy,
-    /// The size of the picture, from whose centre the principal point is counted.
+    /// Image size; the principal point is relative to its centre.
     W,
     H,
-    /// Beside the focal length of columns; what rows add to columns; the same as a part of it.
+    /// Addition to the focal length of columns; shear of rows into columns; the shear relative to the focal length.
     B1,
     B2,
     Skew,
-    /// A parameter of the projection.
+    /// Parameter of the projection.
     Own(usize),
-    /// A coefficient of N or D of the radial factor, by its power.
+    /// Coefficient of N or D of the radial factor, by its power.
     N(usize),
     D(usize),
     /// t1 or t2.
@@ -198,8 +198,8 @@ pub(super) enum Role {
     P(usize),
 }
 
-/// What a lens does to a place: all terms at once, radial terms first and the others on what these have bent, or all at once with a
-/// profile of the tangential ones.
+/// Order of the lens terms: all in one step, radial terms first and the others on the radially distorted position, or in one step with a
+/// tangential profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Action {
     Whole,
@@ -220,7 +220,7 @@ impl Role {
     }
 }
 
-/// The terms of a lens that some parameters are of.
+/// Returns the lens terms of the given roles.
 pub(super) const fn terms(roles: &[Role]) -> Terms {
     let mut terms = Terms { powers: [0, 0], prism: false };
     let mut i = 0;
@@ -236,7 +236,7 @@ pub(super) const fn terms(roles: &[Role]) -> Terms {
     terms
 }
 
-/// What a camera is made of: image = (fx a + shear b + x0, fy b + y0) of the bent a, b.
+/// Parts of a camera: image = (fx a + shear b + x0, fy b + y0) of the distorted a, b.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parts {
     pub focal: [f64; 2],
@@ -249,7 +249,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Nothing but a lens that bends nothing.
+    /// Returns zero parameters and the identity lens.
     #[inline(always)]
     pub fn none() -> Self {
         let lens =
@@ -258,7 +258,7 @@ impl Parts {
         Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] }
     }
 
-    /// Takes the value of a parameter.
+    /// Sets the value of a parameter.
     #[inline(always)]
     pub fn take(&mut self, role: Role, value: f64) {
         match role {
@@ -280,7 +280,7 @@ impl Parts {
         }
     }
 
-    /// The place that a lens bends, and what it is then.
+    /// Applies the lens to a position.
     #[inline(always)]
     fn bend(&self, ab: [f64; 2], action: Action, terms: Terms) -> Bending {
         if action != Action::Staged {
@@ -310,13 +310,13 @@ impl Parts {
         [self.focal[0] * a + self.shear * b + self.origin[0], self.focal[1] * b + self.origin[1]]
     }
 
-    /// What moves a, b moves the image so.
+    /// Transforms a change of a, b to a change of the image.
     #[inline(always)]
     fn moved(&self, [a, b]: [f64; 2]) -> [f64; 2] {
         [self.focal[0] * a + self.shear * b, self.focal[1] * b]
     }
 
-    /// The image's partials by a parameter.
+    /// Returns the partials of the image with respect to a parameter.
     #[inline(always)]
     pub fn by(&self, role: Role, seen: &Seen, bending: &Bending) -> [f64; 2] {
         let [a, b] = bending.last.xy;
@@ -345,16 +345,16 @@ impl Parts {
     }
 }
 
-/// What a lens does in one or two stages: radial, then the rest.
+/// Result of a lens in one or two stages: radial terms, then the rest.
 pub(super) struct Bending {
     first: Bent,
     last: Bent,
-    /// What a lens gives by what its first stage gives, and by the place.
+    /// Partials of the distorted position with respect to the result of the first stage, and to the undistorted position.
     by_first: Matrix2,
     by_place: Matrix2,
 }
 
-/// A model as a table: the projection, how its terms act, and the roles.
+/// Camera model as a table: projection, order of the lens terms, parameter roles.
 pub(super) trait Table<const N: usize>: Copy {
     type Projection: RayProjection;
     const ACTION: Action;
@@ -363,7 +363,7 @@ pub(super) trait Table<const N: usize>: Copy {
 
     fn parts(&self) -> Parts;
 
-    /// The partials of x and y by the parameters.
+    /// Returns the partials of x and y with respect to the parameters.
     fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; N]; 2];
 
     #[inline(always)]

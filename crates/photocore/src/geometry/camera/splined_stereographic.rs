@@ -1,4 +1,4 @@
-//! The splined stereographic camera of mrcal: a stereographic one whose images are moved by B-splines on a grid of knots.
+//! Splined stereographic camera of mrcal: a stereographic camera with image displacements by B-splines on a grid of knots.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use super::model::{CameraModel, Image, Unit, parameters};
 use super::projections::{RayProjection, Stereographic};
 use crate::geometry::Vector3;
 
-/// Knots of an axis at the most.
+/// Maximum number of knots per axis.
 const MOST: f64 = 10_000.0;
-/// Steps of Newton's method at the most, what one is cut to, and after which one it ends: the next would be of its square.
+/// Maximum number of Newton steps; maximum step length; relative step length that ends the iteration (convergence is quadratic).
 const STEPS: usize = 100;
 const LONGEST: f64 = 0.3;
 const LAST: f64 = 1e-8;
 
-/// A stereographic camera with displacements d that are uniform B-splines of order 3 or 2.
+/// Stereographic camera with displacements d by uniform B-splines of order 3 or 2.
 ///
 /// ```text
 /// (X, Y, Z) = (u1, -u2, -u3),   n = |(X, Y, Z)|,   v = 2 (X, Y) / (n + Z)
@@ -23,8 +23,8 @@ const LAST: f64 = 1e-8;
 /// d = sum B_b(j) B_a(i) knot(a, b),   image = (fx (v1 + d1) + cx, fy (v2 + d2) + cy)
 /// ```
 ///
-/// Image coordinates are pixels, column and row. order, nx, ny and fov, in degrees, are never unknowns. The knots, beside the parameters,
-/// are row by row, columns fastest; zero unless given by [`CameraModel::with_knots`]. Beyond them the polynomials at the edge go on.
+/// Image coordinates are pixels, column and row. order, nx, ny and fov (degrees) are always fixed. Knots are listed row by row, columns
+/// fastest; they are zero unless set by [`CameraModel::with_knots`]. The polynomials at the edge extrapolate beyond the knots.
 ///
 /// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,18 +35,18 @@ pub struct SplinedStereographic {
     grid: Grid,
 }
 
-/// Where knots are.
+/// Layout of the knots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Grid {
-    /// Nodes that a place lies between, along an axis; 0 where constants are none of a spline.
+    /// Number of nodes per axis that affect a position; 0 for invalid constants.
     nodes: usize,
-    /// Knots along columns and rows.
+    /// Number of knots along columns and rows.
     size: [usize; 2],
-    /// s: from one knot to the next is its reciprocal.
+    /// s, the reciprocal of the knot spacing.
     per_place: f64,
 }
 
-/// The values of the splines that are not zero at a place along an axis, their slopes, and the first knot.
+/// Nonzero spline values at a position along an axis, their slopes, and the first knot.
 struct Basis {
     first: usize,
     values: [f64; NODES],
@@ -54,7 +54,7 @@ struct Basis {
 }
 
 impl Basis {
-    /// At a place that is counted in knots, of which there are `count`; beyond them the last polynomials go on.
+    /// Evaluates the basis at a position in units of knots, of which there are `count`; the edge polynomials extrapolate.
     #[inline]
     fn at(place: f64, count: usize, nodes: usize) -> Self {
         if nodes == NODES {
@@ -82,7 +82,7 @@ impl Basis {
 impl Grid {
     const NONE: Self = Self { nodes: 0, size: [0; 2], per_place: f64::NAN };
 
-    /// That of the constants; [`Grid::NONE`] where they are none of a spline.
+    /// Returns the grid of the constants; [`Grid::NONE`] if the constants are invalid.
     fn of([order, nx, ny, fov]: [f64; 4]) -> Self {
         let whole = |count: f64| count.fract() == 0.0 && count > order && count <= MOST;
         if (order != 3.0 && order != 2.0) || !whole(nx) || !whole(ny) || !(fov > 0.0 && fov < 360.0) {
@@ -92,7 +92,7 @@ impl Grid {
         Self { nodes: order as usize + 1, size: [nx as usize, ny as usize], per_place }
     }
 
-    /// The splines along columns and rows at a place of the stereographic image.
+    /// Returns the splines along columns and rows at a position of the stereographic image.
     #[inline]
     fn bases(&self, place: [f64; 2]) -> [Basis; 2] {
         [0, 1].map(|k| {
@@ -103,7 +103,7 @@ impl Grid {
 }
 
 impl SplinedStereographic {
-    /// A place of the stereographic image with its displacement, and the partials of that.
+    /// Returns a position of the stereographic image with its displacement, and the partials of the sum.
     #[inline]
     fn moved(&self, place: [f64; 2]) -> ([f64; 2], Matrix2) {
         let Grid { nodes, size, per_place } = self.grid;
@@ -127,15 +127,14 @@ impl SplinedStereographic {
         (at, by)
     }
 
-    /// The stereographic image of u, with its partials by the ray in axes of vision.
+    /// Returns the stereographic image of u, with its partials with respect to the ray in vision axes.
     #[inline]
     fn seen(u: &Vector3) -> ([f64; 2], [[f64; 3]; 2]) {
         let seen = Stereographic::project([u.x, -u.y, -u.z], [0.0; 2]);
         (seen.ab, seen.by_ray)
     }
 
-    /// The knots that images depend on which are nearer to that of u than so many distances of knots; None where constants are none of a
-    /// spline.
+    /// Returns the knots that affect images within `margin` knot spacings of the image of u; None for invalid constants.
     pub fn window(&self, u: &Vector3, margin: f64) -> Option<Window> {
         let Grid { nodes, per_place, .. } = self.grid;
         if nodes == 0 {
@@ -146,12 +145,12 @@ impl SplinedStereographic {
         Some(Window { first: at(-margin), end: at(margin).map(|first| first + nodes) })
     }
 
-    /// How many knots there are in a row.
+    /// Returns the number of knots per row.
     pub fn columns(&self) -> usize {
         self.grid.size[0]
     }
 
-    /// The place of the stereographic image that is moved to the given one.
+    /// Returns the position of the stereographic image whose displaced position is `target`.
     fn unmoved(&self, target: [f64; 2]) -> Option<[f64; 2]> {
         let mut place = target;
         for _ in 0..STEPS {
@@ -192,7 +191,7 @@ impl CameraModel for SplinedStereographic {
         self.parameters
     }
 
-    /// Knots stay while there are as many.
+    /// The knots are retained if the constants are unchanged.
     fn with_others(&self, parameters: [f64; 8]) -> Self {
         if parameters[4..] == self.parameters[4..] {
             return Self { parameters, knots: self.knots.clone(), grid: self.grid };
@@ -208,7 +207,7 @@ impl CameraModel for SplinedStereographic {
         (knots.len() == self.knots.len()).then(|| Self { knots, ..self.clone() })
     }
 
-    /// None where constants are none of a spline.
+    /// None for invalid constants.
     #[inline]
     fn patch(&self, u: &Vector3) -> Option<Patch> {
         let nodes = self.grid.nodes;
@@ -247,7 +246,7 @@ impl CameraModel for SplinedStereographic {
         Image { xy: [fx * a + cx, fy * b + cy], by_u, by_parameters }
     }
 
-    /// None where displacements turn the image over, or Newton's method does not end.
+    /// None if the displacements fold the image, or Newton's method does not converge.
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [fx, fy, cx, cy, ..] = self.parameters;
         let place = self.unmoved([(x - cx) / fx, (y - cy) / fy])?;

@@ -1,6 +1,6 @@
 //! Cameras of computer vision and of Agisoft: a projection, a lens with radial, tangential and prism terms, focal lengths.
 //!
-//! Each is a table of what its parameters are. Axes are those of vision, x right, y down, z forward: (X, Y, Z) = (u1, -u2, -u3). Image
+//! Each camera is a table of parameter roles. Axes are vision axes, x right, y down, z forward: (X, Y, Z) = (u1, -u2, -u3). Image
 //! coordinates are pixels, column and row.
 
 use super::inverse::RadialLimit;
@@ -12,15 +12,15 @@ use super::projections::{
 use super::radial_tangential::{Action, Bending, Parts, Role, Table};
 use crate::geometry::Vector3;
 
-/// Declares cameras: name and number of parameters, what files call it, projection, formula of the lens, parameters with their roles. The
-/// last `constants` of them are never unknowns.
+/// Declares cameras: name and number of parameters, name in files, projection, lens formula, parameters with their roles. The last
+/// `constants` of them are always fixed.
 macro_rules! cameras_of_vision {
     ($($(#[$doc:meta])* $name:ident[$count:literal] = $said:literal, $projection:ident, $action:ident, $constants:literal,
        $formula:expr, [$($parameter:literal: $role:expr),* $(,)?] $(, $lanes:ident)?;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct $name {
-            /// Its parameters, in their order.
+            /// Parameters, in order.
             pub parameters: [f64; $count],
         }
 
@@ -29,7 +29,7 @@ macro_rules! cameras_of_vision {
             const ACTION: Action = Action::$action;
             const ROLES: [Role; $count] = [$($role),*];
 
-            // Parameter by parameter, not in a loop: so the numbers are in registers, and lanes can be made of them.
+            // Unrolled instead of a loop: the numbers remain in registers, and the code can be vectorized.
             #[inline(always)]
             #[allow(unused_assignments)]
             fn parts(&self) -> Parts {
@@ -104,14 +104,14 @@ macro_rules! cameras_of_vision {
     )*};
 }
 
-/// (a, b) of a central perspective, and where the bent ones are in the image.
+/// Formula of (a, b) of a central perspective, the lens and the image.
 macro_rules! central {
     ($image:literal, $lens:literal) => {
         concat!("(a, b) = (P1, -P2) / -P3, r^2 = a^2 + b^2, ", $lens, ", image = ", $image)
     };
 }
 
-/// The same of an equidistant one.
+/// Formula of an equidistant projection, the lens and the image.
 macro_rules! fisheye {
     ($image:literal, $lens:literal) => {
         concat!(
@@ -130,7 +130,7 @@ cameras_of_vision! {
     SimplePinhole[3] = "simple_pinhole", Central, Whole, 0,
         central!("(f a + cx, f b + cy)", "no lens"),
         ["f": F, "cx": Cx, "cy": Cy];
-    /// PINHOLE of COLMAP: pixels that are not square.
+    /// PINHOLE of COLMAP: a central perspective with different focal lengths of columns and rows.
     Pinhole[4] = "pinhole", Central, Whole, 0,
         central!("(fx a + cx, fy b + cy)", "no lens"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy];
@@ -143,21 +143,21 @@ cameras_of_vision! {
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0)], IN_LANES;
-    /// FULL_OPENCV of COLMAP: a rational radial factor; k3 stands behind p2.
+    /// FULL_OPENCV of COLMAP: a rational radial factor; k3 follows p2.
     FullOpencv[12] = "full_opencv", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
              p1 (r^2 + 2 b^2) + 2 p2 a b)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
          "k6": D(3)];
-    /// The camera of OpenCV itself: that of [`FullOpencv`] with a thin prism; pixel centres are whole numbers.
+    /// Camera of OpenCV: [`FullOpencv`] with a thin prism; pixel centres are integers.
     OpencvPinhole[16] = "opencv_pinhole", Central, Whole, 0,
         central!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + (2 p1 a b + p2 (r^2 + 2 a^2), \
              p1 (r^2 + 2 b^2) + 2 p2 a b) + (s1 r^2 + s2 r^4, s3 r^2 + s4 r^4)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": D(1), "k5": D(2),
          "k6": D(3), "s1": S(0), "s2": S(1), "s3": S(2), "s4": S(3)];
-    /// FOV of COLMAP (Devernay and Faugeras 2001). At omega = 0 nothing depends on omega to first order: do not start there.
+    /// FOV of COLMAP (Devernay and Faugeras 2001). At omega = 0 the derivative with respect to omega vanishes: use another initial value.
     Fov[5] = "fov", FieldOfView, Whole, 0,
         central!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) atan(2 r tan(omega / 2)) / (r omega)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "omega": Own(0)];
@@ -181,18 +181,18 @@ cameras_of_vision! {
     OpencvFisheye[8] = "opencv_fisheye", Equidistant, Whole, 0,
         fisheye!("(fx A + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
-    /// The fisheye of OpenCV itself: that of [`OpencvFisheye`] with a skew; pixel centres are whole numbers.
+    /// Fisheye of OpenCV: [`OpencvFisheye`] with a skew; pixel centres are integers.
     OpencvFisheyeSkew[9] = "opencv_fisheye_skew", Equidistant, Whole, 0,
         fisheye!("(fx (A + skew B) + cx, fy B + cy)", "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8)"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "skew": Skew, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4)];
-    /// THIN_PRISM_FISHEYE of COLMAP; k3 stands behind p2.
+    /// THIN_PRISM_FISHEYE of COLMAP; k3 follows p2.
     ThinPrismFisheye[12] = "thin_prism_fisheye", Equidistant, Whole, 0,
         fisheye!("(fx A + cx, fy B + cy)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (2 p1 a b + p2 (r^2 + 2 a^2), p1 (r^2 + 2 b^2) + 2 p2 a b) + \
              (sx1, sy1) r^2"),
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2), "p1": T(1), "p2": T(0), "k3": N(3), "k4": N(4), "sx1": S(0),
          "sy1": S(2)];
-    /// RAD_TAN_THIN_PRISM_FISHEYE of COLMAP: tangential and prism terms act on what the radial ones have bent; p0, p1 are P1, P2 of
+    /// RAD_TAN_THIN_PRISM_FISHEYE of COLMAP: tangential and prism terms act on the radially distorted position; p0, p1 are P1, P2 of
     /// photogrammetry.
     RadTanThinPrismFisheye[16] = "rad_tan_thin_prism_fisheye", Equidistant, Staged, 0,
         fisheye!("(fx A + cx, fy B + cy)",
@@ -208,12 +208,12 @@ cameras_of_vision! {
     Division[5] = "division", DivisionByRadius, Whole, 0,
         "(A, B) = (P1, -P2) 2 / (-P3 + sqrt(P3^2 - 4 k (P1^2 + P2^2))), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k": Own(0)];
-    /// A fisheye that shows equal areas of the sky as equal areas, as most lenses of all-sky cameras do.
+    /// Equal-area fisheye, the projection of most all-sky lenses.
     Equisolid[6] = "equisolid", EquisolidRays, Whole, 0,
         "(a, b) = 2 sin(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
          (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "k1": N(1), "k2": N(2)];
-    /// A fisheye that shows circles of the sky as circles.
+    /// Stereographic fisheye, which preserves circles of the sphere.
     Stereographic[6] = "stereographic", StereographicRays, Whole, 0,
         "(a, b) = 2 tan(theta / 2) (P1, -P2) / rho, rho = hypot(P1, P2), theta = atan2(rho, -P3), r^2 = a^2 + b^2, \
          (A, B) = (a, b) (1 + k1 r^2 + k2 r^4), image = (fx A + cx, fy B + cy)",
@@ -222,26 +222,26 @@ cameras_of_vision! {
     Eucm[6] = "eucm", ExtendedUnified, Whole, 0,
         "d = sqrt(beta (P1^2 + P2^2) + P3^2), (A, B) = (P1, -P2) / (alpha d - (1 - alpha) P3), image = (fx A + cx, fy B + cy)",
         ["fx": Fx, "fy": Fy, "cx": Cx, "cy": Cy, "alpha": Own(0), "beta": Own(1)];
-    /// The frame camera of Agisoft; cx, cy are counted from the centre of the picture of w by h pixels, p1, p2 are P1, P2 of photogrammetry.
+    /// Frame camera of Agisoft; cx, cy are relative to the centre of the image of w by h pixels, p1, p2 are P1, P2 of photogrammetry.
     AgisoftFrame[13] = "agisoft_frame", Central, Whole, 2,
         central!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
         ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
          "h": H];
-    /// The fisheye of Agisoft: [`AgisoftFrame`] with an equidistant projection.
+    /// Fisheye of Agisoft: [`AgisoftFrame`] with an equidistant projection.
     AgisoftFisheye[13] = "agisoft_fisheye", Equidistant, Whole, 2,
         fisheye!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b)"),
         ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1), "w": W,
          "h": H];
-    /// [`AgisoftFrame`] with the profile of its tangential terms that files of 2016 to about 2020 hold.
+    /// [`AgisoftFrame`] with a tangential profile, as in files of 2016 to about 2020.
     AgisoftFrameP4[15] = "agisoft_frame_p4", Central, Profiled, 2,
         central!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b) \
              (1 + p3 r^2 + p4 r^4)"),
         ["f": F, "cx": Cx, "cy": Cy, "b1": B1, "b2": B2, "k1": N(1), "k2": N(2), "k3": N(3), "k4": N(4), "p1": T(0), "p2": T(1),
          "p3": P(0), "p4": P(1), "w": W, "h": H];
-    /// [`AgisoftFisheye`] with the same.
+    /// [`AgisoftFisheye`] with a tangential profile.
     AgisoftFisheyeP4[15] = "agisoft_fisheye_p4", Equidistant, Profiled, 2,
         fisheye!("(w/2 + cx + A f + A b1 + B b2, h/2 + cy + B f)",
             "(A, B) = (a, b) (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) + (p1 (r^2 + 2 a^2) + 2 p2 a b, p2 (r^2 + 2 b^2) + 2 p1 a b) \

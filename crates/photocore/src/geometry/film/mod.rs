@@ -1,4 +1,4 @@
-//! From the frame of a camera to the reading of a scanned film or a measured plate, with all partials.
+//! Transformation from the camera frame to the reading of a scanned film or a measured plate, with all partials.
 //!
 //! ```text
 //! n = q + [m + b1, b2; b2, m - b1] q + D(q)              q: mm, x right, y up, seen as the positive
@@ -15,7 +15,7 @@ use super::correction::PARAMETERS;
 
 pub use pattern::{Deformation, Function, Functions, Grid, Pattern, Scanned, Scanner};
 
-/// The film of a photo: where it lay, and how its size changed.
+/// Film of a photo: its orientation on the scanner and its deformation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Film {
     /// R(theta) J.
@@ -27,10 +27,10 @@ pub struct Film {
     bend: Bend,
 }
 
-/// What is not affine in the film of a photo.
+/// Non-affine deformation of the film of a photo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bend {
-    /// Nothing.
+    /// Zero.
     Flat,
     /// h1, h2, per mm.
     Bilinear([f64; 2]),
@@ -38,7 +38,7 @@ pub enum Bend {
     Projective([f64; 2]),
 }
 
-/// A reading with its partials; the first index is x or y.
+/// Reading with its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Reading {
     /// Column and row, or x and y.
@@ -49,14 +49,14 @@ pub struct Reading {
     pub by_film: [[f64; 6]; 2],
     /// With respect to h1, h2 or g1, g2.
     pub by_bend: Matrix2,
-    /// With respect to D: times the value of a function of the pattern that is the partial by its weight.
+    /// With respect to D: its product with the value of a pattern function is the partial with respect to the function's weight.
     pub by_shift: Matrix2,
     /// With respect to the parameters of the scanner's correction.
     pub by_scanner: [[f64; PARAMETERS]; 2],
 }
 
 impl Reading {
-    /// Of a place that no reading has.
+    /// NaN, for positions without a reading.
     pub const NONE: Self = {
         let square = [[f64::NAN; 2]; 2];
         Self {
@@ -80,13 +80,13 @@ struct Aged {
 }
 
 impl Film {
-    /// One that lay at t1, t2 (mm), theta (radians), whose size has changed by m, b1, b2; `mirrored`: seen from the other side.
+    /// Returns a film with orientation t1, t2 (mm), theta (radians) and deformation m, b1, b2; `mirrored` if the emulsion side is reversed.
     pub fn new(mirrored: bool, [t1, t2, theta]: [f64; 3], size: [f64; 3], bend: Bend) -> Self {
         let ((sin, cos), side) = (theta.sin_cos(), if mirrored { -1.0 } else { 1.0 });
         Self { lie: [[side * cos, -sin], [side * sin, cos]], shift: [t1, t2], size, bend }
     }
 
-    /// The reading of a place in the camera's frame; None where the scanner has none.
+    /// Returns the reading of a position in the camera frame; None outside of the scanner's range.
     pub fn read(&self, q: [f64; 2], deformation: &Deformation, scanner: &Scanner) -> Option<Reading> {
         let Aged { e, by_q, by_size, by_bend, by_shift } = self.aged(q, deformation);
         let [x, y] = times(&self.lie, e);
@@ -107,7 +107,7 @@ impl Film {
         })
     }
 
-    /// The place in the camera's frame that has a reading; None where there is none near. `deformation` says D of a place.
+    /// Returns the position of a reading in the camera frame; None without convergence. `deformation` returns D of a position.
     pub fn place(
         &self,
         reading: [f64; 2],
@@ -122,7 +122,7 @@ impl Film {
         })
     }
 
-    /// e.
+    /// Returns e with its partials.
     fn aged(&self, q: [f64; 2], deformation: &Deformation) -> Aged {
         let ([x, y], [m, b1, b2], Deformation { shift, by_place }) = (q, self.size, *deformation);
         let affine = [[1.0 + m + b1, b2], [b2, 1.0 + m - b1]];

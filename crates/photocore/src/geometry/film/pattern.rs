@@ -1,6 +1,6 @@
-//! Systematic deformations of films: sums of given functions of the place, each with a weight.
+//! Systematic film deformations: weighted sums of given functions of the position.
 //!
-//! What a scanner or comparator reads where a place of a film lies.
+//! Readings of a scanner or comparator as functions of the film position.
 
 use smallvec::SmallVec;
 
@@ -8,51 +8,51 @@ use crate::geometry::camera::inverse::{inverted, times};
 use crate::geometry::camera::{Ebner12, Matrix2, OrthogonalSet};
 use crate::geometry::correction::{Correction, LINEAR, Linear, PARAMETERS, Placed};
 
-/// Which functions a deformation is made of. All are without dimension: weights are lengths, in mm.
+/// Functions of a deformation, dimensionless: weights are lengths in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pattern {
-    /// `w1 x y/h^2` in x and `w2 (x^2 - y^2)/h^2` in y, h half the format.
+    /// `w1 x y/h^2` in x and `w2 (x^2 - y^2)/h^2` in y; h is half the format.
     Quadratic {
         /// h.
         half: f64,
     },
-    /// The corrections of Ebner (1976) without the linear e1 and e2, of `x/h` and `y/h`.
+    /// Corrections of Ebner (1976) without the linear e1 and e2, as functions of `x/h` and `y/h`.
     Ebner {
         /// h.
         half: f64,
     },
-    /// Shifts of the nodes of a grid, bilinear inside the cells; beyond the grid, cells at its edge go on.
+    /// Displacements of grid nodes, bilinear inside the cells; edge cells extrapolate beyond the grid.
     Grid(Grid),
 }
 
-/// The nodes of a grid, row by row. Weights are the shifts in x and y, node by node.
+/// Nodes of a grid, row by row. Weights are the displacements in x and y, node by node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// The first node.
+    /// Position of the first node.
     pub first: [f64; 2],
-    /// From a node to the next, along x and y.
+    /// Distance between nodes along x and y.
     pub spacing: [f64; 2],
-    /// Columns and rows, 2 at least.
+    /// Number of columns and rows, at least 2.
     pub nodes: [usize; 2],
 }
 
-/// A function that is not zero in a cell.
+/// Function that is nonzero in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Function {
-    /// The number of its weight among those of the [`Pattern::pairs`] of the cell.
+    /// Index of its weight among the [`Pattern::pairs`] of the cell.
     pub weight: usize,
-    /// Along x or y.
+    /// Axis of the displacement, x or y.
     pub axis: usize,
-    /// Its value.
+    /// Value of the function.
     pub value: f64,
-    /// Its derivatives by the place.
+    /// Derivatives with respect to the position.
     pub slope: [f64; 2],
 }
 
-/// The functions that are not zero in a cell.
+/// Functions that are nonzero in a cell.
 pub type Functions = SmallVec<[Function; 20]>;
 
-/// D at a place, and its partials by the place.
+/// D at a position, and its partials with respect to the position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deformation {
     /// D, mm.
@@ -62,7 +62,7 @@ pub struct Deformation {
 }
 
 impl Deformation {
-    /// The sum of functions with the given weights.
+    /// Returns the weighted sum of functions.
     pub fn new(functions: &[Function], weight: impl Fn(usize) -> f64) -> Self {
         let mut all = Self::default();
         for own in functions {
@@ -75,7 +75,7 @@ impl Deformation {
 }
 
 impl Pattern {
-    /// Number of weights.
+    /// Returns the number of weights.
     pub fn count(&self) -> usize {
         match self {
             Self::Quadratic { .. } => 2,
@@ -84,7 +84,7 @@ impl Pattern {
         }
     }
 
-    /// The cell of a place: patterns that are no grid have one.
+    /// Returns the cell of a position: 0 for patterns without a grid.
     pub fn cell(&self, place: [f64; 2]) -> usize {
         match self {
             Self::Quadratic { .. } | Self::Ebner { .. } => 0,
@@ -92,7 +92,7 @@ impl Pattern {
         }
     }
 
-    /// The pairs of weights that count in a cell: weights 2k and 2k + 1 are pair k.
+    /// Returns the pairs of weights that are active in a cell: weights 2k and 2k + 1 are pair k.
     pub fn pairs(&self, cell: usize) -> SmallVec<[usize; 5]> {
         match self {
             Self::Quadratic { .. } | Self::Ebner { .. } => (0..self.count() / 2).collect(),
@@ -100,7 +100,7 @@ impl Pattern {
         }
     }
 
-    /// The functions of a cell at a place.
+    /// Returns the functions of a cell at a position.
     pub fn at(&self, cell: usize, place: [f64; 2]) -> Functions {
         match *self {
             Self::Quadratic { half } => quadratic(half, place).into_iter().collect(),
@@ -124,7 +124,7 @@ fn quadratic(half: f64, [x, y]: [f64; 2]) -> [Function; 2] {
 }
 
 fn ebner(half: f64, place: [f64; 2]) -> Functions {
-    /// e1 and e2.
+    /// Number of linear terms, e1 and e2.
     const LINEAR: usize = 2;
     let [of_x, of_y] = place.map(|value| Ebner12::basis(value / half, 1.0));
     let nonlinear = Ebner12::TERMS.iter().filter(|term| term.0 >= LINEAR);
@@ -137,7 +137,7 @@ fn ebner(half: f64, place: [f64; 2]) -> Functions {
 }
 
 impl Grid {
-    /// Cells are numbered by their first corners.
+    /// Returns the cell of a position; cells are numbered by their first corners.
     fn cell(&self, place: [f64; 2]) -> usize {
         let along = |k: usize| {
             let from_first = (place[k] - self.first[k]) / self.spacing[k];
@@ -167,7 +167,7 @@ impl Grid {
     }
 }
 
-/// A scanner: what it reads becomes a true place by its correction.
+/// Scanner with the correction of its readings.
 ///
 /// ```text
 /// (X, Y) = (x - o1, y - o2) pitch, or (x - o1, o2 - y) pitch where rows count down,    true = correction(X, Y)
@@ -175,47 +175,47 @@ impl Grid {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scanner {
     correction: Correction,
-    /// Its linear part.
+    /// Linear part of the correction.
     linear: Linear,
-    /// Whether it may have polynomials.
+    /// Whether the polynomials may be nonzero.
     curved: bool,
     /// o1, o2.
     origin: [f64; 2],
-    /// Units of readings in a mm along each axis.
+    /// Reading units per mm along each axis.
     units: [f64; 2],
 }
 
-/// A reading with its partials; the first index is x or y.
+/// Reading with its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct Scanned {
     /// Column and row, or x and y.
     pub xy: [f64; 2],
-    /// With respect to the true place.
+    /// With respect to the corrected position.
     pub by_place: Matrix2,
     /// With respect to the parameters of the correction.
     pub by_parameters: [[f64; PARAMETERS]; 2],
 }
 
 impl Scanner {
-    /// One of so many mm in a unit of readings; `down`: whether the second coordinate counts down. The correction is that of readings in mm,
-    /// counted from the origin, y up; without polynomials unless it is `curved`.
+    /// Returns a scanner with `pitch` mm per unit of readings; `down`: whether the second coordinate increases downwards. The correction
+    /// applies to readings in mm from the origin, y up. Its polynomials are used only if it is `curved`.
     pub fn new((correction, curved): (Correction, bool), pitch: f64, origin: [f64; 2], down: bool) -> Self {
         let units = [1.0 / pitch, if down { -1.0 } else { 1.0 } / pitch];
         Self { correction, linear: correction.linear(), curved, origin, units }
     }
 
-    /// Units of readings in a mm, without sign.
+    /// Returns the reading units per mm, without sign.
     pub fn scale(&self) -> f64 {
         self.units[0]
     }
 
-    /// The true place of a reading.
+    /// Returns the corrected position of a reading.
     pub fn place(&self, xy: [f64; 2]) -> [f64; 2] {
         let counted = [0, 1].map(|k| (xy[k] - self.origin[k]) / self.units[k]);
         if self.curved { self.correction.place(counted) } else { times(&self.linear.matrix, counted) }
     }
 
-    /// The reading of a true place; None where the correction has no way back.
+    /// Returns the reading of a corrected position; None if the correction is not invertible there.
     pub fn read(&self, place: [f64; 2]) -> Option<Scanned> {
         let mut by_parameters = [[0.0; PARAMETERS]; 2];
         let (reading, back, count) = if self.curved {
@@ -230,7 +230,7 @@ impl Scanner {
             (reading, self.linear.back, LINEAR)
         };
         let by_place = [0, 1].map(|row| back[row].map(|value| self.units[row] * value));
-        // g(reading; parameters) = place stays, so d reading = -(dg/d reading)^-1 dg/d parameter.
+        // g(reading; parameters) = position is constant, so d reading = -(dg/d reading)^-1 dg/d parameter.
         for k in 0..count {
             let moved = times(&by_place, [by_parameters[0][k], by_parameters[1][k]]);
             (0..2).for_each(|row| by_parameters[row][k] = -moved[row]);

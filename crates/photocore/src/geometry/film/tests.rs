@@ -1,11 +1,11 @@
-//! Partials against differences, and the way back.
+//! Tests of the film model: partials against differences, and the inverse.
 
 #![allow(clippy::unwrap_used)]
 
 use super::{Bend, Deformation, Film, Grid, Pattern, Reading, Scanned, Scanner};
 use crate::geometry::correction::Correction;
 
-/// A chain of everything, as numbers: q, film, bend, weights of the pattern, parameters of the scanner.
+/// Parameters of the complete chain: q, film, bend, weights of the pattern, parameters of the scanner.
 #[derive(Clone)]
 struct Scene {
     pattern: Pattern,
@@ -40,7 +40,7 @@ impl Scene {
         Film::new(self.mirrored, [t1, t2, theta], [m, b1, b2], bend(self.bend))
     }
 
-    /// All numbers with the steps that they take in units of mm, and the partials by each.
+    /// Returns all parameters with their steps in units of mm, and their partials.
     fn partials(&self) -> Vec<(usize, f64, [f64; 2])> {
         let found = self.reading();
         let column = |rows: [&[f64]; 2], k: usize| [rows[0][k], rows[1][k]];
@@ -113,11 +113,11 @@ fn partials_agree_with_differences() {
             let [near, back, far, far_back] = [1.0, -1.0, 2.0, -2.0].map(at);
             let [further, further_back] = [3.0, -3.0].map(at);
             for row in 0..2 {
-                // Central differences of the sixth order.
+                // Sixth-order central differences.
                 let change = 45.0 * (near[row] - back[row]) - 9.0 * (far[row] - far_back[row])
                     + (further[row] - further_back[row]);
                 let error = (change / (60.0 * step) - by[row]).abs();
-                // Steps move readings by some ten pixels.
+                // The steps change readings by about ten pixels.
                 assert!(error * step < 1e-9, "{number} {row}: {error:e} of {}", by[row]);
             }
         }

@@ -1,25 +1,25 @@
-//! The axes that corrections of positions are told in.
+//! Axes of position corrections.
 
 use super::Positions;
 use crate::geometry::{Matrix3, Vector3};
 
-/// What corrections of positions are along.
+/// Axes in which position corrections are expressed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Axes {
     /// The axes of the table.
     #[default]
     Table,
-    /// Along, across and radial on an orbit about a place: radial is away from it, along the velocity across that, across to the left.
+    /// Orbit about a centre: radial points outward, along is the velocity component perpendicular to it, across points left.
     Orbit(Vector3),
-    /// The same of a flight: radial is the third axis of the table, up.
+    /// Flight: the same axes, with the third axis of the table (up) as radial.
     Flight,
 }
 
-/// The step, in seconds, of the differences of axes, which are of the fourth order.
+/// Step, in seconds, of the fourth-order differences of axes.
 const STEP: f64 = 5e-4;
 
 impl Axes {
-    /// Their directions as columns, in those of the table, and how these change in a second.
+    /// Returns the directions of the axes as columns, in the axes of the table, and their derivatives per second.
     pub(super) fn at(&self, positions: &Positions, time: f64) -> (Matrix3, Matrix3) {
         if *self == Self::Table {
             return (Matrix3::identity(), Matrix3::zeros());
@@ -38,7 +38,7 @@ impl Axes {
         Matrix3::from_columns(&[along, radial.cross(&along), radial])
     }
 
-    /// The same with coordinates counted from an origin.
+    /// Returns the axes with coordinates relative to an origin.
     pub(super) fn counted_from(self, origin: [f64; 3]) -> Self {
         match self {
             Self::Orbit(centre) => Self::Orbit(centre - Vector3::from(origin)),

@@ -1,11 +1,11 @@
-//! Poses as functions of time: a table of what is known beforehand, and corrections in a basis of functions of time.
+//! Trajectories (poses as functions of time): an a-priori table, and corrections in a basis of functions of time.
 //!
 //! ```text
 //! C(t) = C0(t) + sum B_k(t) c_k        A(t) = A0(t) Exp(r(t)),  r(t) = sum B_k(t) r_k
 //! ```
 //!
-//! C0, A0 are the table. c_k, in the axes of the table, and the rotation vectors r_k, in those of the photo, are the coefficients. Others are
-//! [`Axes`] and [`Rotations`]. A frame is the case of one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
+//! The table is C0, A0. The coefficients are c_k, in its axes, and rotation vectors r_k, in photo axes; alternatives: [`Axes`],
+//! [`Rotations`]. A frame photo has one record and degree 0. Continuous-time splines: Furgale and others 2012; line scanners: Poli 2007.
 
 mod axes;
 mod functions;
@@ -29,7 +29,7 @@ macro_rules! bases {
         $(mod $module;
         pub use $module::$name;)*
 
-        /// What corrections are made of: functions of time of any kind, or nothing.
+        /// Basis of corrections: functions of time, or none.
         #[derive(Debug, Clone, PartialEq, Default)]
         pub enum Basis {
             /// No corrections.
@@ -39,7 +39,7 @@ macro_rules! bases {
         }
 
         impl Basis {
-            /// A basis of that name (see [`BasisModel::from_numbers`]); None where there is no such.
+            /// Returns a basis by name (see [`BasisModel::from_numbers`]); None for an unknown name.
             pub fn from_numbers(name: &str, degree: usize, numbers: &[f64]) -> Option<Self> {
                 match name {
                     "none" => Some(Self::None),
@@ -48,7 +48,7 @@ macro_rules! bases {
                 }
             }
 
-            /// How many functions there are.
+            /// Returns the number of functions.
             pub fn count(&self) -> usize {
                 match self {
                     Self::None => 0,
@@ -56,7 +56,7 @@ macro_rules! bases {
                 }
             }
 
-            /// Those functions that are not zero at a time.
+            /// Returns the functions that are nonzero at a time.
             pub fn at(&self, time: f64) -> Active {
                 let mut all = Active::default();
                 match self {
@@ -113,12 +113,12 @@ bases! {
 }
 
 impl Basis {
-    /// Whether some functions are zero at some times: others then are not.
+    /// Returns whether the functions are local, that is zero outside of a time interval.
     pub fn is_local(&self) -> bool {
         self.reach().is_some()
     }
 
-    /// The numbers of the functions that are not zero at a time or, where that is not known exactly, near it.
+    /// Returns the indices of the functions that are nonzero at a time or, unless `exactly`, near it.
     pub fn near(&self, time: f64, exactly: bool) -> Range<usize> {
         match self.reach() {
             Some(reach) if !exactly => self.active(time - reach).start..self.active(time + reach).end,
@@ -127,58 +127,58 @@ impl Basis {
     }
 }
 
-/// A pose, and how it moves.
+/// Pose with its velocity and rotation rate.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     /// The pose.
     pub pose: Pose,
-    /// C', in the axes of the pose's position, in a second.
+    /// C' in the axes of the position, per second.
     pub velocity: Vector3,
-    /// w, about the axes of the photo, in radians in a second: `A' = A [w]x`.
+    /// w, about the axes of the photo, in radians per second: `A' = A [w]x`.
     pub rate: Vector3,
 }
 
-/// A trajectory without the values of its coefficients.
+/// Trajectory without the values of its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// What is known beforehand of positions.
+    /// A-priori positions.
     pub positions: Positions,
-    /// The same of attitudes, photo to the axes of the positions.
+    /// A-priori attitudes, photo to the axes of the positions.
     pub attitudes: Attitudes,
-    /// What the corrections of positions are made of.
+    /// Basis of the position corrections.
     pub position: Basis,
-    /// The same of attitudes.
+    /// Basis of the attitude corrections.
     pub rotation: Basis,
-    /// The axes of the corrections of positions.
+    /// Axes of the position corrections.
     pub axes: Axes,
-    /// What the corrections of attitudes are.
+    /// Parametrization of the attitude corrections.
     pub rotations: Rotations,
-    /// Where the table is inertial, and the object space a body that turns: inertial to body.
+    /// Attitudes inertial to body, if the table is inertial and the object space is a rotating body.
     pub body: Option<Attitudes>,
 }
 
-/// A trajectory at a time, with what its pose is made of.
+/// Evaluated trajectory at a time, with derivatives.
 #[derive(Debug, Clone)]
 pub struct Flight {
     /// Pose, velocity and rate.
     pub motion: Motion,
-    /// The functions that the position is made of.
+    /// Basis functions of the position.
     pub position: Active,
-    /// The same of the rotation.
+    /// Basis functions of the rotation.
     pub rotation: Active,
-    /// The axes of the coefficients of positions, as columns in those of the object space.
+    /// Axes of the position coefficients, as columns in the axes of the object space.
     pub axes: Matrix3,
-    /// How these change in a second.
+    /// Derivatives of these axes per second.
     axes_rate: Matrix3,
-    /// The turn about the axes of the photo by a unit of each correction of the attitude, as columns: Jr(r) of rotation vectors.
+    /// Rotation about the axes of the photo per unit of each attitude correction, as columns: Jr(r) for rotation vectors.
     pub jacobian: Matrix3,
-    /// How that changes.
+    /// Parametrization and values for the rate of the Jacobian.
     rotations: Rotations,
     turn: [Vector3; 2],
 }
 
 impl Trajectory {
-    /// At a time, the coefficients given.
+    /// Evaluates the trajectory at a time with the given coefficients.
     pub fn at(&self, time: f64, c: &dyn Fn(usize) -> Vector3, r: &dyn Fn(usize) -> Vector3) -> Flight {
         let (position, rotation) = (self.position.at(time), self.rotation.at(time));
         let (shift, drift) = position.sums(c);
@@ -209,21 +209,21 @@ impl Trajectory {
         }
     }
 
-    /// Where it is at a time, or at the end that is nearest to that, by its table alone.
+    /// Returns the table position at a time, clamped to the valid time range, without corrections.
     pub fn place(&self, time: f64) -> Vector3 {
         let (first, last) = self.span();
         let nothing = |_: usize| Vector3::zeros();
         self.at(time.max(first).min(last), &nothing, &nothing).motion.pose.position
     }
 
-    /// The same with its coordinates counted from an origin.
+    /// Returns the trajectory with coordinates relative to an origin.
     #[must_use]
     pub fn counted_from(&self, origin: [f64; 3]) -> Self {
         let (positions, axes) = (self.positions.counted_from(origin), self.axes.counted_from(origin));
         Self { positions, axes, ..self.clone() }
     }
 
-    /// The times that it may be asked for: those of the table and half a record beyond, within the knots of splines.
+    /// Returns the valid time range: the table and half a record beyond, within the knots of splines.
     pub fn span(&self) -> (f64, f64) {
         let all = [self.positions.span(), self.attitudes.span(), self.position.span(), self.rotation.span()];
         all.into_iter()
@@ -235,15 +235,15 @@ impl Trajectory {
 }
 
 impl Flight {
-    /// The partials of C' by c_k.
+    /// Returns the partials of C' with respect to c_k.
     pub fn velocity_by_position(&self, k: usize) -> Matrix3 {
         self.position.rate(k) * self.axes + self.position.value(k) * self.axes_rate
     }
 
-    /// The partials of w by r_k: `W_k = B_k' Jr + B_k (Jr' + [w]x Jr)`.
+    /// Returns the partials of w with respect to r_k: `W_k = B_k' Jr + B_k (Jr' + [w]x Jr)`.
     pub fn rate_by_rotation(&self, k: usize) -> Matrix3 {
         let (value, rate) = (self.rotation.value(k), self.rotation.rate(k));
-        // The turning of the body, which is in w, steps as it is seen in the photo's axes.
+        // The rotation of the body, which is part of w, changes in the photo's axes.
         rate * self.jacobian
             + value
                 * (self.rotations.jacobian_rate(&self.turn) + self.motion.rate.cross_matrix() * self.jacobian)

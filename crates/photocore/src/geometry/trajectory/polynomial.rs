@@ -1,22 +1,22 @@
-//! Corrections that are polynomials in time.
+//! Polynomial corrections in time.
 
 use super::functions::{Active, BasisModel};
 
 /// Powers of scaled time: `B_k = ((t - reference) / scale)^k`, k from 0 to the degree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Polynomial {
-    /// The highest power.
+    /// Highest power.
     pub degree: usize,
-    /// The time that counts as zero.
+    /// Time with the scaled value 0.
     pub reference: f64,
-    /// The seconds that count as one.
+    /// Unit of the scaled time, in seconds.
     pub scale: f64,
 }
 
 impl BasisModel for Polynomial {
     const NAME: &'static str = "polynomial";
 
-    /// The reference and the scale.
+    /// The numbers are the reference and the scale.
     fn from_numbers(degree: usize, numbers: &[f64]) -> Option<Self> {
         let &[reference, scale] = numbers else { return None };
         Some(Self { degree, reference, scale })

@@ -1,45 +1,45 @@
-//! What the coefficients of rotations are: rotation vectors, or the three angles of ISIS.
+//! Parametrizations of rotation corrections: rotation vectors, or the three angles of ISIS.
 
 use crate::geometry::angle_axis::{angle_axis_with_jacobian, right_jacobian_rate};
 use crate::geometry::{Matrix3, Vector3};
 
-/// What is added to the attitudes of a table.
+/// Correction of the attitudes of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotations {
     /// Rotation vectors r about the axes of the photo: `A = A_0 Exp(r)`.
     #[default]
     Vector,
-    /// Angles, added to those of the table: `M = [a3]_3 [a2]_1 [a1]_3` leads from the axes of the table to a camera that looks along its
-    /// third axis, x right and y down: `A = M' F`, F = diag(1, -1, -1).
+    /// Angles, added to the angles of the table. `M = [a3]_3 [a2]_1 [a1]_3` rotates from the axes of the table to a camera that looks along
+    /// its third axis, x right and y down: `A = M' F`, F = diag(1, -1, -1).
     Zxz,
 }
 
-/// An attitude that is corrected.
+/// Corrected attitude and its derivatives.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corrected {
     pub attitude: Matrix3,
     /// w, about the axes of the photo.
     pub rate: Vector3,
-    /// The turn about these by a unit of each of the three corrections, as columns.
+    /// Rotation about these axes per unit of each of the three corrections, as columns.
     pub jacobian: Matrix3,
-    /// The corrections with what they are added to, and how they change.
+    /// Sum of table and corrections, and its rate.
     pub turn: [Vector3; 2],
 }
 
-/// The columns a1, a2, a3 of K, but for F: `[a3]_3 [a2]_1 e3, [a3]_3 e1, e3`.
+/// Returns the columns a1, a2, a3 of K without F: `[a3]_3 [a2]_1 e3, [a3]_3 e1, e3`.
 fn columns([_, a2, a3]: [f64; 3]) -> [Vector3; 3] {
     let ((s2, c2), (s3, c3)) = (a2.sin_cos(), a3.sin_cos());
     [Vector3::new(s3 * s2, c3 * s2, c2), Vector3::new(c3, -s3, 0.0), Vector3::z()]
 }
 
-/// F times a vector.
+/// Returns F times a vector.
 fn looking_back(v: Vector3) -> Vector3 {
     Vector3::new(v.x, -v.y, -v.z)
 }
 
-/// `A = M' F` of three angles.
+/// Returns `A = M' F` of three angles.
 fn attitude(a: &Vector3) -> Matrix3 {
-    // The rows of M' F are the columns of M times F: those of M' are e1, e2, e3 turned back through the three angles.
+    // The columns of M' F are e1, -e2, -e3 rotated back by the three angles.
     let ((s1, c1), (s2, c2), (s3, c3)) = (a.x.sin_cos(), a.y.sin_cos(), a.z.sin_cos());
     let first = Vector3::new(c3 * c1 - s3 * c2 * s1, c3 * s1 + s3 * c2 * c1, s3 * s2);
     let second = Vector3::new(-s3 * c1 - c3 * c2 * s1, -s3 * s1 + c3 * c2 * c1, c3 * s2);
@@ -47,16 +47,16 @@ fn attitude(a: &Vector3) -> Matrix3 {
     Matrix3::from_columns(&[first, -second, -third])
 }
 
-/// The three angles of an attitude.
+/// Returns the three angles of an attitude.
 fn angles(a: &Matrix3) -> Vector3 {
-    // Rows of M: the columns of A, the second and third turned round.
+    // The rows of M are the columns of A with the second and third negated.
     let (m13, m23) = (a[(2, 0)], -a[(2, 1)]);
     let (m31, m32, m33) = (-a[(0, 2)], -a[(1, 2)], -a[(2, 2)]);
     Vector3::new(m31.atan2(-m32), m31.hypot(m32).atan2(m33), m13.atan2(m23))
 }
 
 impl Rotations {
-    /// An attitude of a table, which turns at a rate, with corrections that change at a rate. Not a number where sin a2 is zero.
+    /// Returns the corrected attitude of a table attitude and its rate, for given corrections and rates. NaN if sin a2 is zero.
     pub(super) fn corrected(self, (attitude, rate): (Matrix3, Vector3), turn: [Vector3; 2]) -> Corrected {
         match self {
             Self::Vector => {
@@ -76,14 +76,14 @@ impl Rotations {
         }
     }
 
-    /// How the jacobian of a corrected attitude changes.
+    /// Returns the derivative of the Jacobian of a corrected attitude per second.
     pub(super) fn jacobian_rate(self, [turn, rate]: &[Vector3; 2]) -> Matrix3 {
         match self {
             Self::Vector => right_jacobian_rate(turn, rate),
             Self::Zxz => {
                 let (s2, c2) = turn.y.sin_cos();
                 let [first, second, _] = columns((*turn).into());
-                // The third axis turns what stands before it by -a3', the second what stands before that by -a2'.
+                // The rotation by a3 changes the first two columns by -a3', the rotation by a2 only the first by -a2'.
                 let by_third = |v: &Vector3| -rate.z * Vector3::z().cross(v);
                 let (s3, c3) = turn.z.sin_cos();
                 let by_second = rate.y * Vector3::new(s3 * c2, c3 * c2, -s2);
@@ -96,7 +96,7 @@ impl Rotations {
         }
     }
 
-    /// K: rho = K da.
+    /// Returns K with rho = K da.
     fn zxz_jacobian(a: &Vector3) -> Matrix3 {
         Matrix3::from_columns(&columns((*a).into()).map(looking_back))
     }

@@ -1,4 +1,4 @@
-//! Corrections that are splines in time.
+//! Spline corrections in time.
 
 use std::ops::Range;
 
@@ -6,30 +6,30 @@ use smallvec::{SmallVec, smallvec};
 
 use super::functions::{Active, BasisModel};
 
-/// The B-splines of a degree over knots, which do not decrease (Cox and de Boor): B_k is not zero from knot k to knot k + degree + 1.
+/// B-splines over nondecreasing knots (Cox and de Boor): B_k is nonzero between the knots k and k + degree + 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spline {
-    /// 1 to 5.
+    /// Degree, 1 to 5.
     pub degree: usize,
-    /// In seconds; more than twice the degree.
+    /// Knots in seconds; more than twice the degree.
     pub knots: Vec<f64>,
 }
 
 impl Spline {
-    /// The interval between knots that a time is in, of those where as many functions as there can be are not zero.
+    /// Returns the knot interval of a time, restricted to intervals with degree + 1 nonzero functions.
     fn interval(&self, time: f64) -> usize {
         let after = self.knots.partition_point(|&knot| knot <= time);
         after.saturating_sub(1).clamp(self.degree, self.count() - 1)
     }
 
-    /// The functions of a lower degree in an interval: so many as the degree and one more.
+    /// Returns the degree + 1 nonzero functions of a lower degree in an interval.
     fn lower(&self, interval: usize, degree: usize, time: f64) -> SmallVec<[f64; 6]> {
         let knot = |k: usize| self.knots[k];
         let mut all: SmallVec<[f64; 6]> = smallvec![1.0];
         for p in 1..=degree {
             let mut next: SmallVec<[f64; 6]> = smallvec![0.0; p + 1];
             for (j, value) in all.iter().enumerate() {
-                // B of degree p - 1 that begins at this knot; part of it goes to the one that begins a knot before.
+                // B of degree p - 1 that begins at this knot; the rest contributes to the function that begins one knot earlier.
                 let k = interval + 1 + j - p;
                 let length = knot(k + p) - knot(k);
                 let share = if length > 0.0 { (time - knot(k)) / length } else { 0.0 };
@@ -45,7 +45,7 @@ impl Spline {
 impl BasisModel for Spline {
     const NAME: &'static str = "spline";
 
-    /// The knots.
+    /// The numbers are the knots.
     fn from_numbers(degree: usize, numbers: &[f64]) -> Option<Self> {
         Some(Self { degree, knots: numbers.to_vec() })
     }
@@ -88,7 +88,7 @@ impl BasisModel for Spline {
         (self.knots[self.degree.min(last)], self.knots[last])
     }
 
-    /// The mean of the knots inside (Greville).
+    /// Mean of the inner knots (Greville).
     fn middle(&self, k: usize) -> Option<f64> {
         let inside = self.knots.get(k + 1..=k + self.degree)?;
         Some(inside.iter().sum::<f64>() / self.degree as f64)

@@ -1,6 +1,6 @@
-//! What is known of a trajectory beforehand: records of positions and of attitudes, each at times of their own.
+//! A-priori trajectory: records of positions and of attitudes, each at times of their own.
 //!
-//! Interpolation by the polynomial through neighbouring records.
+//! Lagrange interpolation uses the polynomial through neighbouring records.
 
 use smallvec::SmallVec;
 
@@ -9,19 +9,19 @@ use crate::geometry::angle_axis::{
 };
 use crate::geometry::{Matrix3, Vector3};
 
-/// How the records between which a time lies are joined.
+/// Interpolation between neighbouring records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interpolation {
-    /// Straight; attitudes turn uniformly about one axis (slerp).
+    /// Linear; attitudes rotate uniformly about one axis (slerp).
     #[default]
     Linear,
-    /// By cubics with the velocities of the records.
+    /// Cubic with the velocities of the records.
     Hermite,
-    /// By a polynomial through eight neighbours; attitudes by those of the components of their quaternions, normalised.
+    /// Polynomial through eight neighbours; attitudes by the normalised polynomial of their quaternions.
     Lagrange,
 }
 
-/// Records of positions.
+/// Position records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Positions {
     times: Vec<f64>,
@@ -30,18 +30,18 @@ pub struct Positions {
     interpolation: Interpolation,
 }
 
-/// Records of attitudes.
+/// Attitude records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitudes {
     times: Vec<f64>,
     attitudes: Vec<Matrix3>,
-    /// From each record to the next, about its own axes.
+    /// Rotation vector from each record to the next, about its own axes.
     turns: Vec<Vector3>,
-    /// Each the shorter way from the one before; none where they are joined by turns.
+    /// Quaternions with continuous signs; empty unless the interpolation is [`Interpolation::Lagrange`].
     quaternions: Vec<[f64; 4]>,
 }
 
-/// Whether there are records, and times increase.
+/// Returns whether records exist and times increase.
 fn increase(times: &[f64], records: usize) -> bool {
     !times.is_empty()
         && times.len() == records
@@ -49,12 +49,12 @@ fn increase(times: &[f64], records: usize) -> bool {
         && times.windows(2).all(|pair| pair[0] < pair[1])
 }
 
-/// The interval that a time is in, the first or the last for all beyond.
+/// Returns the interval of a time, clamped to the first and last.
 fn interval(times: &[f64], time: f64) -> usize {
     times.partition_point(|&own| own <= time).saturating_sub(1).min(times.len().saturating_sub(2))
 }
 
-/// The times of records, and half an interval beyond; all times where there is one alone.
+/// Returns the time range of the records and half an interval beyond; unlimited for a single record.
 fn reaching(times: &[f64]) -> (f64, f64) {
     match times {
         [first, second, ..] => {
@@ -66,8 +66,8 @@ fn reaching(times: &[f64]) -> (f64, f64) {
 }
 
 impl Positions {
-    /// From records at times that increase. `velocities`, in a second, are those of [`Interpolation::Hermite`]. None where there are no
-    /// records, or not as many of one as of another.
+    /// Creates positions from records at increasing times. `velocities`, per second, belong to [`Interpolation::Hermite`]. None without
+    /// records or with different numbers of them.
     pub fn new(
         times: Vec<f64>,
         places: Vec<Vector3>,
@@ -79,14 +79,14 @@ impl Positions {
         sound.then_some(Self { times, places, velocities, interpolation })
     }
 
-    /// The same counted from an origin.
+    /// Returns the positions relative to an origin.
     #[must_use]
     pub fn counted_from(&self, origin: [f64; 3]) -> Self {
         let places = self.places.iter().map(|place| place - Vector3::from(origin)).collect();
         Self { places, ..self.clone() }
     }
 
-    /// The position at a time, and its velocity.
+    /// Returns the position at a time, and its velocity.
     pub fn at(&self, time: f64) -> (Vector3, Vector3) {
         let [_, _, ..] = self.times[..] else { return (self.places[0], Vector3::zeros()) };
         let i = interval(&self.times, time);
@@ -117,14 +117,14 @@ impl Positions {
         }
     }
 
-    /// The times that it may be asked for.
+    /// Returns the valid time range.
     pub fn span(&self) -> (f64, f64) {
         reaching(&self.times)
     }
 }
 
 impl Attitudes {
-    /// From records, photo to object, at times that increase; None where there are no records, or not as many of one as of the other.
+    /// Creates attitudes from records, photo to object, at increasing times; None without records or with different numbers of them.
     pub fn new(times: Vec<f64>, attitudes: Vec<Matrix3>, interpolation: Interpolation) -> Option<Self> {
         if !increase(&times, attitudes.len()) {
             return None;
@@ -142,7 +142,7 @@ impl Attitudes {
         Some(Self { times, attitudes, turns, quaternions })
     }
 
-    /// The attitude at a time, and its rate about its own axes.
+    /// Returns the attitude at a time, and its rate about its own axes.
     pub fn at(&self, time: f64) -> (Matrix3, Vector3) {
         let [_, _, ..] = self.times[..] else { return (self.attitudes[0], Vector3::zeros()) };
         let i = interval(&self.times, time);
@@ -165,22 +165,22 @@ impl Attitudes {
         }
         let square: f64 = q.iter().map(|value| value * value).sum();
         let (v, dv) = (Vector3::new(q[1], q[2], q[3]), Vector3::new(d[1], d[2], d[3]));
-        // The vector of 2 conj(q) q' / |q|^2.
+        // Vector part of 2 conj(q) q' / |q|^2.
         let rate = 2.0 * (q[0] * dv - d[0] * v - v.cross(&dv)) / square;
         (quaternion_rotation(q.map(|value| value / square.sqrt())), rate)
     }
 
-    /// The times that it may be asked for.
+    /// Returns the valid time range.
     pub fn span(&self) -> (f64, f64) {
         reaching(&self.times)
     }
 }
 
-/// Records on each side where there are so many.
+/// Maximum number of records on each side.
 const EACH_SIDE: usize = 4;
 
-/// For the records about an interval, from the first on: what each counts at a time, and how that changes in a second. There are as many
-/// on either side: near the ends 6, 4 and 2 (Community Sensor Model).
+/// Returns the first record about an interval and, per record, its weight at a time and the rate of the weight per second. Both sides have
+/// equally many records: near the ends 6, 4 and 2 in total (Community Sensor Model).
 pub fn weights(times: &[f64], interval: usize, time: f64) -> (usize, SmallVec<[(f64, f64); 8]>) {
     let side = EACH_SIDE.min(interval + 1).min(times.len() - 1 - interval);
     let first = interval + 1 - side;

@@ -1,4 +1,4 @@
-//! Derivatives by time and by coefficients, against differences; splines against polynomials; slerp against one long turn.
+//! Tests of trajectories: time and coefficient derivatives against differences, splines against polynomials, slerp against one rotation.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use super::{
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{Matrix3, Vector3, angle_axis_rotation, rotation};
 
-/// Of Richardson's scheme with steps of a thousandth and two.
+/// Derivative by Richardson's scheme with steps of 0.001 and 0.002.
 fn slope(at: impl Fn(f64) -> Vector3) -> Vector3 {
     let h = 1e-3;
     (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)
@@ -74,7 +74,7 @@ fn all() -> Vec<Trajectory> {
     .into()
 }
 
-/// Just behind a record, and between.
+/// Times just after a record, and between records.
 const TIMES: [f64; 4] = [3.003, 4.5, 5.5123, 0.25];
 
 #[test]
@@ -91,7 +91,7 @@ fn rates_agree_with_differences() {
     }
 }
 
-/// Asserts that the partials of something by a coefficient agree with its differences.
+/// Asserts that partials with respect to a coefficient agree with differences.
 fn agrees(partials: &Matrix3, moved: impl Fn(Vector3) -> Vector3) {
     for k in 0..3 {
         let expected = slope(|h| moved(h * Vector3::ith(k, 1.0)));
@@ -103,7 +103,7 @@ fn agrees(partials: &Matrix3, moved: impl Fn(Vector3) -> Vector3) {
 #[test]
 fn partials_by_coefficients_agree_with_differences() {
     for trajectory in all() {
-        // A rotation vector of zero, one that is hardly more, and one that is large.
+        // Rotation vectors: zero, tiny and large.
         for (time, size) in TIMES.into_iter().flat_map(|time| [(time, 0.0), (time, 1e-9), (time, 0.3)]) {
             let (c, r) = (coefficient(3.0), coefficient(size));
             let plain = trajectory.at(time, &c, &r);
@@ -132,7 +132,7 @@ fn partials_by_coefficients_agree_with_differences() {
 #[test]
 fn splines_sum_to_one_and_hold_polynomials() {
     for degree in 1..=5 {
-        // The cube is in every spline of degree 3 or more: its coefficients are the blossom at the knots within (Marsden).
+        // Every spline of degree 3 or more reproduces the cube: its coefficients are the blossom at the inner knots (Marsden).
         let knots: Vec<f64> = (0..14).map(|k| 0.7 * f64::from(k) + 0.02 * f64::from(k * k)).collect();
         let spline = Spline { degree, knots };
         assert!(spline.is_sound());

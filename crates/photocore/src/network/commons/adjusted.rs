@@ -1,4 +1,4 @@
-//! Common unknowns after the adjustment.
+//! Adjusted shared parameters.
 
 use nalgebra::DMatrix;
 
@@ -8,29 +8,29 @@ use crate::geometry::Matrix3;
 use crate::network::Network;
 use crate::network::problem::Assembled;
 
-/// An adjusted common unknown.
+/// An adjusted shared parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedCommon {
-    /// By how much its unknowns differ from what is given: observed minus adjusted is the negative of it.
+    /// Adjusted minus given values of its components: the negative of observed minus adjusted.
     pub change: Vec<f64>,
-    /// Its position, as in [`Common`]; of planes and lines the place that is given, moved along their own axes by the offsets, in
-    /// rectangular space.
+    /// Position, as in [`Common`]; for planes and lines the given position, displaced along their own axes by the offsets in rectangular
+    /// space.
     pub position: [f64; 3],
-    /// Its rotation, as in [`Common`].
+    /// Rotation, as in [`Common`].
     pub attitude: Matrix3,
-    /// Cofactors (a priori unit weight) of its unknowns, rotations being those about its own axes: zero for those that are
-    /// held; NaN where there are none.
+    /// Cofactors (a priori unit weight) of the components, with rotations about the own axes: zero for fixed components, NaN without
+    /// cofactors.
     pub cofactors: DMatrix<f64>,
-    /// Cofactors of its unknowns (rows) with those of the common unknown before it in their block; none where it is the first.
+    /// Cofactors of the components (rows) with the components of the preceding shared parameter of the block; empty for the first.
     pub with_former: DMatrix<f64>,
-    /// Redundancy numbers of its unknowns as observations of themselves; zero unless weighted, NaN where there are no cofactors.
+    /// Redundancy numbers of the components as their own observations; zero unless weighted, NaN without cofactors.
     pub redundancy: Vec<f64>,
-    /// How many observations that took part, images of rigs among them, are of it.
+    /// Number of active observations, including images of rigs, that depend on it.
     pub observations: usize,
 }
 
 impl Network {
-    /// The adjusted common unknowns, in the order of the network.
+    /// Returns the adjusted shared parameters, in the order of the network.
     pub(in crate::network) fn adjusted_commons(
         &self,
         Assembled { problem, .. }: &Assembled,

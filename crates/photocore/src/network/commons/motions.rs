@@ -1,4 +1,4 @@
-//! How common unknowns move with a network as a whole (see [`crate::adjustment::Motions`]).
+//! Effect of similarity transformations of the network on shared parameters (see [`crate::adjustment::Motions`]).
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::network::model::Bundle;
 use crate::network::observations::Observation;
 use crate::network::stations::Placed;
 
-/// A motion of the whole: how it displaces a place, the rotation vector by which it turns, the factor of its scale.
+/// A similarity transformation: displacement of a position, rotation vector and scale factor.
 pub struct Motion<'a> {
     pub displacement: &'a dyn Fn(&Vector3) -> Vector3,
     pub turn: Vector3,
@@ -16,18 +16,18 @@ pub struct Motion<'a> {
 }
 
 impl PlacedCommon {
-    /// Whether anything of it changes when the network moves as a whole.
+    /// Returns true if the transformation changes a component.
     pub fn moves(&self) -> bool {
         self.kind.moves() != Moves::Stays
     }
 
-    /// Whether it takes up what the network moves by.
+    /// Returns true if the parameter absorbs the displacement of the network.
     pub fn moves_against(&self) -> bool {
         self.kind.moves() == Moves::Against
     }
 
-    /// How its unknowns change with a small motion, the scale being 1 and a change of it; of those that move against it, and of coefficients of
-    /// trajectories, nothing.
+    /// Returns the change of the parameters under a small transformation with a scale near 1; zero for static and absorbing parameters and
+    /// coefficients of trajectories.
     pub fn change(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
         let growth = motion.scale - 1.0;
         let (offset, turn) = match self.kind.moves() {
@@ -40,7 +40,7 @@ impl PlacedCommon {
                     state.attitude.tr_mul(&motion.turn),
                 );
                 let turn = self.to_components(state, &turn);
-                // R^T (p - p_0): its own axes turn as the unknowns turn them.
+                // R^T (p - p_0): the own axes rotate with the parameters.
                 (own - (state.turns * turn).cross(&state.offset), turn)
             }
         };
@@ -48,7 +48,7 @@ impl PlacedCommon {
         self.kind.components().map(|component| six[component]).collect()
     }
 
-    /// The components of r that turn the axes so, about themselves; of an axis its third component is none.
+    /// Returns the components of r for a rotation about the own axes; the third component of an axis is zero.
     fn to_components(&self, state: &CommonState, turn: &Vector3) -> Vector3 {
         if !self.kind.rotates() {
             Vector3::zeros()
@@ -61,7 +61,7 @@ impl PlacedCommon {
         }
     }
 
-    /// Its unknowns after a motion that need not be small; of the same ones as they are.
+    /// Returns the parameters after a finite transformation; unchanged for static and absorbing ones and coefficients of trajectories.
     pub fn moved(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
         match self.kind.moves() {
             Moves::Stays | Moves::Against | Moves::Follows => self.unknowns(&state.offset, &state.attitude),
@@ -78,7 +78,7 @@ impl PlacedCommon {
                 let place = place + (motion.displacement)(&place);
                 let turn = if self.kind.rotates() { motion.turn } else { Vector3::zeros() };
                 let unknowns = self.unknowns(&Vector3::zeros(), &turned(&state.attitude, &turn));
-                // Offsets count in the axes that the unknowns give.
+                // Offsets refer to the axes that the parameters represent.
                 let axes = self.at(&unknowns);
                 self.unknowns(&axes.own(&place), &axes.attitude)
             }
@@ -86,12 +86,12 @@ impl PlacedCommon {
     }
 }
 
-/// The places of antennas with their times, of the positions that have one shift and drift.
+/// Antenna positions and times of observed positions with the same shift and drift.
 type Antennas = BTreeMap<[Option<usize>; 2], Vec<(Vector3, f64)>>;
 
 impl Bundle {
-    /// Writes what a motion makes of common unknowns where these stand among all: by `each` of those that do not move against it; to
-    /// shifts and drifts is added what they take up of it.
+    /// Writes the transformed shared parameters into all parameters. Nonabsorbing ones are computed by `each`; shifts and drifts absorb the
+    /// mean displacement of their antennas.
     pub(in crate::network) fn move_commons(
         &self,
         placed: &Placed,
@@ -118,7 +118,7 @@ impl Bundle {
         }
     }
 
-    /// The antennas of each shift and drift; without those that belong to several.
+    /// Returns the antennas of each pair of shift and drift that no other pair shares.
     fn antennas(&self, placed: &Placed) -> Antennas {
         let mut all = Antennas::new();
         for tied in &self.observations {
@@ -143,7 +143,7 @@ impl Bundle {
     }
 }
 
-/// The line a + b t through vectors at times t, least squares; only a, or only b, where the other is not asked for.
+/// Returns the least-squares line a + b t through vectors at times t; only a or only b if the other is not requested.
 fn line(of: impl Iterator<Item = (Vector3, f64)>, asked: [bool; 2]) -> [Vector3; 2] {
     let (mut n, mut t, mut tt) = (0.0, 0.0, 0.0);
     let (mut sum, mut along) = (Vector3::zeros(), Vector3::zeros());

@@ -24,6 +24,8 @@ pub struct Effect {
     pub at: Option<(usize, usize)>,
     /// The largest change of a coordinate, in the unit of the object space (heights only if that is geographic).
     pub change: f64,
+    /// Changes of the check points of the facts; NaN for points that do not take part.
+    pub checks: Vec<[f64; 3]>,
 }
 
 /// Points whose changes are computed.
@@ -32,9 +34,13 @@ pub(super) struct Sample<'a> {
     linearized: &'a Linearized,
     /// Local points of the model, each of which stands for `share` of them.
     locals: Vec<usize>,
+    /// How many of them are counted, the first ones.
+    counted: usize,
     share: f64,
     /// The point of the network and its standard deviations (a priori unit weight): local ones, then all others.
     points: Vec<(usize, Vector3<f64>)>,
+    /// Where the check points are among these.
+    checks: Vec<Option<usize>>,
 }
 
 /// Changes of unknowns by errors, a column per error.
@@ -44,17 +50,28 @@ pub(super) struct Changes {
 }
 
 impl<'a> Sample<'a> {
-    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized) -> Self {
+    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized, checks: &[usize]) -> Self {
         let (model, points) = (&trial.assembled.problem.model, &trial.assembled.points);
         let stride = model.locals.div_ceil(SAMPLE).max(1);
-        let locals: Vec<usize> = (0..model.locals).step_by(stride).collect();
+        let mut locals: Vec<usize> = (0..model.locals).step_by(stride).collect();
+        let interval = locals.len().max(1);
+        let places = checks.iter().map(|&point| trial.place.get(point).copied().flatten());
+        let places: Vec<Option<usize>> = places.collect();
+        // Behind the others, which alone are counted.
+        locals.extend(places.iter().flatten().filter(|&&place| place < model.locals));
         let of = |place: usize| {
             let q = trial.cofactors_at(found, Home::Point(place));
             (points[place], Vector3::from_fn(|k, _| q[(k, k)].max(0.0).sqrt()))
         };
-        let share = model.locals as f64 / locals.len().max(1) as f64;
+        let share = model.locals as f64 / interval as f64;
+        let find = |place: Option<usize>| {
+            let place = place?;
+            let behind = (place >= model.locals).then(|| locals.len() + place - model.locals);
+            behind.or_else(|| (interval..locals.len()).find(|&k| locals[k] == place))
+        };
+        let checks = places.into_iter().map(find).collect();
         let points = locals.iter().copied().chain(model.locals..points.len()).map(of).collect();
-        Self { trial, linearized, locals, share, points }
+        Self { trial, linearized, locals, counted: interval, share, points, checks }
     }
 
     /// Changes by errors of parameters whose effects on unknowns that are not local are known.
@@ -80,21 +97,26 @@ impl<'a> Sample<'a> {
     pub fn effect(&self, changes: &Changes, error: usize, own: &[usize], limit: f64) -> Effect {
         let model = &self.trial.assembled.problem.model;
         let is_geographic = matches!(model.space, ObjectSpace::Geographic(_));
-        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0 };
-        let (mut points, mut others) = (0.0, 0.0);
         let first_other = 3 * model.locals;
-        for (index, &(point, sd)) in self.points.iter().enumerate() {
-            let (is_local, place) = match index.checked_sub(self.locals.len()) {
-                None => (true, 0),
-                Some(behind) => (false, model.of_point(model.locals + behind).start - first_other),
-            };
+        let change = |index: usize, axis: usize| match index.checked_sub(self.locals.len()) {
+            None => changes.locals[index][(axis, error)],
+            Some(behind) => {
+                let place = model.of_point(model.locals + behind).start - first_other;
+                changes.others[(place + axis, error)]
+            }
+        };
+        let at_check = |at: &Option<usize>| {
+            at.map_or([f64::NAN; 3], |index| std::array::from_fn(|axis| change(index, axis)))
+        };
+        let checks = self.checks.iter().map(at_check).collect();
+        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0, checks };
+        let (mut points, mut others) = (0.0, 0.0);
+        let retained = self.locals.len()..self.points.len();
+        for index in (0..self.counted).chain(retained) {
+            let (point, sd) = self.points[index];
             let mut largest = 0.0;
             for axis in 0..3 {
-                let change = match is_local {
-                    true => changes.locals[index][(axis, error)],
-                    false => changes.others[(place + axis, error)],
-                };
-                let size = change.abs();
+                let size = change(index, axis).abs();
                 let ratio = if sd[axis] > 0.0 { size / sd[axis] } else { 0.0 };
                 if ratio > effect.ratio {
                     (effect.ratio, effect.at) = (ratio, Some((point, axis)));
@@ -105,7 +127,7 @@ impl<'a> Sample<'a> {
                 }
             }
             if largest > limit {
-                let share = if is_local { self.share } else { 1.0 };
+                let share = if index < self.counted { self.share } else { 1.0 };
                 points += share;
                 others += if own.contains(&point) { 0.0 } else { share };
             }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::super::suspects::{Home, Row, Subject, Suspect};
 use super::super::trial::Trial;
 use super::effect::Sample;
-use super::judged::Judged;
+use super::judged::{Criteria, Judged};
 use super::{About, Facts, Hypothesis};
 use crate::Threads;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized};
@@ -25,7 +25,7 @@ pub(super) fn single_errors(
     found: &Leverages,
     linearized: &Linearized,
     sample: &Sample<'_>,
-    facts: &Facts,
+    (facts, criteria): (&Facts, &Criteria),
     threads: &Threads,
 ) -> Vec<Hypothesis> {
     let Some(groups) = found.cofactors.groups.as_ref() else { return vec![] };
@@ -48,7 +48,7 @@ pub(super) fn single_errors(
             // In unit weight C selects rows.
             let count = rows.len();
             let judged =
-                Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], facts);
+                Judged::new(&score, &DMatrix::identity(count, count), &block, &vec![LARGE; count], criteria);
             let unit = judged.error.clone().unwrap_or_default();
             let shares = rows.iter().zip(&unit).map(|(&k, &value)| (trial.equation(suspect, k), value));
             errors.push((trial.points_of(suspect), shares.collect::<Error>()));

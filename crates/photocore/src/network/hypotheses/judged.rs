@@ -8,6 +8,24 @@ use crate::adjustment::{Tail, VISIBLE, chi_square, detectable_noncentrality, fis
 /// Degrees of freedom from which on an estimated unit weight counts as known for the MDB.
 const LARGE_FREEDOM: f64 = 50.0;
 
+/// Parameters that a hypothesis has at most.
+const MOST: usize = 7;
+
+/// What all hypotheses of a network are judged by.
+pub(super) struct Criteria {
+    /// lambda0 of tests of 1, 2 ... parameters.
+    noncentrality: Vec<f64>,
+    /// Sum of squares and degrees of freedom if the unit weight is estimated.
+    estimated: Option<(f64, f64)>,
+}
+
+impl Criteria {
+    pub fn new(facts: &Facts) -> Self {
+        let noncentrality = (1..=MOST).map(|count| noncentrality(count, facts)).collect();
+        Self { noncentrality, estimated: facts.estimated }
+    }
+}
+
 /// Test and internal reliability of a hypothesis with k parameters d.
 ///
 /// With score u = C^T P v, S = C^T P C and redundancy R: T = u^T R^- u, d = R^- u; directions with a redundancy r below 1e-6, r an eigenvalue
@@ -42,7 +60,7 @@ impl Judged {
         squares: &DMatrix<f64>,
         redundancy: &DMatrix<f64>,
         plausible: &[f64],
-        facts: &Facts,
+        criteria: &Criteria,
     ) -> Self {
         let count = score.len();
         // Parameters in units in which each has unit weight: S = D s D. Its factor exists unless two parameters are the same one.
@@ -70,7 +88,7 @@ impl Judged {
         if direction[direction.iamax()] < 0.0 {
             direction.neg_mut();
         }
-        let noncentrality = noncentrality(count, facts);
+        let noncentrality = criteria.noncentrality[count.clamp(1, MOST) - 1];
         let mdb = (share > VISIBLE).then(|| &direction * (noncentrality / share).sqrt());
         let error = mdb.clone().or_else(|| {
             let size = |own: &[f64]| (0..count).map(|k| (direction[k] / own[k]).powi(2)).sum::<f64>().sqrt();
@@ -82,7 +100,7 @@ impl Judged {
         Self {
             rank: shown.len(),
             statistic,
-            probability: probability(statistic, shown.len(), facts),
+            probability: probability(statistic, shown.len(), criteria.estimated),
             estimate: listed(estimate),
             cofactors: cofactors.transpose().as_slice().to_vec(),
             redundancy: share.max(0.0),
@@ -109,7 +127,7 @@ impl Judged {
 }
 
 /// lambda0 of a test of k degrees of freedom.
-pub(super) fn noncentrality(count: usize, facts: &Facts) -> f64 {
+fn noncentrality(count: usize, facts: &Facts) -> f64 {
     let (level, power) = facts.detection;
     let count = count as f64;
     let rest = facts.estimated.map_or(f64::INFINITY, |(_, freedom)| freedom - count);
@@ -117,12 +135,12 @@ pub(super) fn noncentrality(count: usize, facts: &Facts) -> f64 {
     detectable_noncentrality(level, power, count, second)
 }
 
-fn probability(statistic: f64, rank: usize, facts: &Facts) -> f64 {
+fn probability(statistic: f64, rank: usize, estimated: Option<(f64, f64)>) -> f64 {
     if rank == 0 {
         return f64::NAN;
     }
     let rank = rank as f64;
-    match facts.estimated {
+    match estimated {
         None => chi_square(statistic, rank, Tail::Upper),
         Some((sum, freedom)) => {
             let rest = freedom - rank;

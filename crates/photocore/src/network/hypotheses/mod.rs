@@ -25,6 +25,7 @@ pub use judged::Judged;
 use self::catalogue::Catalogue;
 use self::effect::Sample;
 use self::groups::single_errors;
+use self::judged::Criteria;
 use super::trial::Trial;
 use super::{NetworkError, Subject};
 use crate::Threads;
@@ -45,6 +46,8 @@ pub struct Facts {
     pub readouts: Vec<Option<[f64; 3]>>,
     /// Width of the image of each camera, in its unit; NaN if unknown.
     pub widths: Vec<f64>,
+    /// Check points: their changes are reported.
+    pub checks: Vec<usize>,
     /// Centre of scale, rotation and bending; the middle of the network if None.
     pub centre: Option<[f64; 3]>,
     /// Sum of squares and degrees of freedom if the unit weight is estimated; None if it is known.
@@ -111,7 +114,8 @@ impl Trial {
         let failed = |error| NetworkError::new(error, &self.assembled);
         let (values, held) = (found.values.clone(), found.held.clone());
         let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
-        let sample = Sample::new(self, found, &linearized);
+        let criteria = Criteria::new(facts);
+        let sample = Sample::new(self, found, &linearized, &facts.checks);
 
         let catalogue = Catalogue::new(self, found, facts);
         let sums = linearized.additional(problem, &catalogue, threads);
@@ -130,7 +134,7 @@ impl Trial {
                 &sums.squares.select_rows(&own).select_columns(&own),
                 &sums.redundancy.select_rows(&own).select_columns(&own),
                 &plausible,
-                facts,
+                &criteria,
             );
             let mut error = DVector::zeros(sums.score.len());
             own.iter().zip(judged.error.iter().flatten()).for_each(|(&k, &value)| error[k] = value);
@@ -163,7 +167,7 @@ impl Trial {
         };
         let pairs = (0..sets).flat_map(|i| (0..sets).map(move |j| (i, j)));
         let correlations = pairs.map(correlation).collect();
-        all.extend(single_errors(self, found, &linearized, &sample, facts, threads));
+        all.extend(single_errors(self, found, &linearized, &sample, (facts, &criteria), threads));
         Ok(Hypotheses { all, sets, correlations })
     }
 }

@@ -1,4 +1,4 @@
-//! A pose on its way from mount to mount, and what it is made of.
+//! Composition of a pose from mounts, and the parameter blocks on which it depends.
 
 use nalgebra::{Matrix6, Matrix6xX, Vector6};
 use smallvec::{SmallVec, smallvec};
@@ -7,56 +7,56 @@ use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Pose, Steps, Vect
 use crate::network::in_block::InBlock;
 use crate::normals::GroupRows;
 
-/// Unknowns of retained blocks that step a pose alike, each up to a factor of its own: coefficients of a trajectory.
+/// Parameters of retained blocks with proportional partials of the pose: coefficients of a trajectory.
 #[derive(Debug, Clone, Default)]
 struct Alike {
-    /// How it steps with a factor of one.
+    /// Partials for a factor of one.
     steps: Steps,
     blocks: SmallVec<[(InBlock, f64); 4]>,
 }
 
-/// A block among those that a pose is made of.
+/// A block among the blocks of a pose.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     block: usize,
     width: usize,
-    /// Where its unknowns stand among those of all but the main block.
+    /// First column of its parameters behind the main block.
     first: usize,
 }
 
-/// A pose on the way from mount to mount, and what it is made of.
+/// A partially composed pose, with its partials by parameters of retained blocks.
 #[derive(Debug, Clone)]
 pub struct Chain {
     pose: Pose,
-    /// Whether it is asked how the pose steps.
+    /// Whether partials are requested.
     stepping: bool,
-    /// How the pose steps with unknowns of retained blocks; so many of these as are used.
+    /// Partials of the pose by parameters of retained blocks; only the first `used` elements are valid.
     alike: Vec<Alike>,
     used: usize,
 }
 
-/// dC and rho of three unknowns that shift a pose so.
+/// Returns the partials dC and rho of three parameters of position.
 pub fn shifting(shifts: &Matrix3) -> impl Iterator<Item = (Vector3, Vector3)> {
     shifts.column_iter().map(|own| (own.into(), Vector3::zeros()))
 }
 
-/// dC and rho of three unknowns that turn it so.
+/// Returns the partials dC and rho of three parameters of rotation.
 pub fn turning(turns: &Matrix3) -> impl Iterator<Item = (Vector3, Vector3)> {
     turns.column_iter().map(|own| (Vector3::zeros(), own.into()))
 }
 
 impl Chain {
-    /// Whether it is asked how the pose steps.
+    /// Returns true if partials are requested.
     pub fn steps(&self) -> bool {
         self.stepping
     }
 
-    /// The pose that is reached.
+    /// Returns the composed pose.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// Goes on to a pose that is given in the axes of this one, and there steps so with unknowns of a block.
+    /// Appends a pose in the axes of the current one, with its partials by the parameters of a block.
     pub fn lead_to(
         &mut self,
         inner: &Pose,
@@ -71,13 +71,13 @@ impl Chain {
         self.pose = from.of_inner(inner);
     }
 
-    /// Goes on from a pose that nothing before has made.
+    /// Restarts the composition from an independent pose.
     pub fn stand(&mut self, pose: Pose) {
         self.pose = pose;
         self.used = 0;
     }
 
-    /// Steps so with unknowns of blocks, each times a factor, besides.
+    /// Adds partials by parameters of blocks, each with a factor.
     pub fn add(
         &mut self,
         blocks: impl Iterator<Item = (InBlock, f64)>,
@@ -99,30 +99,29 @@ impl Chain {
         &self.alike[..self.used]
     }
 
-    /// Unknowns of an orientation instead of steps of its pose.
+    /// Converts the partials from steps of the pose to parameters of an orientation.
     pub(super) fn lead_by(&mut self, unknowns: &Matrix6<f64>) {
         self.alike[..self.used].iter_mut().for_each(|own| own.steps.lead_by(unknowns));
     }
 }
 
-/// A pose that is made of the unknowns of several blocks. The same is taken for one pose after the other, so that nothing has to be
-/// allocated for each.
+/// A pose composed from the parameters of several blocks. It is reused for consecutive poses to avoid allocations.
 #[derive(Debug, Clone)]
 pub(in crate::network) struct Composed {
-    /// With six unknowns of its own: its coordinates and a rotation about its axes.
+    /// Orientation with six parameters of its own: coordinates and a rotation about its axes.
     pub orientation: Orientation,
-    /// How these six step.
+    /// Partials of these six parameters.
     pub(super) chain: Chain,
-    /// Each block once, the main one first, then in the order in which they are named.
+    /// Distinct blocks, the main block first, then in the order of the composition.
     slots: Vec<Slot>,
-    /// Which of them each block of the chain is.
+    /// Slot of each block of the chain.
     numbers: Vec<usize>,
-    /// How many unknowns of all but the main block.
+    /// Number of parameters outside the main block.
     width: usize,
 }
 
 impl Composed {
-    /// For poses that are yet to be found; `stepping` where it is asked what they are made of.
+    /// Returns storage for poses; `stepping` requests their partials.
     pub fn new(stepping: bool) -> Self {
         let pose = Pose { position: Vector3::zeros(), attitude: Matrix3::identity() };
         Self {
@@ -134,7 +133,7 @@ impl Composed {
         }
     }
 
-    /// Finds out which blocks the pose is made of; the main block may be none of them.
+    /// Numbers the blocks of the pose; the main block may be none of them.
     pub(super) fn number(&mut self, main: usize) {
         self.slots.clear();
         self.slots.push(Slot { block: main, width: POSE, first: 0 });
@@ -154,7 +153,7 @@ impl Composed {
         }
     }
 
-    /// The blocks, some of them more than once, with the number of an unknown in each and how the pose steps with it.
+    /// Returns the columns of all blocks, possibly with repeated blocks: block, number of the parameter and partials of the pose.
     pub fn columns(&self) -> impl Iterator<Item = (usize, usize, Vector6<f64>)> {
         self.chain.alike().iter().flat_map(|own| {
             let of_block = |&(InBlock { block, first, .. }, factor): &(InBlock, f64)| {
@@ -165,7 +164,7 @@ impl Composed {
         })
     }
 
-    /// Each block once, with how the pose steps with its unknowns; the main block first.
+    /// Returns the distinct blocks with the partials of the pose by their parameters; the main block first.
     pub fn parts(&self) -> Vec<(usize, Matrix6xX<f64>)> {
         let of_slot = |slot: &Slot| (slot.block, Matrix6xX::zeros(slot.width));
         let mut all: Vec<_> = self.slots.iter().map(of_slot).collect();
@@ -178,8 +177,8 @@ impl Composed {
         all
     }
 
-    /// Writes an image: `write` does so as if its photo had six unknowns of its own. They become those of the main block and of all others,
-    /// which are the first of what is common with others; the camera is the last of that.
+    /// Writes an image. `write` computes it for six own parameters, which are then mapped to the main block and the shared columns. The
+    /// camera occupies the last shared columns.
     pub fn write(&self, rows: &mut GroupRows<'_>, write: impl FnOnce(&mut GroupRows<'_>)) {
         let (main, common) = (rows.retained.len() / 2, rows.shared.len() / 2);
         let parameters = common - self.width;

@@ -1,7 +1,7 @@
-//! What the pose of an image is made of where it is not the six unknowns of its photo: photos on a frame, images on a trajectory.
+//! Poses of images that differ from the six parameters of their photo: photos on a frame, images on a trajectory.
 //!
-//! Each kind is a file with a type that implements [`MountModel`], and a line of `kinds!` below. A pose is handed on from mount to mount
-//! with the list of the blocks that it is made of, and how it steps with the unknowns of each.
+//! Each type is a file with an implementation of [`MountModel`], and a line of `kinds!` below. A pose is composed mount by mount, with the
+//! list of its blocks and its partials by the parameters of each.
 
 mod chain;
 
@@ -17,81 +17,81 @@ use crate::geometry::{self, ObjectSpace, Orientation, POSE, Vector3};
 pub use chain::Chain;
 pub(super) use chain::Composed;
 
-/// The photos themselves: the time of their images counts from theirs (see [`OnTrajectory`]).
+/// Image number of the photo itself: times of images are relative to it (see [`OnTrajectory`]).
 pub(super) const AT_PHOTO: f64 = 0.0;
 
-/// A trajectory of a network: a pose as a function of time, and the common unknowns that are its coefficients.
+/// Trajectory of a network: a pose as a function of time, and the shared parameters that are its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// Table and bases. Rectangular coordinates as those of photos and points; geocentric ones where the space is geographic.
+    /// Table and bases, in the coordinates of photos and points; geocentric if the space is geographic.
     pub course: geometry::trajectory::Trajectory,
-    /// Common unknowns: those of positions, one for each function of the basis.
+    /// Shared parameters of positions, one for each function of the basis.
     pub position: Vec<usize>,
-    /// The same of rotations.
+    /// Shared parameters of rotations, one for each function of the basis.
     pub rotation: Vec<usize>,
 }
 
 impl Trajectory {
-    /// The common unknowns that are its coefficients, positions first.
+    /// Returns the shared parameters that are its coefficients, positions first.
     pub fn coefficients(&self) -> impl Iterator<Item = usize> + Clone {
         self.position.iter().chain(&self.rotation).copied()
     }
 
-    /// The common unknowns that are the coefficients of functions that are never zero.
+    /// Returns the coefficients of functions with global support.
     pub fn everywhere(&self) -> impl Iterator<Item = usize> {
         let own = [(&self.course.position, &self.position), (&self.course.rotation, &self.rotation)];
         own.into_iter().filter(|(basis, _)| !basis.is_local()).flat_map(|(_, all)| all.iter().copied())
     }
 }
 
-/// How the pose of a photo, or of its images, follows from another pose and from common unknowns.
+/// Dependence of the pose of a photo, or of its images, on another pose and on shared parameters.
 pub trait MountModel {
-    /// The photo.
+    /// Returns the photo.
     fn photo(&self) -> usize;
 
-    /// The photo whose pose it begins with instead of its own, whose six unknowns then count for nothing.
+    /// Returns the photo whose pose replaces the own six parameters as the start of the composition.
     fn frame(&self) -> Option<usize> {
         None
     }
 
-    /// The trajectory that it is on.
+    /// Returns the trajectory of the mount.
     fn trajectory(&self) -> Option<usize> {
         None
     }
 
-    /// That, and the time there of an image with a number, common unknowns as they are given.
+    /// Returns the trajectory and the time of an image there, at the given values of shared parameters.
     fn flight(&self, _at: f64, _known: &Mounts) -> Option<(usize, f64)> {
         None
     }
 
-    /// The common unknowns that it is given, with their types.
+    /// Returns the shared parameters of the mount, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
 
-    /// The common unknowns that a pose at a time is made of, in the order of [`MountModel::compose`].
+    /// Returns the shared parameters of a pose at a time, in the order of [`MountModel::compose`].
     fn commons(&self, at: f64, known: &Mounts) -> Vec<usize>;
 
-    /// Those that poses at all times are made of.
+    /// Returns the shared parameters of the poses at all times.
     fn always(&self, known: &Mounts) -> Vec<usize>;
 
-    /// Whether the pose that it begins with, and the six unknowns of that, count for nothing.
+    /// Returns true if the mount replaces the preceding pose and its six parameters.
     fn replaces(&self) -> bool {
         false
     }
 
-    /// Where it replaces: the common unknowns that every pose is made of, and that stand in one block.
+    /// For a replacing mount, returns the shared parameters of every pose, which are in one block.
     fn everywhere<'a>(&self, _known: &'a Mounts) -> Box<dyn Iterator<Item = usize> + 'a> {
         Box::new(std::iter::empty())
     }
 
-    /// Whether images of one photo have poses of their own.
+    /// Returns true if images of one photo have individual poses.
     fn is_timed(&self) -> bool;
 
-    /// How the pose that is asked for moves; None where it does not.
+    /// Returns velocity and rotation rate of the composed pose; None for a static one.
     fn moving(&self, _at: f64, _grounds: &Grounds<'_>) -> Option<Moving> {
         None
     }
 
-    /// Leads from the pose that it begins with to the one that is asked for.
+    /// Composes the preceding pose with the mount.
     fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain);
 }
 
@@ -100,7 +100,7 @@ macro_rules! kinds {
         $(mod $module;
         pub use $module::$name;)*
 
-        /// A mount of any kind.
+        /// A mount of any type.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Mount {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
@@ -129,18 +129,18 @@ kinds! {
     on_trajectory::OnTrajectory;
 }
 
-/// The mounts of a network by their photos, in their order; none at all where there are none.
+/// Mounts of a network by photo, in their order; empty for a network without mounts.
 #[derive(Debug, Default)]
 pub struct Mounts {
     by_photo: Vec<Vec<Mount>>,
-    /// The trajectories that they name, their coordinates counted from the origin.
+    /// Trajectories of the mounts, with coordinates relative to the origin.
     trajectories: Vec<Trajectory>,
-    /// Of the common unknowns, what is given as the first component, and whether that is known.
+    /// First given component of each shared parameter, and whether it is fixed.
     given: Vec<(f64, bool)>,
 }
 
 impl Mounts {
-    /// Those of so many photos, with trajectories whose coordinates are to be counted from an origin, and the common unknowns.
+    /// Returns the mounts of `photos` photos, with trajectories relative to an origin, and the shared parameters.
     pub(super) fn new(
         (mounts, photos): (&[Mount], usize),
         (trajectories, origin): (&[Trajectory], [f64; 3]),
@@ -164,33 +164,31 @@ impl Mounts {
         self.by_photo.is_empty()
     }
 
-    /// A trajectory.
+    /// Returns a trajectory.
     pub fn trajectory(&self, trajectory: usize) -> &Trajectory {
         &self.trajectories[trajectory]
     }
 
-    /// The first component of a common unknown as it is given, and whether it is known.
+    /// Returns the first given component of a shared parameter, and whether it is fixed.
     pub fn given(&self, common: usize) -> (f64, bool) {
         self.given[common]
     }
 
-    /// Those of a photo.
     #[inline]
     pub(super) fn of(&self, photo: usize) -> &[Mount] {
         self.by_photo.get(photo).map_or(&[], Vec::as_slice)
     }
 
-    /// All of them.
     pub(super) fn all(&self) -> impl Iterator<Item = &Mount> {
         self.by_photo.iter().flatten()
     }
 
-    /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
+    /// Returns the photo whose pose is the start of the composition: the frame of a photo, or itself.
     pub(super) fn carrier(&self, photo: usize) -> usize {
         self.of(photo).first().and_then(|mount| mount.frame()).unwrap_or(photo)
     }
 
-    /// Whether the six unknowns of a photo count for nothing: others do, or coefficients.
+    /// Returns true if the six parameters of a photo are replaced by another photo or by coefficients.
     pub(super) fn is_carried(&self, photo: usize) -> bool {
         self.carrier(photo) != photo || self.is_replaced(photo)
     }
@@ -199,8 +197,8 @@ impl Mounts {
         self.of(photo).iter().any(|mount| mount.replaces())
     }
 
-    /// The main block of a pose, given those of common unknowns: that of its carrier, also where the six of that count for nothing and no
-    /// common unknown stands for them.
+    /// Returns the main block of a pose, given the blocks of shared parameters. It is the block of its carrier, even if the carrier has no
+    /// free parameters, unless coefficients replace it.
     pub(super) fn main_block(&self, photo: usize, block: &dyn Fn(usize) -> Option<InBlock>) -> usize {
         let carrier = self.carrier(photo);
         let replacing = self.of(carrier).iter().find(|mount| mount.replaces());
@@ -208,31 +206,29 @@ impl Mounts {
         own.map_or(carrier, |own| own.block)
     }
 
-    /// All trajectories.
     pub(super) fn trajectories(&self) -> &[Trajectory] {
         &self.trajectories
     }
 
-    /// The trajectory that a photo is on.
     pub(super) fn trajectory_of(&self, photo: usize) -> Option<usize> {
         [photo, self.carrier(photo)]
             .iter()
             .find_map(|&photo| self.of(photo).iter().find_map(|own| own.trajectory()))
     }
 
-    /// That, and the time there of an image of the photo with a number, common unknowns as they are given.
+    /// Returns the trajectory and the time of an image of a photo there, at the given values of shared parameters.
     pub(super) fn flight(&self, photo: usize, at: f64) -> Option<(usize, f64)> {
         self.of(self.carrier(photo)).first().and_then(|mount| mount.flight(at, self))
     }
 
-    /// The common unknowns that all poses of a photo are made of.
+    /// Returns the shared parameters of all poses of a photo.
     pub(super) fn always(&self, photo: usize) -> impl Iterator<Item = usize> {
         let carrier = Some(self.carrier(photo)).filter(|&carrier| carrier != photo);
         let photos = carrier.into_iter().chain([photo]);
         photos.flat_map(|photo| self.of(photo)).flat_map(|mount| mount.always(self))
     }
 
-    /// The coefficients of functions that are zero at most times, each with the place of its trajectory in the middle of the others.
+    /// Returns the coefficients of functions with local support, each with the position of its trajectory at the centre of the support.
     pub(super) fn places_of_coefficients(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         self.trajectories.iter().flat_map(|Trajectory { course, position, rotation }| {
             [(&course.position, position), (&course.rotation, rotation)].into_iter().flat_map(
@@ -246,10 +242,10 @@ impl Mounts {
         })
     }
 
-    /// The common unknowns that a pose is made of, each once.
+    /// Returns the distinct shared parameters of a pose.
     #[inline]
     pub(super) fn commons(&self, photo: usize, at: f64) -> Vec<usize> {
-        // It is asked of every image.
+        // Called for every image.
         if self.is_empty() { vec![] } else { self.commons_of_mounts(photo, at) }
     }
 
@@ -264,53 +260,53 @@ impl Mounts {
         all
     }
 
-    /// Whether images of a photo have poses of their own.
+    /// Returns true if images of a photo have individual poses.
     pub(super) fn are_timed(&self, photo: usize) -> bool {
         [photo, self.carrier(photo)].iter().any(|&photo| self.of(photo).iter().any(|mount| mount.is_timed()))
     }
 }
 
-/// How a photo on a trajectory moves, in the axes of the object space and about its own.
+/// Velocity and rotation rate of a photo on a trajectory, in the axes of the object space and of the photo.
 #[derive(Debug, Clone)]
 pub struct Moving {
-    /// C', in a second.
+    /// Velocity C' per second.
     pub velocity: Vector3,
-    /// w, in radians in a second.
+    /// Rotation rate w in radians per second.
     pub rate: Vector3,
-    /// The partials of C' by unknowns of retained blocks.
+    /// Partials of C' by parameters of retained blocks.
     pub velocity_by: Vec<(InBlock, Matrix3xX<f64>)>,
-    /// The same of w.
+    /// Partials of w by parameters of retained blocks.
     pub rate_by: Vec<(InBlock, Matrix3xX<f64>)>,
 }
 
-/// What poses are composed of, at given values of the unknowns.
+/// Input of the composition of poses, at given parameter values.
 pub struct Grounds<'a> {
     pub(super) space: ObjectSpace,
     pub(super) mounts: &'a Mounts,
-    /// Photos as their own six unknowns have them.
+    /// Orientations of photos from their own six parameters.
     pub(super) photo: &'a dyn Fn(usize) -> Orientation,
-    /// Common unknowns, and where each is unless it is known.
+    /// Shared parameters, each with its position in the blocks; None if it is fixed.
     pub(super) common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<InBlock>),
 }
 
 impl Grounds<'_> {
-    /// The trajectories, and what is given.
+    /// Returns the trajectories and the given values.
     pub fn known(&self) -> &Mounts {
         self.mounts
     }
 
-    /// A common unknown, and where it is unless it is known.
+    /// Returns a shared parameter, and its position in the blocks; None if it is fixed.
     pub fn common(&self, common: usize) -> (Cow<'_, CommonState>, Option<InBlock>) {
         (self.common)(common)
     }
 
-    /// A pose of a photo; None where nothing but its six unknowns counts.
+    /// Returns the composed pose of a photo; None for a photo without mounts.
     pub(super) fn composed(&self, photo: usize, at: f64) -> Option<Composed> {
         let mut own = Composed::new(true);
         self.compose(photo, at, &mut own).then_some(own)
     }
 
-    /// The same put in the place of another; false where nothing but its six unknowns counts.
+    /// Composes the pose into existing storage; returns false for a photo without mounts.
     pub(super) fn compose(&self, photo: usize, at: f64, own: &mut Composed) -> bool {
         if self.mounts.of(photo).is_empty() {
             return false;
@@ -319,7 +315,7 @@ impl Grounds<'_> {
         self.lead(photo, at, chain);
         *orientation = Orientation::of_pose(self.space, chain.pose());
         if chain.steps() {
-            // In rectangular space its unknowns step as the pose does.
+            // In rectangular space, its parameters step like the pose.
             if orientation.stepping_pose().is_none() {
                 chain.lead_by(&orientation.unknowns_by_step().unwrap_or_else(|| Matrix6::repeat(f64::NAN)));
             }
@@ -328,7 +324,7 @@ impl Grounds<'_> {
         true
     }
 
-    /// How a photo moves; None where it is on no trajectory, or on a frame that is.
+    /// Returns the motion of a photo; None unless its only mount is a trajectory.
     pub(super) fn moving(&self, photo: usize, at: f64) -> Option<Moving> {
         match self.mounts.of(photo) {
             [mount] => mount.moving(at, self),
@@ -336,7 +332,7 @@ impl Grounds<'_> {
         }
     }
 
-    /// Leads from mount to mount to a pose.
+    /// Composes a pose mount by mount.
     fn lead(&self, photo: usize, at: f64, chain: &mut Chain) {
         let carrier = self.mounts.carrier(photo);
         if carrier != photo {

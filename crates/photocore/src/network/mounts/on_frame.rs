@@ -1,17 +1,17 @@
-//! Rigs: photos on a frame with others, each in a pose of its own there.
+//! Rigs: several photos with individual poses on a common frame.
 
 use super::{Chain, Grounds, MountModel, Mounts};
 use crate::network::commons::CommonKind;
 
-/// That a photo was taken by a sensor on a frame. Its pose follows from those of the frame, which is that of the photo of the first
-/// sensor, and of the sensor in it: A = A_f A_s, C = C_f + A_f c_s.
+/// Mount of a photo that was taken by a sensor on a frame. Its pose is composed from the frame (the photo of the first sensor) and the
+/// sensor: A = A_f A_s, C = C_f + A_f c_s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OnFrame {
-    /// The photo. Of its own pose nothing counts but where it is about.
+    /// Photo. Its own pose is only an approximate position.
     pub photo: usize,
-    /// The photo that stands for the frame; it may have no images. The photo itself where its frame is on a trajectory.
+    /// Photo that represents the frame, with or without images. It is the photo itself if its frame is on a trajectory.
     pub frame: usize,
-    /// The common unknown that is the pose of its sensor in the frame.
+    /// Shared parameter with the pose of the sensor in the frame.
     pub sensor: usize,
 }
 

@@ -1,5 +1,4 @@
-//! Images and records whose pose is that of a trajectory at their time: rolling shutters, line scanners, satellite positions between
-//! exposures.
+//! Images and records with the pose of a trajectory at their time: rolling shutters, line scanners, satellite positions between exposures.
 
 use nalgebra::Matrix3xX;
 
@@ -9,36 +8,36 @@ use crate::geometry::trajectory::{Flight, Motion};
 use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;
 
-/// That a photo is on a trajectory: an image has the pose of its time
+/// Mount of a photo on a trajectory. An image has the pose of the time
 ///
 /// ```text
 /// t = time + rate a + offset
 /// ```
 ///
-/// a being its own number (`Network::image_times`) and the photo itself at a = 0. With a rolling shutter a is the row over all
-/// rows and the rate the readout time of all; with a line scanner a is the time of the line from that of the photo and the rate a factor
-/// of all line rates, about 1; the offset is that of a clock.
+/// with its number a (`Network::image_times`); a = 0 is the photo itself. For a rolling shutter, a is row / rows and the rate is the
+/// readout time of all rows. For a line scanner, a is the time of the line relative to the photo. Its rate is a factor of all line rates,
+/// about 1; the offset is a clock error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnTrajectory {
-    /// The photo. Of its own pose nothing counts but where it is about.
+    /// Photo. Its own pose is only an approximate position.
     pub photo: usize,
-    /// The trajectory.
+    /// Trajectory.
     pub trajectory: usize,
-    /// The time of the photo, in seconds.
+    /// Time of the photo, in seconds.
     pub time: f64,
-    /// The common unknown that is the rate; 1 without.
+    /// Shared parameter of the rate; 1 if None.
     pub rate: Option<usize>,
-    /// The common unknown that is the offset; 0 without.
+    /// Shared parameter of the offset; 0 if None.
     pub offset: Option<usize>,
 }
 
 impl OnTrajectory {
-    /// The time of an image, given the values of common unknowns.
+    /// Returns the time of an image, given the values of shared parameters.
     fn time_of(&self, at: f64, value: impl Fn(usize) -> f64) -> f64 {
         self.time + at * self.rate.map_or(1.0, &value) + self.offset.map_or(0.0, &value)
     }
 
-    /// The coefficients that a pose is made of: of positions, of rotations. Where the time has unknowns, those about it as well.
+    /// Returns the ranges of active coefficients of positions and rotations, extended if the time has free parameters.
     fn active(&self, at: f64, known: &Mounts) -> [std::ops::Range<usize>; 2] {
         let time = self.time_of(at, |common| known.given(common).0);
         let exactly = self.scalars().all(|common| known.given(common).1);
@@ -46,7 +45,7 @@ impl OnTrajectory {
         [course.position.near(time, exactly), course.rotation.near(time, exactly)]
     }
 
-    /// The time of an image.
+    /// Returns the time of an image.
     fn time(&self, at: f64, grounds: &Grounds<'_>) -> f64 {
         self.time_of(at, |common| grounds.common(common).0.vector().x)
     }
@@ -57,7 +56,7 @@ impl OnTrajectory {
         course.at(time, &|k| value(position, k), &|k| value(rotation, k))
     }
 
-    /// The common unknowns that its time has, each with what a unit of it makes of that.
+    /// Returns the shared parameters of the time, each with the partial of the time.
     fn scaled(&self, at: f64) -> impl Iterator<Item = (usize, f64)> {
         self.rate.map(|own| (own, at)).into_iter().chain(self.offset.map(|own| (own, 1.0)))
     }
@@ -107,7 +106,7 @@ impl MountModel for OnTrajectory {
         true
     }
 
-    /// By the offset of a clock: the difference of what is half a millisecond later and earlier.
+    /// The partials by a clock offset are central differences over one millisecond.
     fn moving(&self, at: f64, grounds: &Grounds<'_>) -> Option<Moving> {
         const HALF: f64 = 5e-4;
         let known = grounds.known();
@@ -170,7 +169,7 @@ mod tests {
         self, Attitudes, Axes, Basis, Interpolation, Polynomial, Positions, Rotations, Spline,
     };
 
-    /// A curve, corrected by a straight line and a spline; body and table apart where they are asked to be.
+    /// Returns a curve with a linear and a spline correction; `turning` separates body and table.
     fn trajectory(turning: bool) -> Trajectory {
         let times: Vec<f64> = (0..6).map(|k| -4.0 + 1.6 * f64::from(k)).collect();
         let places = times.iter().map(|t| Vector3::new(150.0 + t.cos(), 200.0 + 0.3 * t, 170.0)).collect();

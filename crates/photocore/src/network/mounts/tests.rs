@@ -1,4 +1,4 @@
-//! What every kind must hold: steps that agree with differences.
+//! Test of the partials of all mounts against differences.
 
 #![allow(clippy::unwrap_used)]
 
@@ -14,13 +14,13 @@ use crate::geometry::{
 use crate::network::commons::{Common, CommonKind, PlacedCommon};
 use crate::network::in_block::InBlock;
 
-/// One mount, of so many photos.
+/// Returns the mounts of one mounted photo among `photos`.
 pub fn mounted(mount: Mount, photos: usize) -> Mounts {
     Mounts::new((&[mount], photos), (&[], [0.0; 3]), &[])
 }
 
-/// Asserts that the poses of the first of two photos step as central differences of the fourth order do, in both spaces. Common unknowns
-/// are of the types that they have to be, and not at their origin.
+/// Asserts that the partials of the pose of photo 0 agree with central differences of fourth order, in both spaces. Shared parameters have
+/// the required types and nonzero values.
 pub fn agrees(mount: Mount, commons: &[CommonKind], trajectories: &[Trajectory]) {
     let geographic = ObjectSpace::Geographic(Ellipsoid::new(300.0, 290.0).unwrap());
     for space in [ObjectSpace::Rectangular, geographic] {

@@ -1,47 +1,47 @@
-//! Observations after the adjustment.
+//! Adjusted additional observations.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Observation, TiedObservation};
 
-/// An observation after the adjustment, component by component.
+/// An adjusted observation, component by component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedObservation {
-    /// Observed minus computed, in the units of the components.
+    /// Observed minus computed values, in the units of the components.
     pub residual: Vec<f64>,
-    /// Redundancy numbers `(Qvv S^-1)_ii`, S being the covariance matrix a priori; single ones may leave 0 to 1 where the components are
-    /// correlated. NaN when not asked for.
+    /// Redundancy numbers `(Qvv S^-1)_ii` with the a-priori covariance matrix S. They may be outside 0 to 1 if components are correlated;
+    /// NaN if not requested.
     pub redundancy: Vec<f64>,
-    /// Standardized residuals `(S^-1 v)_i / sqrt((S^-1 Qvv S^-1)_ii)`, a priori unit weight; NaN when not asked for, and without redundancy.
+    /// Standardized residuals `(S^-1 v)_i / sqrt((S^-1 Qvv S^-1)_ii)`, a priori unit weight; NaN if not requested, or without redundancy.
     pub standardized: Vec<f64>,
-    /// v^T S^-1 v, the weight as the loss has changed it.
+    /// v^T S^-1 v, with the weight as modified by the loss.
     pub square: f64,
-    /// The factor by which a loss has changed its weight; 1 without a loss.
+    /// Weight factor of the loss; 1 without a loss.
     pub weight: f64,
 }
 
-/// All observations of one kind.
+/// Sums over all observations of one type.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KindSums {
-    /// The name of the kind.
+    /// Name of the type.
     pub kind: &'static str,
-    /// How many took part.
+    /// Number of active observations.
     pub observations: usize,
-    /// How many components these have.
+    /// Number of their components.
     pub components: usize,
-    /// Sum of v^T S^-1 v, weights as the loss has changed them.
+    /// Sum of v^T S^-1 v, weights as modified by the loss.
     pub sum_of_squares: f64,
-    /// Sum of the redundancy numbers; NaN when not asked for.
+    /// Sum of the redundancy numbers; NaN if not requested.
     pub redundancy: f64,
 }
 
-/// What rounding leaves of a redundancy of zero would make a test value of noise.
+/// Smallest relative variance of a test value that is not rounding noise.
 const LEAST_REDUNDANCY: f64 = 1e-10;
 
 impl AdjustedObservation {
-    /// From z = L^-1 v and a Q a^T of the equations of unit weight, row by row, the latter where there are cofactors.
+    /// Returns the results from z = L^-1 v and the leverages a Q a^T of the whitened equations, row by row.
     ///
-    /// With B = a Q a^T, a being whitened: Qvv = L (I - B) L^T, Qvv S^-1 = L (I - B) L^-1, S^-1 Qvv S^-1 = L^-T (I - B) L^-1.
+    /// With B = a Q a^T and whitened a: Qvv = L (I - B) L^T, Qvv S^-1 = L (I - B) L^-1, S^-1 Qvv S^-1 = L^-T (I - B) L^-1.
     pub(in super::super) fn new(
         tied: &TiedObservation,
         whitened: &[f64],
@@ -70,7 +70,7 @@ impl AdjustedObservation {
 }
 
 impl KindSums {
-    /// Of those kinds of which there are observations.
+    /// Returns the sums of each observed type.
     pub(in super::super) fn all(
         observations: &[Observation],
         adjusted: &[Option<AdjustedObservation>],

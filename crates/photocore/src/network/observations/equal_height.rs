@@ -1,19 +1,19 @@
-//! Points at one height.
+//! Points of equal height.
 
 use nalgebra::DMatrix;
 
 use super::{Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
 
-/// Two points at one height, or with the difference of heights that was levelled.
+/// Two points of equal height, or with a levelled height difference.
 ///
 /// h = Z_Q - Z_P, with the partials 1 by Z_Q and -1 by Z_P; heights above the ellipsoid in geographic space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EqualHeight {
-    /// P and Q.
+    /// Points P and Q.
     pub points: [usize; 2],
-    /// The observed height of Q above P: zero, or what was levelled.
+    /// Observed height of Q above P: zero or levelled.
     pub difference: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the difference.
     pub sd: f64,
 }
 

@@ -1,59 +1,59 @@
-//! What is wrong with an observation.
+//! Errors of observations.
 
 use thiserror::Error;
 
 use crate::network::commons::CommonKind;
 
-/// What is wrong with an observation.
+/// Error of an invalid observation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Fault {
-    /// A point that is not there.
+    /// Missing point.
     #[error("names point {0}, which is not there")]
     NoPoint(usize),
-    /// A photo that is not there.
+    /// Missing photo.
     #[error("names photo {0}, which is not there")]
     NoPhoto(usize),
-    /// A common unknown that is not there.
+    /// Missing shared parameter.
     #[error("names common unknown {0}, which is not there")]
     NoCommon(usize),
-    /// A common unknown of another type than it needs.
+    /// Shared parameter of a wrong type.
     #[error("names common unknown {common}, which is no {}", .needed.name())]
     OtherCommon {
-        /// Its index.
+        /// Index of the shared parameter.
         common: usize,
-        /// The type.
+        /// Required type.
         needed: CommonKind,
     },
-    /// A photo that is on no trajectory: it has no velocity.
+    /// Photo without a trajectory, and so without a velocity.
     #[error("is of the motion of photo {0}, which is on no trajectory")]
     AtRest(usize),
-    /// Nothing of what it is of is unknown.
+    /// All quantities of the observation are fixed.
     #[error("is of known quantities alone")]
     NothingUnknown,
-    /// A point, photo or common unknown with itself.
+    /// Repeated point, photo or shared parameter.
     #[error("names a point, photo or common unknown twice")]
     Twice,
-    /// No component is observed.
+    /// Observation without components.
     #[error("has no component")]
     Nothing,
-    /// More or fewer standard deviations than components.
+    /// Wrong number of standard deviations.
     #[error("has {components} components and {given} standard deviations")]
     Deviations {
-        /// How many components it has.
+        /// Number of components.
         components: usize,
-        /// Standard deviations, or rows of the covariance matrix.
+        /// Number of standard deviations, or rows of the covariance matrix.
         given: usize,
     },
-    /// A standard deviation that gives no weight.
+    /// Standard deviation without a finite weight.
     #[error("has a standard deviation that is not positive and finite")]
     Deviation,
-    /// A matrix that is no covariance matrix.
+    /// Invalid covariance matrix.
     #[error("has a covariance matrix that is not symmetric and positive definite")]
     Covariance,
-    /// A matrix that is no rotation.
+    /// Matrix that is not a rotation.
     #[error("has a matrix that is no rotation")]
     Rotation,
-    /// A value that is not finite, at the initial values or at all.
+    /// Value that is not finite, as given or at the initial values.
     #[error("has a value that is not finite, or cannot be computed from the initial values")]
     NotFinite,
 }

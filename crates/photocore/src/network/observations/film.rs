@@ -1,4 +1,4 @@
-//! Films: what is known of that of a photo beforehand, and readings of fiducial marks.
+//! Prior information of films, and readings of fiducial marks.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -6,9 +6,9 @@ use super::{Fault, Named, ObservationModel, Precision, Rows, Sites, Touches};
 use crate::network::commons::CommonKind;
 use crate::network::film::{FilmOf, Read};
 
-/// Some of t1, t2, theta, m, b1, b2 of the film of a photo; m about that of its roll, where there is one.
+/// Prior values of some of t1, t2, theta, m, b1, b2 of the film of a photo; m is relative to the roll, if any.
 ///
-/// `m - m_roll` has the partials 1 and -1, all others are unknowns themselves.
+/// `m - m_roll` has the partials 1 and -1; all others are parameters themselves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
     /// A [`CommonKind::FilmPlacement`].
@@ -17,21 +17,21 @@ pub struct Film {
     pub size: usize,
     /// A [`CommonKind::Roll`].
     pub roll: Option<usize>,
-    /// Which of the six are known.
+    /// Observed components among the six.
     pub components: Vec<usize>,
-    /// As many values.
+    /// Observed values of the components.
     pub observed: Vec<f64>,
-    /// Of these.
+    /// Precision of the components.
     pub precision: Precision,
 }
 
-/// The number of m among the six.
+/// Index of m among the six.
 const MEAN: usize = 3;
 
 impl ObservationModel for Film {
     const NAME: &'static str = "film";
 
-    /// Numbers of the components, then their values.
+    /// Values: numbers of the components, then their observed values.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[Some(placement), Some(size), roll] = of.commons else { return None };
         let (components, observed) = values.split_at_checked(covariance.nrows())?;
@@ -80,25 +80,25 @@ impl ObservationModel for Film {
     }
 }
 
-/// The reading of a fiducial mark: what the film and the scanner make of its place in the camera.
+/// Reading of a fiducial mark: its position in the camera, transformed by film and scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fiducial {
-    /// The mark, a [`CommonKind::Fiducial`].
+    /// Mark, a [`CommonKind::Fiducial`].
     pub mark: usize,
-    /// About where it is, mm.
+    /// Approximate position of the mark, in mm.
     pub near: [f64; 2],
-    /// The film of the photo.
+    /// Film of the photo.
     pub film: FilmOf,
     /// Column and row, or x and y.
     pub reading: [f64; 2],
-    /// Of the same.
+    /// Precision of the reading.
     pub precision: Precision,
 }
 
 impl ObservationModel for Fiducial {
     const NAME: &'static str = "fiducial";
 
-    /// Of the mark, then of the film (see [`crate::network::Passage`]); the reading, about where the mark is, the numbers of the film.
+    /// Indices: mark, then film (see [`crate::network::Passage`]); values: reading, approximate position, numbers of the film.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let commons: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
         let (&[x, y, near_x, near_y], film) = values.split_first_chunk()?;

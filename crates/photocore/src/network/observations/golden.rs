@@ -1,4 +1,4 @@
-//! Values and partials of every kind against those of an independent program, read where they are at hand.
+//! Comparison of values and partials of all types with an independent program, if its files exist.
 
 #![allow(clippy::unwrap_used)]
 
@@ -36,7 +36,7 @@ fn state(kind: CommonKind, position: [f64; 3], attitude: Matrix3) -> CommonState
     PlacedCommon::new(&common, SPACE, [0.0; 3], &Matrix3::identity()).at(&vec![0.0; common.sd.len()])
 }
 
-/// The common unknown of a block, of a case of the given kind, and the columns of ours that its partials are by, with their signs.
+/// Returns the shared parameter of a block in a case, and the matching columns of its partials with their signs.
 fn common(case: &Value, kind: &str, block: &Value) -> (CommonState, Vec<(usize, f64)>) {
     let plain = |kind: CommonKind, position: [f64; 3]| {
         let all = (0..kind.unknowns().len()).map(|k| (k, 1.0)).collect();
@@ -49,13 +49,13 @@ fn common(case: &Value, kind: &str, block: &Value) -> (CommonState, Vec<(usize, 
         "equal height, unknown level" => plain(CommonKind::Level, [0.0, 0.0, value()[0]]),
         "point on plumb line" => plain(CommonKind::PlumbLine, [value()[0], value()[1], 0.0]),
         "point on plane" => {
-            // n <- n + T tau: towards the first axis by a turn about the second, towards the second by one about the first, back.
+            // n <- n + T tau: rotations about the second and first axes tilt the normal towards the first and second.
             let normal = Vector3::from_column_slice(&list(&case["normal"]));
             let basis = rows(&case["tangent_basis"]);
             let axis = |k: usize| Vector3::new(basis[0][k], basis[1][k], basis[2][k]);
             let handed = axis(0).cross(&axis(1)).dot(&normal).signum();
             let attitude = Matrix3::from_columns(&[axis(0), handed * axis(1), normal]);
-            // Their distance counts from the origin; so does the place that is given.
+            // The distance is relative to the origin, and so is the given position.
             let plane = state(CommonKind::Plane, [0.0; 3], attitude);
             (plane, vec![(2, 1.0), (1, -handed), (0, 1.0)])
         }
@@ -71,7 +71,7 @@ fn common(case: &Value, kind: &str, block: &Value) -> (CommonState, Vec<(usize, 
     }
 }
 
-/// The name of our kind, what it is given in numbers, and whether the golden figures are those of the residual.
+/// Returns the name of the type, its numbers, and whether the reference partials refer to the residual.
 fn kind(case: &Value, blocks: &[Value]) -> Option<(&'static str, Vec<f64>, bool)> {
     let flat = |name: &str| rows(&case[name]).concat();
     let none = vec![0.0];
@@ -97,7 +97,7 @@ fn assert_close(found: f64, expected: f64, scale: f64, what: &str) {
     assert!((found - expected).abs() <= 1e-11 * scale.max(1.0), "{what}: {found} {expected}");
 }
 
-/// Compares one case of a kind that is a tie.
+/// Compares one case of an additional observation.
 fn assert_case(case: &Value) -> bool {
     let blocks = case["blocks"].as_array().unwrap();
     let what = case["kind"].as_str().unwrap();
@@ -145,7 +145,7 @@ fn assert_case(case: &Value) -> bool {
     let (mut constant, mut coefficients) = (vec![0.0; components], vec![0.0; components * all]);
     tied.write(&model, &mut constant, &mut coefficients);
     for (row, expected) in list(&case["computed"]).into_iter().enumerate() {
-        // Distances from the origin are observed; all others as zero.
+        // Planes have observed distances from the origin; all other observed values are zero.
         let found = if of_residual { constant[row] } else { -constant[row] };
         assert_close(found, expected, expected.abs(), what);
     }
@@ -155,7 +155,7 @@ fn assert_case(case: &Value) -> bool {
         let same = (0..width(*own)).map(|k| (k, 1.0)).collect();
         let columns = if *own < 200 { &same } else { &commons[own - 200].1 };
         for (k, &(column, sign)) in columns.iter().enumerate() {
-            // What the core writes are the partials of the computed, those of a residual with the other sign.
+            // Partials of residuals have the opposite sign of partials of computed values.
             let sign = if of_residual { -sign } else { sign };
             for (row, expected) in expected.iter().enumerate() {
                 let found = sign * coefficients[row * all + first + column];
@@ -204,6 +204,6 @@ fn every_kind_has_the_golden_values_and_partials() {
     let cases = file["cases"].as_array().unwrap();
     let ties = cases.iter().filter(|case| assert_case(case)).count();
     cases.iter().filter(|case| case["kind"] == "image, rig").for_each(assert_rig);
-    // Images of cameras that are known, backward and forward are not of this module.
+    // Forward and backward images of fixed cameras belong to another module.
     assert_eq!((ties, cases.len()), (11, 15));
 }

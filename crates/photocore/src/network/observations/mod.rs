@@ -1,7 +1,7 @@
-//! Observations of a network beside its images (lengths, differences of coordinates, positions and attitudes of photos ...).
+//! Additional observations of a network: lengths, coordinate differences, positions and attitudes of photos.
 //!
-//! Each kind is a type that implements [`ObservationModel`], in a file of its own or in one with others that are of the same things, and
-//! a line of `kinds!` below. It writes observed minus computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
+//! Each type implements [`ObservationModel`], in its own file or with related types, and has a line of `kinds!` below. It writes observed
+//! minus computed values and the partials by positions and rotations. [`Rows`] converts these to the parameter columns.
 
 mod adjusted;
 mod fault;
@@ -32,7 +32,7 @@ macro_rules! kinds {
         kinds! { @kinds $($($name)? $($($member)*)?)* }
     };
     (@kinds $($name:ident)*) => {
-        /// An observation of any kind.
+        /// An observation of any type.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Observation {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
@@ -44,7 +44,7 @@ macro_rules! kinds {
             }
         })*
 
-        /// The names of all kinds, in the order in which results list them.
+        /// Names of all types, in the order of the results.
         pub const KINDS: &[&str] = &[$($name::NAME),*];
 
         impl Observation {
@@ -55,7 +55,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// An observation of the kind of that name (see [`ObservationModel::from_numbers`]); None where there is no such kind.
+            /// Returns an observation of the named type (see [`ObservationModel::from_numbers`]); None for an unknown name.
             pub fn from_numbers(
                 kind: &str,
                 of: &Named<'_>,
@@ -134,7 +134,7 @@ kinds! {
 }
 
 impl Observation {
-    /// Refuses an observation that contradicts itself or a network of so many points and photos, and these common unknowns.
+    /// Returns an error if the observation is invalid or does not fit the points, photos and shared parameters of the network.
     pub(super) fn check(&self, points: usize, photos: usize, commons: &[Common]) -> Result<(), Fault> {
         let touches = self.touches();
         if let Some(&point) = touches.points.iter().find(|&&point| point >= points) {
@@ -148,7 +148,7 @@ impl Observation {
             if let Some(needed) = needed.filter(|&needed| needed != own.kind) {
                 return Err(Fault::OtherCommon { common, needed });
             }
-            // Of any type: all its unknowns are observed.
+            // A shared parameter of any type: all its components are observed.
             let (components, given) = (own.sd.len(), self.components(place));
             if needed.is_none() && components != given {
                 return Err(Fault::Deviations { components, given });

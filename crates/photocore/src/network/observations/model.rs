@@ -1,4 +1,4 @@
-//! What a kind of observation is.
+//! Interface of an observation type.
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 
@@ -8,74 +8,74 @@ use super::rows::{Rows, Sites};
 use crate::geometry::Matrix3;
 use crate::network::commons::CommonKind;
 
-/// A kind of observation of points, photos and unknowns that observations have in common.
+/// A type of observations of points, photos and shared parameters.
 pub trait ObservationModel: Sized {
-    /// The name under which reports know the kind.
+    /// Name of the type in reports.
     const NAME: &'static str;
 
-    /// From numbers, as callers have them that know a kind by its name; None where there are more or fewer than it has.
+    /// Returns an observation from indices and numbers; None if their counts are wrong.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self>;
 
-    /// What it is of: points, photos and common unknowns are known by their place in these lists to [`ObservationModel::write`].
+    /// Returns points, photos and shared parameters; [`ObservationModel::write`] refers to them by their index in these lists.
     fn touches(&self) -> Touches;
 
-    /// Whether it is of how a photo moves, which then is on a trajectory: [`Sites::moving`].
+    /// Returns true if the observation depends on the motion of a photo on a trajectory: [`Sites::moving`].
     fn moves(&self) -> bool {
         false
     }
 
-    /// How many components it has.
+    /// Returns the number of components.
     fn rows(&self) -> usize;
 
-    /// How many unknowns a common one of any type has, by its place in [`Touches::commons`].
+    /// Returns the number of parameters of a shared parameter of any type, by its index in [`Touches::commons`].
     fn components(&self, _common: usize) -> usize {
         self.rows()
     }
 
-    /// How well these are known.
+    /// Returns the precision of the components.
     fn precision(&self) -> Precision;
 
     /// Writes observed minus computed, and the partials of the computed values.
     fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
 
-    /// The axes, as rows, in which observed minus computed is a displacement of a place; None where it is none. A displacement turns and
-    /// grows with a network that moves as a whole, and says nothing about that (see [`crate::adjustment::Evaluated::carried`]).
+    /// Returns, as rows, the axes of observed minus computed if it is a displacement of a position; None otherwise. A displacement is
+    /// transformed with the network and does not define its datum (see [`crate::adjustment::Evaluated::carried`]).
     fn axes(&self, _sites: &Sites<'_>) -> Option<DMatrix<f64>> {
         None
     }
 
-    /// Refuses what cannot be observed.
+    /// Returns an error for invalid values.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The first invalid value.
     fn check(&self) -> Result<(), Fault> {
         Ok(())
     }
 }
 
-/// What an observation is of: indices into the network, each once; of a common unknown with the type that it must have, None for any.
+/// Distinct indices into the network on which an observation depends; shared parameters with their required type, None for any.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Touches {
-    /// Its points.
+    /// Points.
     pub points: Vec<usize>,
-    /// Its photos.
+    /// Photos.
     pub photos: Vec<usize>,
-    /// Its common unknowns.
+    /// Shared parameters.
     pub commons: Vec<(usize, Option<CommonKind>)>,
 }
 
 impl Touches {
-    /// Points alone.
+    /// Returns a list of points.
     pub fn points(points: &[usize]) -> Self {
         Self { points: points.to_vec(), ..Self::default() }
     }
 
-    /// Photos alone.
+    /// Returns a list of photos.
     pub fn photos(photos: &[usize]) -> Self {
         Self { photos: photos.to_vec(), ..Self::default() }
     }
 
-    /// Besides a common unknown, where there is one.
+    /// Adds a shared parameter, if any.
     #[must_use]
     pub fn and(mut self, common: Option<usize>, kind: CommonKind) -> Self {
         self.commons.extend(common.map(|common| (common, Some(kind))));
@@ -83,33 +83,33 @@ impl Touches {
     }
 }
 
-/// What an observation is of, as it is given in numbers: indices into the network.
+/// Objects of an observation as indices into the network.
 #[derive(Debug, Clone, Copy)]
 pub struct Named<'a> {
     /// Points.
     pub points: &'a [usize],
     /// Photos.
     pub photos: &'a [usize],
-    /// Common unknowns; None where the kind can do without.
+    /// Shared parameters; None for optional ones.
     pub commons: &'a [Option<usize>],
 }
 
-/// A quantity that is known, or a common unknown, by its index.
+/// A fixed quantity, or the index of a shared parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity<T> {
-    /// Its value.
+    /// Value.
     Known(T),
-    /// Its index.
+    /// Index.
     Common(usize),
 }
 
 impl<T> Quantity<T> {
-    /// The common unknown, where there is one; else what is known.
+    /// Returns the shared parameter if it is given, else the fixed value.
     pub fn new(common: Option<usize>, known: T) -> Self {
         common.map_or(Self::Known(known), Self::Common)
     }
 
-    /// The index of a common unknown.
+    /// Returns the index of a shared parameter.
     pub fn common(&self) -> Option<usize> {
         match self {
             Self::Known(_) => None,
@@ -118,24 +118,24 @@ impl<T> Quantity<T> {
     }
 }
 
-/// Three numbers from a place on; None where there are not so many.
+/// Returns three numbers from an index on; None if there are fewer.
 pub(super) fn three(values: &[f64], first: usize) -> Option<[f64; 3]> {
     values.get(first..first + 3)?.try_into().ok()
 }
 
-/// A matrix of nine numbers, row by row, from a place on.
+/// Returns a matrix of nine numbers from an index on, row by row.
 pub(super) fn nine(values: &[f64], first: usize) -> Option<Matrix3> {
     values.get(first..first + 9).map(Matrix3::from_row_slice)
 }
 
-/// The standard deviation of an observation of one component.
+/// Returns the standard deviation of an observation with one component.
 pub(super) fn deviation(covariance: &DMatrix<f64>) -> f64 {
     covariance[(0, 0)].sqrt()
 }
 
-/// Writes some components of a point in the own axes of a plane or line, less the unknown offsets: `selected` has them as rows.
+/// Writes the `selected` components (rows) of a point in the own axes of a plane or line, minus the estimated offsets.
 ///
-/// own = R^T (P - p_0), with the partials R^T by P, and `[own]x` by a turn of the axes about themselves.
+/// own = R^T (P - p_0), with the partials R^T by P, and `[own]x` by a rotation of the axes about themselves.
 pub(super) fn in_own_axes<const N: usize>(
     sites: &Sites<'_>,
     rows: &mut Rows<'_>,
@@ -151,7 +151,7 @@ pub(super) fn in_own_axes<const N: usize>(
     rows.by_turn(0, 0, &(selected * own.cross_matrix()));
 }
 
-/// What [`ObservationModel::axes`] are of a point in some of the own axes of a plane or line.
+/// Returns [`ObservationModel::axes`] of a point in some of the own axes of a plane or line.
 pub(super) fn own_axes<const N: usize>(
     sites: &Sites<'_>,
     selected: &SMatrix<f64, N, 3>,
@@ -159,15 +159,15 @@ pub(super) fn own_axes<const N: usize>(
     rows_of(&(selected * sites.common(0).attitude().transpose()))
 }
 
-/// Axes as rows.
+/// Returns axes as rows.
 pub(super) fn rows_of<const N: usize>(axes: &SMatrix<f64, N, 3>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_iterator(N, 3, axes.iter().copied()))
 }
 
-/// Refuses a matrix that is not a rotation to six digits.
+/// Returns an error unless a matrix is a rotation within 1e-6.
 pub(super) fn rotates(matrix: &Matrix3) -> Result<(), Fault> {
     const DIGITS: f64 = 1e-6;
     let difference = (matrix.tr_mul(matrix) - Matrix3::identity()).amax();
-    // NaN is no rotation either.
+    // NaN also fails this test.
     if difference < DIGITS && matrix.determinant() > 0.0 { Ok(()) } else { Err(Fault::Rotation) }
 }

@@ -1,4 +1,4 @@
-//! How a photo on a trajectory moves: velocities from GNSS, rates of rotation from gyroscopes, smooth curves.
+//! Motion of photos on trajectories: velocities from GNSS, rotation rates from gyroscopes, smoothness.
 
 use nalgebra::DMatrix;
 
@@ -8,25 +8,25 @@ use super::{
 };
 use crate::geometry::{Matrix3, Vector3};
 
-/// The velocity of the antenna of a photo or record on a trajectory, in the cartesian axes of the object space.
+/// Velocity of the antenna of a photo or record on a trajectory, in the Cartesian axes of the object space.
 ///
 /// `C' + A [w]x l`, with the partials `I` by C', `-A [l]x` by w, `-A [w x l]x` by rho and `A [w]x` by l.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Velocity {
-    /// The photo, which is on a trajectory.
+    /// Photo on a trajectory.
     pub photo: usize,
-    /// Units of the object space in a second.
+    /// Velocity in units of the object space per second.
     pub velocity: [f64; 3],
-    /// l, from the projection centre to the antenna in the photo's axes.
+    /// Lever arm l from the projection centre to the antenna, in the axes of the photo.
     pub lever_arm: Quantity<Vector3>,
-    /// Of X, Y, Z.
+    /// Precision of X, Y, Z.
     pub precision: Precision,
 }
 
 impl ObservationModel for Velocity {
     const NAME: &'static str = "velocity";
 
-    /// The velocity, l where it is known; the lever arm.
+    /// Values: velocity, l if fixed; shared parameter: lever arm.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[lever_arm]) = (of.photos, of.commons) else { return None };
         let lever_arm = Quantity::new(lever_arm, three(values, 3)?.into());
@@ -69,27 +69,27 @@ impl ObservationModel for Velocity {
     }
 }
 
-/// The rate of the body that carries a camera, about its own axes, at a photo or record on a trajectory.
+/// Rotation rate of the body of a camera, about its own axes, at a photo or record on a trajectory.
 ///
-/// `B^T w + b`, with the partials `B^T` by w, `[B^T w]x` by a turn of B about the axes of the body, and `I` by the bias b.
+/// `B^T w + b`, with the partials `B^T` by w, `[B^T w]x` by a rotation of B about the axes of the body, and `I` by the bias b.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rate {
-    /// The photo, which is on a trajectory.
+    /// Photo on a trajectory.
     pub photo: usize,
-    /// Radians in a second.
+    /// Radians per second.
     pub rate: [f64; 3],
-    /// B, body to photo.
+    /// Rotation B from body to photo.
     pub boresight: Quantity<Matrix3>,
-    /// b, where there is one.
+    /// Shared parameter of the bias b, if any.
     pub bias: Option<usize>,
-    /// Of the three axes of the body.
+    /// Precision about the three axes of the body.
     pub precision: Precision,
 }
 
 impl ObservationModel for Rate {
     const NAME: &'static str = "rate";
 
-    /// The rate, then B where it is known, row by row; the boresight, the bias.
+    /// Values: rate, then B if fixed, row by row; shared parameters: boresight, bias.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[boresight, bias]) = (of.photos, of.commons) else { return None };
         let boresight = Quantity::new(boresight, nine(values, 3)?);
@@ -141,26 +141,25 @@ impl ObservationModel for Rate {
     }
 }
 
-/// A sum of coefficients of a trajectory, each with its factor: differences of neighbours (Eilers and Marx 1996), or one that follows from
-/// the one before as in a process of Gauss and Markov.
+/// Weighted sum of trajectory coefficients: differences of neighbours (Eilers and Marx 1996), or one step of a Gauss-Markov process.
 ///
 /// `sum f_k c_k`, with the partials `f_k I`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smoothness {
-    /// The coefficients: common unknowns of three components.
+    /// Coefficients: shared parameters of three components.
     pub coefficients: Vec<usize>,
-    /// As many factors.
+    /// Factor of each coefficient.
     pub factors: Vec<f64>,
-    /// What was observed, most often zero.
+    /// Observed sum, usually zero.
     pub observed: [f64; 3],
-    /// Of x, y, z.
+    /// Precision of x, y, z.
     pub precision: Precision,
 }
 
 impl ObservationModel for Smoothness {
     const NAME: &'static str = "smoothness";
 
-    /// What was observed, then the factors.
+    /// Values: observed sum, then the factors.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let coefficients: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
         let factors = values.get(3..)?.to_vec();

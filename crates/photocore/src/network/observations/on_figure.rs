@@ -1,4 +1,4 @@
-//! Points on unknown levels, planes, verticals and straight lines.
+//! Points on unknown levels, planes, vertical lines and straight lines.
 
 use nalgebra::{DMatrix, Matrix2x3, RowVector3};
 
@@ -6,19 +6,19 @@ use super::{
     CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, in_own_axes, own_axes,
 };
 
-/// A point on a plane, or at a distance from it: the standard deviation is how flat that is.
+/// A point on a plane, or at a given distance from it; its standard deviation is the flatness of the plane.
 ///
-/// n.(P - p_0) - d, n being the third of the axes of the plane and p_0 the place that is given; with the partials n by P, -1 by d, and by a
-/// turn of the plane about its own axes those of R^T (P - p_0).
+/// n.(P - p_0) - d, with the normal n (third axis of the plane) and the given position p_0. Partials are n by P, -1 by d, and the third row
+/// of `[R^T (P - p_0)]x` by a rotation about the own axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnPlane {
-    /// The point.
+    /// Point.
     pub point: usize,
-    /// The plane.
+    /// Plane.
     pub plane: usize,
-    /// The observed distance from it along its normal.
+    /// Observed distance along the normal.
     pub distance: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the distance.
     pub sd: f64,
 }
 
@@ -51,19 +51,19 @@ impl ObservationModel for OnPlane {
     }
 }
 
-/// A point at the height of a level, or so much above it: a water line, the horizon of a levelling instrument.
+/// A point at the height of a level, or at a given height above it: a water line, the horizon of a levelling instrument.
 ///
-/// Z - h, with the partials 1 by Z and -1 by h; heights above the ellipsoid in geographic space. As many points as there are give one check
-/// fewer, as their differences with the full covariance of these would.
+/// Z - h, with the partials 1 by Z and -1 by h; heights above the ellipsoid in geographic space. n points yield n - 1 checks, like their
+/// differences with full covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OnLevel {
-    /// The point.
+    /// Point.
     pub point: usize,
-    /// The level.
+    /// Level.
     pub level: usize,
-    /// The observed height above it: zero, or what was levelled.
+    /// Observed height above the level: zero or levelled.
     pub difference: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the height.
     pub sd: f64,
 }
 
@@ -98,15 +98,15 @@ impl ObservationModel for OnLevel {
     }
 }
 
-/// Points on a line, told by two offsets that are zero.
+/// Points on a line: two offsets are observed as zero.
 macro_rules! on_lines {
     ($($(#[$doc:meta])* $name:ident = $said:literal, $kind:ident, $axes:literal;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq)]
         pub struct $name {
-            /// The point.
+            /// Point.
             pub point: usize,
-            /// The line.
+            /// Line.
             pub line: usize,
             #[doc = $axes]
             pub precision: Precision,
@@ -146,11 +146,11 @@ macro_rules! on_lines {
 on_lines! {
     /// A point on a plumb line.
     ///
-    /// (X - X0, Y - Y0), with the partials 1 by X, Y and -1 by X0, Y0; in geographic space along east and north of the given place.
+    /// (X - X0, Y - Y0), with the partials 1 by X, Y and -1 by X0, Y0; in geographic space along east and north at the given position.
     OnPlumbLine = "on plumb line", PlumbLine, "Of the offsets along X and Y or, in geographic space, east and north.";
     /// A point on a straight line.
     ///
-    /// T^T (P - p_0) - q, T being the first two of the axes of the line and p_0 the place that is given; with the partials T^T by P, -I by
-    /// q, and by a turn of the line about its own axes those of R^T (P - p_0).
+    /// T^T (P - p_0) - q, with the first two axes T of the line and the given position p_0. Partials are T^T by P, -I by q, and the first
+    /// two rows of `[R^T (P - p_0)]x` by a rotation about the own axes.
     OnLine = "on line", Line, "Of the offsets along the first two axes of the line.";
 }

@@ -1,4 +1,4 @@
-//! Photos: positions from GNSS, attitudes from inertial units, relative poses, ranges from a photo to a point.
+//! Observations of photos: GNSS positions, inertial attitudes, relative poses, ranges from a photo to a point.
 
 use nalgebra::{DMatrix, Matrix1x3, SMatrix};
 
@@ -9,30 +9,30 @@ use super::{
 use crate::geometry::angle_axis::{right_jacobian_inverse, rotation_angle_axis};
 use crate::geometry::{Matrix3, Pose, Vector3};
 
-/// The position of the antenna of a photo.
+/// Position of the antenna of a photo.
 ///
-/// `C + A l + s + d dt`, with the partials `I` by C, `-A [l]x` by rho, `A` by l, `I` by s and `dt I` by d (Ackermann and Schade 1993); in
-/// geographic space positions and their errors are told in the axes east, north and up of the observed place.
+/// `C + A l + s + d dt`, with the partials `I` by C, `-A [l]x` by rho, `A` by l, `I` by s and `dt I` by d (Ackermann and Schade 1993). In
+/// geographic space, positions and errors refer to east, north and up at the observed position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Position {
-    /// The photo.
+    /// Photo.
     pub photo: usize,
-    /// The observed coordinates of the antenna in the object space.
+    /// Observed coordinates of the antenna in the object space.
     pub coordinates: [f64; 3],
-    /// l, from the projection centre to the antenna in the photo's axes (x right, y up, z back), in the unit of the object space.
+    /// Lever arm l from the projection centre to the antenna in the axes of the photo (x right, y up, z back), in object units.
     pub lever_arm: Quantity<Vector3>,
-    /// s, where there is one.
+    /// Shared parameter of the shift s, if any.
     pub shift: Option<usize>,
-    /// d, where there is one.
+    /// Shared parameter of the drift d, if any.
     pub drift: Option<usize>,
-    /// dt in seconds: from the time that the drift counts from.
+    /// Time dt in seconds since the reference time of the drift.
     pub time: f64,
-    /// Of X, Y, Z or, in geographic space, of east, north and up, in units of length.
+    /// Precision of X, Y, Z or, in geographic space, of east, north and up, in units of length.
     pub precision: Precision,
 }
 
 impl Position {
-    /// With a lever arm that is known, and nothing else.
+    /// Returns a position with a fixed lever arm, without shift and drift.
     pub fn new(photo: usize, coordinates: [f64; 3], lever_arm: Vector3, precision: Precision) -> Self {
         let lever_arm = Quantity::Known(lever_arm);
         Self { photo, coordinates, lever_arm, shift: None, drift: None, time: 0.0, precision }
@@ -40,7 +40,7 @@ impl Position {
 }
 
 impl Position {
-    /// l; zero where it is unknown.
+    /// Returns l; zero if it is a shared parameter.
     pub(in crate::network) fn known_lever_arm(&self) -> Vector3 {
         match self.lever_arm {
             Quantity::Known(lever_arm) => lever_arm,
@@ -52,7 +52,7 @@ impl Position {
 impl ObservationModel for Position {
     const NAME: &'static str = "position";
 
-    /// The coordinates, l where it is known, dt; lever arm, shift and drift.
+    /// Values: coordinates, l if fixed, dt; shared parameters: lever arm, shift, drift.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[lever_arm, shift, drift]) = (of.photos, of.commons) else { return None };
         Some(Self {
@@ -103,33 +103,33 @@ impl ObservationModel for Position {
         rows.residual(0, (axes * (observed - computed)).as_slice());
     }
 
-    /// What a drift takes up depends on where all antennas are.
+    /// The displacement absorbed by a drift depends on the positions of all antennas.
     fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
         self.drift.is_none().then(|| sites.observed(self.coordinates).1).and_then(|axes| rows_of(&axes))
     }
 }
 
-/// The attitude of the body that carries a camera.
+/// Attitude of the body of a camera.
 ///
-/// Computed is A B, body to object; the residual is v = Log((A B)^T A_obs), a rotation about the axes of the body, and with
-/// Jl = Jr^-1(-v) its partials are -Jl B^T by rho and -Jl by a turn of B about the axes of the body (Sola, Deray and Atchuthan 2018).
+/// The computed value is A B, body to object. The residual is v = Log((A B)^T A_obs), a rotation about the axes of the body. With Jl =
+/// Jr^-1(-v), its partials are -Jl B^T by rho and -Jl by a rotation of B about these axes (Sola, Deray and Atchuthan 2018).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitude {
-    /// The photo.
+    /// Photo.
     pub photo: usize,
-    /// A_obs, body to object: its columns are the axes of the body in those of the space or, where it is geographic, in east, north
-    /// and up at the photo.
+    /// Rotation A_obs from body to object. Its columns are the axes of the body in object axes or, in geographic space, in east, north and
+    /// up at the photo.
     pub attitude: Matrix3,
-    /// B, body to photo: the identity where what is observed is the attitude of the photo itself.
+    /// Rotation B from body to photo: the identity if the attitude of the photo itself is observed.
     pub boresight: Quantity<Matrix3>,
-    /// Of rotations about the axes of the body, in radians.
+    /// Precision of rotations about the axes of the body, in radians.
     pub precision: Precision,
 }
 
 impl ObservationModel for Attitude {
     const NAME: &'static str = "attitude";
 
-    /// A_obs, then B where it is known, row by row; the boresight.
+    /// Values: A_obs, then B if fixed, row by row; shared parameter: boresight.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[boresight]) = (of.photos, of.commons) else { return None };
         let boresight = Quantity::new(boresight, nine(values, 9)?);
@@ -176,31 +176,30 @@ impl ObservationModel for Attitude {
     }
 }
 
-/// v = Log(computed^T observed), and Jl = Jr^-1(-v): a turn of the computed by a small vector about its own axes takes Jl times it away.
+/// Returns v = Log(computed^T observed), and Jl: a small rotation rho of the computed attitude about its own axes changes v by -Jl rho.
 pub(in super::super) fn misalignment(computed: &Matrix3, observed: &Matrix3) -> (Vector3, Matrix3) {
     let residual = rotation_angle_axis(&computed.tr_mul(observed));
     (residual, right_jacobian_inverse(&-residual))
 }
 
-/// The pose of one photo in the axes of another: odometry, a stereo rig that was calibrated.
+/// Relative pose of two photos: odometry, a calibrated stereo rig.
 ///
-/// t = Ai^T (Cj - Ci) and R = Ai^T Aj; the residuals are t_obs - t in the axes of photo i and v = Log(R^T R_obs) about those of
-/// photo j. With Jl = Jr^-1(-v), the partials of t are -Ai^T, `[t]x`, Ai^T, 0 by Ci, rho_i, Cj, rho_j; those of the residual v are
-/// 0, Jl R^T, 0, -Jl.
+/// t = Ai^T (Cj - Ci) and R = Ai^T Aj. The residuals are t_obs - t in the axes of photo i and v = Log(R^T R_obs) about the axes of photo j.
+/// With Jl = Jr^-1(-v), the partials by Ci, rho_i, Cj, rho_j are: t -Ai^T, `[t]x`, Ai^T, 0; v 0, Jl R^T, 0, -Jl.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Relative {
-    /// i and j.
+    /// Photos i and j.
     pub photos: [usize; 2],
-    /// Photo j in the axes of photo i: t_obs in the unit of the object space, and R_obs.
+    /// Pose of photo j in the axes of photo i: t_obs in the unit of the object space, and R_obs.
     pub pose: Pose,
-    /// Of the three components of t, in units of length, and the three rotations, in radians.
+    /// Precision of the three components of t, in units of length, and of the three rotations, in radians.
     pub precision: Precision,
 }
 
 impl ObservationModel for Relative {
     const NAME: &'static str = "relative";
 
-    /// t_obs, then R_obs row by row.
+    /// Values: t_obs, then R_obs row by row.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[i, j] = of.photos else { return None };
         let pose = Pose { position: three(values, 0)?.into(), attitude: nine(values, 3)? };
@@ -239,30 +238,30 @@ impl ObservationModel for Relative {
     }
 }
 
-/// The distance of a point from a rangefinder that moves with a photo.
+/// Distance between a point and a rangefinder that moves with a photo.
 ///
-/// s = |P - C - A l|, with the partials e by P, -e by C and e A \[l\]x by rho, e = (P - C - A l)^T/s; of an instrument with the scale m and
-/// the constant k, m s + k, with the partials m e, -m e, m e A \[l\]x, and s and 1 by m and k.
+/// s = |P - C - A l|, with the partials e by P, -e by C and e A \[l\]x by rho, e = (P - C - A l)^T/s. For an instrument with scale m and
+/// constant k, m s + k: the partials are m e, -m e, m e A \[l\]x, and s and 1 by m and k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Range {
-    /// The photo.
+    /// Photo.
     pub photo: usize,
-    /// P.
+    /// Point P.
     pub point: usize,
-    /// The observed length in the unit of the object space.
+    /// Observed length in the unit of the object space.
     pub length: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the length.
     pub sd: f64,
-    /// l, from the projection centre to the rangefinder in the photo's axes (x right, y up, z back), in the unit of the object space.
+    /// Lever arm l from the projection centre to the rangefinder in the axes of the photo (x right, y up, z back), in object units.
     pub lever_arm: Vector3,
-    /// The instrument, where its scale and constant count.
+    /// Instrument, if its scale and constant apply.
     pub instrument: Option<usize>,
 }
 
 impl ObservationModel for Range {
     const NAME: &'static str = "range";
 
-    /// The length, l.
+    /// Values: length, l.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let (&[photo], &[point], &[instrument]) = (of.photos, of.points, of.commons) else { return None };
         let (length, lever_arm) = (*values.first()?, three(values, 1)?.into());

@@ -1,4 +1,4 @@
-//! Points by themselves and two by two: control points whose coordinates are correlated, distances, differences of coordinates.
+//! Observations of single points and pairs: control points with full covariance, distances, coordinate differences.
 
 use nalgebra::{DMatrix, Matrix1x3, SMatrix};
 
@@ -7,16 +7,16 @@ use super::{
 };
 use crate::geometry::Matrix3;
 
-/// The position of a point with its full covariance, from an adjustment of its own.
+/// Position of a point with its full covariance matrix, from a separate adjustment.
 ///
-/// P, with the partials I; in geographic space P and its errors are told in the axes east, north and up of the observed place.
+/// P, with the partials I; in geographic space, P and its errors refer to east, north and up at the observed position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Control {
-    /// The point.
+    /// Point.
     pub point: usize,
-    /// Its observed coordinates in the object space.
+    /// Observed coordinates in the object space.
     pub coordinates: [f64; 3],
-    /// Of X, Y, Z or, in geographic space, of east, north and up, in units of length.
+    /// Precision of X, Y, Z or, in geographic space, of east, north and up, in units of length.
     pub precision: Precision,
 }
 
@@ -51,19 +51,19 @@ impl ObservationModel for Control {
     }
 }
 
-/// The distance between two points: a tape, a rangefinder, the ends of a scale bar.
+/// Distance between two points: a tape, a rangefinder, the ends of a scale bar.
 ///
-/// s = |Q - P|, with the partials e = (Q - P)/s by Q and -e by P (Mikhail and Ackermann 1976, "Observations and Least Squares"); of an
-/// instrument with the scale m and the constant k, m s + k, with the partials m e, -m e, and s and 1 by m and k.
+/// s = |Q - P|, with the partials e = (Q - P)/s by Q and -e by P (Mikhail and Ackermann 1976, "Observations and Least Squares"). For an
+/// instrument with scale m and constant k, m s + k: the partials are m e, -m e, and s and 1 by m and k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distance {
-    /// Its ends P and Q.
+    /// End points P and Q.
     pub points: [usize; 2],
-    /// The observed length in the unit of the object space.
+    /// Observed length in the unit of the object space.
     pub length: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the length.
     pub sd: f64,
-    /// The instrument, where its scale and constant count.
+    /// Instrument, if its scale and constant apply.
     pub instrument: Option<usize>,
 }
 
@@ -104,23 +104,23 @@ impl ObservationModel for Distance {
     }
 }
 
-/// The components of the vector from one point to another: a GNSS baseline, a levelled height, offsets that were taped.
+/// Components of the vector from one point to another: a GNSS baseline, a levelled height difference, taped offsets.
 ///
-/// Q - P in cartesian axes (geocentric ones in geographic space), with the partials I by Q and -I by P.
+/// Q - P in Cartesian axes (geocentric ones in geographic space), with the partials I by Q and -I by P.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
-    /// P and Q.
+    /// Points P and Q.
     pub points: [usize; 2],
-    /// The observed components along X, Y, Z in the unit of the object space; None for those that were not observed.
+    /// Observed components along X, Y, Z in the unit of the object space; None if not observed.
     pub components: [Option<f64>; 3],
-    /// Of those that were observed, in their order.
+    /// Precision of the observed components, in their order.
     pub precision: Precision,
 }
 
 impl ObservationModel for Difference {
     const NAME: &'static str = "difference";
 
-    /// The vector, NaN for components that were not observed.
+    /// Values: the vector, with NaN for components that were not observed.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let &[p, q] = of.points else { return None };
         let components = three(values, 0)?.map(|value| (!value.is_nan()).then_some(value));

@@ -1,25 +1,25 @@
-//! How well an observation is known.
+//! Precision of observations.
 
 use nalgebra::DMatrix;
 
 use super::fault::Fault;
 
-/// The weight that belongs to a smaller standard deviation is not a number, nor is that of one as large as its reciprocal.
+/// Smallest standard deviation with a finite weight; the largest is its reciprocal.
 const SMALLEST: f64 = 1e-100;
-/// What a covariance matrix may be unsymmetric by, relative to its diagonal.
+/// Tolerance of the symmetry of a covariance matrix, relative to its diagonal.
 const SYMMETRIC: f64 = 1e-9;
 
-/// How well the components of an observation are known, in their units.
+/// Precision of the components of an observation, in their units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Precision {
-    /// Their standard deviations.
+    /// Standard deviations.
     Deviations(Vec<f64>),
-    /// Their covariance matrix.
+    /// Covariance matrix.
     Covariance(DMatrix<f64>),
 }
 
 impl Precision {
-    /// L of the covariance matrix S = L L^T of so many components: L^-1 gives them unit weight.
+    /// Returns L of the covariance matrix S = L L^T of `components` components: L^-1 whitens them.
     pub(in super::super) fn root(&self, components: usize) -> Result<DMatrix<f64>, Fault> {
         let deviates = |sd: f64| sd > SMALLEST && sd < SMALLEST.recip();
         let given = match self {

@@ -1,4 +1,4 @@
-//! What an observation is computed from, and the one place where partials by positions and rotations become those by unknowns.
+//! Input of observations, and conversion of partials by positions and rotations to partials by parameters.
 
 use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
@@ -7,20 +7,20 @@ use crate::network::commons::CommonState;
 use crate::network::in_block::InBlock;
 use crate::network::mounts::{Composed, Moving};
 
-/// The points, photos and common unknowns that an observation touches, each known by its place in [`super::Touches`], at given values
-/// of the unknowns. Cartesian positions are counted from an origin amid the network.
+/// Points, photos and shared parameters of an observation at given values, by their index in [`super::Touches`]. Cartesian positions are
+/// relative to an origin near the centre of the network.
 #[derive(Debug)]
 pub struct Sites<'a> {
     pub(super) space: ObjectSpace,
     pub(super) origin: [f64; 3],
     pub(super) points: Vec<PointSite>,
     pub(super) photos: Vec<PhotoSite<'a>>,
-    /// How these move, where that is asked for.
+    /// Motion of the photos, if required.
     pub(super) moving: Vec<Option<Moving>>,
     pub(super) commons: Vec<CommonSite<'a>>,
 }
 
-/// A point with its coordinates in the object space, counted from the origin, and the block of its unknowns.
+/// A point with its object coordinates, relative to the origin, and its block.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct PointSite {
     pub point: Point,
@@ -28,7 +28,7 @@ pub(in crate::network) struct PointSite {
     pub block: usize,
 }
 
-/// A pose, the block of its unknowns and, where it is made of several blocks, how its six step with these.
+/// A pose, its block and, if it depends on several blocks, the partials of its six parameters.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct PhotoSite<'a> {
     pub orientation: &'a Orientation,
@@ -36,7 +36,7 @@ pub(in crate::network) struct PhotoSite<'a> {
     pub made_of: Option<&'a Composed>,
 }
 
-/// A common unknown, and where it is unless it is known.
+/// A shared parameter, and its position in the blocks; None if it is fixed.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::network) struct CommonSite<'a> {
     pub state: &'a CommonState,
@@ -44,39 +44,39 @@ pub(in crate::network) struct CommonSite<'a> {
 }
 
 impl Sites<'_> {
-    /// The cartesian position of a point.
+    /// Returns the Cartesian position of a point.
     pub fn position(&self, point: usize) -> Vector3 {
         self.points[point].point.position()
     }
 
-    /// The height of a point: its Z in rectangular space, that above the ellipsoid in geographic space.
+    /// Returns the height of a point: Z in rectangular space, the height above the ellipsoid in geographic space.
     pub fn height(&self, point: usize) -> f64 {
         self.points[point].coordinates[2]
     }
 
-    /// Up, the axis of heights, as a row; None in geographic space, where it is another everywhere.
+    /// Returns the height axis as a row; None in geographic space, because it depends on the position.
     pub(super) fn up(&self) -> Option<DMatrix<f64>> {
         let up = || DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 1.0]);
         matches!(self.space, ObjectSpace::Rectangular).then(up)
     }
 
-    /// The pose of a photo.
+    /// Returns the pose of a photo.
     pub fn pose(&self, photo: usize) -> &Pose {
         self.photos[photo].orientation.pose()
     }
 
-    /// How a photo moves; None where it is on no trajectory.
+    /// Returns the motion of a photo; None without a trajectory.
     pub fn moving(&self, photo: usize) -> Option<&Moving> {
         self.moving.get(photo)?.as_ref()
     }
 
-    /// A common unknown.
+    /// Returns a shared parameter.
     pub fn common(&self, common: usize) -> &CommonState {
         self.commons[common].state
     }
 
-    /// The attitude A of a photo in the axes that its angles refer to: those of the space or, where it is geographic, east, north and up
-    /// at the photo.
+    /// Returns the attitude A of a photo in the reference axes of its angles: object axes or, in geographic space, east, north and up at
+    /// the photo.
     pub fn local_attitude(&self, photo: usize) -> Matrix3 {
         let Pose { position, attitude } = *self.pose(photo);
         match self.space {
@@ -88,8 +88,8 @@ impl Sites<'_> {
         }
     }
 
-    /// The cartesian position of observed coordinates of the object space, and the axes, as rows, in which their errors are told: X, Y, Z
-    /// or, where the space is geographic, east, north and up there.
+    /// Returns the Cartesian position of observed coordinates, and the axes of their errors as rows: X, Y, Z or, in geographic space, east,
+    /// north and up.
     pub fn observed(&self, coordinates: [f64; 3]) -> (Vector3, Matrix3) {
         let [longitude, latitude, _] = coordinates;
         let axes = match self.space {
@@ -100,25 +100,25 @@ impl Sites<'_> {
     }
 }
 
-/// The equations of an observation, to be written: zero at first, every partial is added to what is there.
+/// Equations of an observation, initially zero; partials are accumulated.
 #[derive(Debug)]
 pub struct Rows<'a> {
     pub(super) sites: &'a Sites<'a>,
-    /// The blocks that are touched, and the first column of each.
+    /// Blocks of the observation, with the first column of each.
     pub(super) columns: &'a [(usize, usize)],
-    /// Columns in all.
+    /// Total number of columns.
     pub(super) width: usize,
     pub(super) constant: &'a mut [f64],
     pub(super) coefficients: &'a mut [f64],
 }
 
 impl Rows<'_> {
-    /// Observed minus computed of the rows from the given one on.
+    /// Sets observed minus computed of the rows from `row` on.
     pub fn residual(&mut self, row: usize, values: &[f64]) {
         self.constant[row..row + values.len()].copy_from_slice(values);
     }
 
-    /// Partials of some rows, from the given one on, by the cartesian position of a point.
+    /// Adds partials of rows, from `row` on, by the Cartesian position of a point.
     pub fn by_position<const N: usize>(&mut self, row: usize, point: usize, partials: &SMatrix<f64, N, 3>) {
         let PointSite { point, block, .. } = self.sites.points[point];
         let by_coordinates = partials * point.partials();
@@ -127,24 +127,24 @@ impl Rows<'_> {
         }
     }
 
-    /// The partial of a row by the height of a point (see [`Sites::height`]).
+    /// Adds the partial of a row by the height of a point (see [`Sites::height`]).
     pub fn by_height(&mut self, row: usize, point: usize, partial: f64) {
         self.add(row, self.sites.points[point].block, 2, [partial].iter());
     }
 
-    /// Partials of some rows by the cartesian position of the projection centre of a photo.
+    /// Adds partials of rows by the Cartesian position of the projection centre of a photo.
     pub fn by_centre<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
         let steps = self.sites.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(shift, _)| partials * shift));
     }
 
-    /// Partials of some rows by the rotation step rho of a photo about its own axes, A <- A Exp(rho).
+    /// Adds partials of rows by the rotation step rho of a photo about its own axes, A <- A Exp(rho).
     pub fn by_rotation<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
         let steps = self.sites.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(_, turn)| partials * turn));
     }
 
-    /// The same where what is computed comes from [`Sites::local_attitude`]: in geographic space that does not turn with the position.
+    /// Adds the same partials for [`Sites::local_attitude`], which in geographic space does not rotate with the position.
     pub fn by_local_rotation<const N: usize>(
         &mut self,
         row: usize,
@@ -160,17 +160,17 @@ impl Rows<'_> {
         self.by_pose(row, photo, by_pose);
     }
 
-    /// Partials of some rows by the offset of a common unknown: of its vector, or in the own axes of a place.
+    /// Adds partials of rows by the offset of a shared parameter: of its vector, or in its own axes.
     pub fn by_offset<const N: usize>(&mut self, row: usize, common: usize, partials: &SMatrix<f64, N, 3>) {
         self.by_common(row, common, |(offset, _)| partials * offset);
     }
 
-    /// Partials of some rows by the turn of a common unknown about its own axes, R <- R Exp(rho).
+    /// Adds partials of rows by the rotation of a shared parameter about its own axes, R <- R Exp(rho).
     pub fn by_turn<const N: usize>(&mut self, row: usize, common: usize, partials: &SMatrix<f64, N, 3>) {
         self.by_common(row, common, |(_, turn)| partials * turn);
     }
 
-    /// The partials of rows that are the unknowns of a common one themselves, as they are counted.
+    /// Adds unit partials of rows that are the components of a shared parameter themselves.
     pub fn by_itself(&mut self, row: usize, common: usize, count: usize) {
         let Some(InBlock { block, first, .. }) = self.sites.commons[common].place else { return };
         (0..count).for_each(|k| self.add(row + k, block, first + k, [1.0].iter()));
@@ -189,12 +189,12 @@ impl Rows<'_> {
         }
     }
 
-    /// Partials of some rows by the velocity of a photo (see [`Sites::moving`]).
+    /// Adds partials of rows by the velocity of a photo (see [`Sites::moving`]).
     pub fn by_velocity<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
         self.by_motion(row, self.sites.moving(photo).map(|own| &own.velocity_by), partials);
     }
 
-    /// Partials of some rows by the rate of a photo.
+    /// Adds partials of rows by the rotation rate of a photo.
     pub fn by_rate<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
         self.by_motion(row, self.sites.moving(photo).map(|own| &own.rate_by), partials);
     }

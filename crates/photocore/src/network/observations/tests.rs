@@ -1,4 +1,4 @@
-//! What every kind must hold: partials that agree with differences, in all spaces and for all numbers of a pose.
+//! Test of the partials of all types against differences, in all spaces and pose parametrizations.
 
 #![allow(clippy::unwrap_used)]
 
@@ -21,12 +21,12 @@ use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 /// Two points or photos in rectangular space.
 const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
 const ATTITUDES: [[f64; 3]; 2] = [[0.4, -0.3, 1.2], [1.1, 0.5, -0.7]];
-/// Unknowns of a photo, those of its camera among them.
+/// Number of parameters of a photo, including its camera.
 const PHOTO: usize = 7;
-/// Blocks of points and photos.
+/// Number of blocks of points and photos.
 const BLOCKS: usize = 4;
 
-/// Common unknowns: one of each type, and a second sensor.
+/// Shared parameters: one of each type, and a second sensor.
 const LEVER_ARM: usize = 0;
 const SHIFT: usize = 1;
 const DRIFT: usize = 2;
@@ -38,20 +38,20 @@ const LINE: usize = 7;
 const PLANE: usize = 8;
 const SENSORS: [usize; 2] = [9, 11];
 
-/// Where the common unknown of a type is.
+/// Returns the index of the shared parameter of a type.
 fn of_kind(kind: CommonKind) -> usize {
     CommonKind::ALL.iter().position(|&own| own == kind).unwrap()
 }
 
-/// A space with two places of points and two photos, as unknowns.
+/// A space with two points and two photos, as parameters.
 struct Scene {
     space: ObjectSpace,
     poses: PoseNumbers,
     unknowns: Vec<f64>,
-    /// What a unit of each unknown moves in units of length or radians, about.
+    /// Approximate unit of each parameter in units of length or radians.
     units: Vec<f64>,
     commons: Vec<PlacedCommon>,
-    /// Whether the second photo is on a frame, which is the first, with the first sensor.
+    /// Whether the second photo is on the frame of the first, with the first sensor.
     rig: bool,
 }
 
@@ -59,7 +59,7 @@ fn width(common: &PlacedCommon) -> usize {
     common.kind.unknowns().len()
 }
 
-/// Common unknowns of all types, near the given place.
+/// Returns shared parameters of all types, near a given position.
 fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
     let kinds = CommonKind::ALL.iter().chain(&[CommonKind::Sensor]);
     let common = |(k, &kind): (usize, &CommonKind)| {
@@ -116,7 +116,7 @@ fn scenes() -> [Scene; 6] {
 }
 
 impl Scene {
-    /// The unknowns of a block: two points, two photos, common unknowns.
+    /// Returns the range of parameters of a block: two points, two photos, shared parameters.
     fn of_block(&self, block: usize) -> std::ops::Range<usize> {
         let widths = [3, 3, PHOTO, PHOTO].into_iter().chain(self.commons.iter().map(width));
         let starts: Vec<usize> = std::iter::once(0)
@@ -149,7 +149,7 @@ impl Scene {
         self.commons.iter().enumerate().map(state).collect()
     }
 
-    /// Constant and coefficients of an observation at given values, over all unknowns.
+    /// Returns constants and coefficients of an observation at given values of all parameters.
     fn equations(&self, observation: &Observation, unknowns: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let ((orientations, mounted), states) = (self.orientations(unknowns), self.states(unknowns));
         let (rows, width) = (observation.rows(), unknowns.len());
@@ -183,7 +183,7 @@ impl Scene {
     }
 }
 
-/// Asserts that partials agree with central differences of the fourth order.
+/// Asserts that partials agree with central differences of fourth order.
 pub fn agrees(observation: &Observation) {
     for (index, scene) in scenes().iter().enumerate() {
         let (_, rows) = scene.equations(observation, &scene.unknowns);
@@ -206,7 +206,7 @@ pub fn agrees(observation: &Observation) {
     }
 }
 
-/// Whether an observation stays as it is when everything is shifted and turned.
+/// Returns true if an observation is invariant to shifts and rotations.
 fn stays(observation: &Observation) -> bool {
     let scene = &scenes()[0];
     let turn = rotation([0.2, -0.4, 0.3]);
@@ -226,7 +226,7 @@ fn stays(observation: &Observation) -> bool {
     before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-12)
 }
 
-/// Observations of nearly each kind, of what is known and of common unknowns.
+/// Returns observations of nearly all types, of fixed quantities and of shared parameters.
 fn of_kinds() -> Vec<Observation> {
     let alike = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
     let two = Precision::Deviations(vec![0.01, 0.02]);

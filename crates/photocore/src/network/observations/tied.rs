@@ -1,4 +1,4 @@
-//! An observation that takes part in an adjustment: a tie of unit weight.
+//! Active observation: a whitened tie.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,30 +7,29 @@ use super::{Observation, Rows, Sites, Touches};
 use crate::geometry::{ObjectSpace, Vector3};
 use crate::network::mounts::Moving;
 
-/// An observation of points, photos and common unknowns of a model.
+/// An observation of points, photos and shared parameters of a model.
 #[derive(Debug)]
 pub struct TiedObservation {
-    /// Its index in the network.
     pub index: usize,
     pub observation: Observation,
-    /// What it touches, points as the model numbers them.
+    /// Objects of the observation, with points as numbered in the model.
     pub touches: Touches,
-    /// The retained blocks of these, each once.
+    /// Their distinct retained blocks.
     pub blocks: Vec<usize>,
-    /// L of its covariance matrix S = L L^T.
+    /// L of the covariance matrix S = L L^T.
     pub root: DMatrix<f64>,
 }
 
-/// What a model has at given values of the unknowns.
+/// A model at given parameter values.
 pub struct TiedModel<'a> {
     pub space: ObjectSpace,
     pub origin: [f64; 3],
     pub point: &'a dyn Fn(usize) -> PointSite,
     pub photo: &'a dyn Fn(usize) -> PhotoSite<'a>,
     pub common: &'a dyn Fn(usize) -> CommonSite<'a>,
-    /// How a photo moves; None where it is on no trajectory.
+    /// Motion of a photo; None without a trajectory.
     pub moving: &'a dyn Fn(usize) -> Option<Moving>,
-    /// How many unknowns each block has.
+    /// Number of parameters of each block.
     pub width: &'a dyn Fn(usize) -> usize,
 }
 
@@ -53,8 +52,8 @@ impl TiedObservation {
         self.whiten(coefficients, width);
     }
 
-    /// L^-1 E m(E^T r), row by row, for what motions m make of a displacement: r is observed minus computed in the axes E that it is told in. None
-    /// where it is no displacement.
+    /// Returns L^-1 E m(E^T r), row by row, for the effects m of transformations on a displacement. r is observed minus computed in the
+    /// axes E. None if it is not a displacement.
     pub fn carried<const N: usize>(
         &self,
         model: &TiedModel<'_>,
@@ -88,7 +87,7 @@ impl TiedObservation {
         }
     }
 
-    /// Multiplies a matrix of so many columns by L^-1: forward substitution, row by row.
+    /// Multiplies a matrix of `width` columns by L^-1: forward substitution, row by row.
     fn whiten(&self, matrix: &mut [f64], width: usize) {
         for i in 0..self.root.nrows() {
             let (before, row) = matrix.split_at_mut(i * width);

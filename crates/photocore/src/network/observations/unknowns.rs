@@ -1,29 +1,29 @@
-//! Common unknowns alone: those that were determined before, bases of rigs.
+//! Observations of shared parameters only: prior values, baselines of rigs.
 
 use nalgebra::DMatrix;
 
 use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
 
-/// What was observed of common unknowns as one observation with its full covariance, from an adjustment of its own.
+/// Joint observation of shared parameters with a full covariance matrix, from a separate adjustment.
 ///
-/// v = d - x, x being the unknowns, which count from what is given, and d what was observed of them, where that is another: with rotations
-/// v = Log(R^T R_0), and d is zero. The partials are I.
+/// v = d - x, with the parameters x relative to the given values, and the observed d if it differs from them. For rotations v = Log(R^T
+/// R_0), and d is zero. The partials are I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// The common unknowns; their own standard deviations are infinite.
+    /// Shared parameters, whose own standard deviations are infinite.
     pub commons: Vec<usize>,
-    /// How many unknowns each of them has.
+    /// Number of components of each.
     pub components: Vec<usize>,
-    /// d; nothing at all where what is given was observed.
+    /// Observed d; empty if the given values were observed.
     pub observed: Vec<f64>,
-    /// Of these.
+    /// Precision of these.
     pub precision: Precision,
 }
 
 impl ObservationModel for Prior {
     const NAME: &'static str = "prior";
 
-    /// Of a single common unknown d, or nothing; of several how many unknowns each has.
+    /// Values: d or nothing for a single shared parameter; numbers of components for several.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let commons: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
         let (components, observed) = match commons[..] {
@@ -65,18 +65,18 @@ impl ObservationModel for Prior {
     }
 }
 
-/// The distance between two sensors on a frame, or of one from the frame itself: a base that was measured gives a rig its scale.
+/// Distance between two sensors on a frame, or between a sensor and the frame: a measured baseline defines the scale of a rig.
 ///
-/// s = |c_2 - c_1|, with the partials e = (c_2 - c_1)/s by c_2 and -e by c_1, c_1 being zero where there is one sensor alone.
+/// s = |c_2 - c_1|, with the partials e = (c_2 - c_1)/s by c_2 and -e by c_1; c_1 is zero for a single sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Base {
-    /// The first sensor; None for that which is the frame.
+    /// First sensor; None for the frame itself.
     pub first: Option<usize>,
-    /// The second sensor.
+    /// Second sensor.
     pub second: usize,
-    /// The observed length in the unit of the object space.
+    /// Observed length in the unit of the object space.
     pub length: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the length.
     pub sd: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Points whose places follow from a few numbers: a board that bends.
+//! Points whose positions depend on few parameters: a bent board.
 
 use nalgebra::Matrix3x2;
 
@@ -6,30 +6,30 @@ use super::{Facts, PassageModel};
 use crate::geometry::{ObjectSpace, Vector3};
 use crate::network::commons::CommonKind;
 
-/// Points that stand where they are given, and beside it by `w_1 e_1 + w_2 e_2`: w is a common unknown, e of each point given. A
-/// chessboard that bends has the deflection of its middle along x and along y for w (mrcal: two parabolas).
+/// Points at their given positions plus `w_1 e_1 + w_2 e_2`: w is a shared parameter, and each point has a given e. For a bent chessboard,
+/// w is the deflection of its centre along x and y (mrcal: two parabolas).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// w, a common unknown.
+    /// Shared parameter w.
     pub common: usize,
-    /// The points: given, in rectangular space.
+    /// Points with fixed coordinates, in rectangular space.
     pub points: Vec<usize>,
-    /// e_1, e_2 of each, as columns.
+    /// e_1 and e_2 of each point, as columns.
     pub shifts: Vec<Matrix3x2<f64>>,
 }
 
 impl Figure {
-    /// The name under which [`super::Passage::from_numbers`] knows it.
+    /// Name in [`super::Passage::from_numbers`].
     pub const NAME: &'static str = "figure";
 
-    /// w, the points, and of each e_1 and e_2.
+    /// Indices: w, points; numbers: e_1 and e_2 of each point.
     pub(super) fn from_numbers(commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
         let (&[common], (shifts, [])) = (commons, numbers.as_chunks::<6>()) else { return None };
         let shifts: Vec<_> = shifts.iter().map(|own| Matrix3x2::from_column_slice(own)).collect();
         (shifts.len() == of.len()).then(|| Self { common, points: of.to_vec(), shifts })
     }
 
-    /// How far the k-th of its points is from where it is given.
+    /// Returns the displacement of its k-th point.
     pub(in crate::network) fn shift(&self, k: usize, w: &Vector3) -> Vector3 {
         self.shifts[k] * w.xy()
     }
@@ -40,7 +40,7 @@ impl PassageModel for Figure {
         vec![(self.common, CommonKind::Bend)]
     }
 
-    /// A point that observations touch would have to move for these, too.
+    /// Points with additional observations are excluded: these would also depend on w.
     fn is_of(&self, network: &Facts<'_>) -> bool {
         network.space == ObjectSpace::Rectangular
             && self.points.len() == self.shifts.len()

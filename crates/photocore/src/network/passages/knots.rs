@@ -1,24 +1,24 @@
-//! Lenses whose distortion is a spline, its knots unknown.
+//! Lens models with a distortion spline of free knots.
 
 use super::{Facts, PassageModel};
 use crate::geometry::Camera;
 use crate::network::commons::CommonKind;
 
-/// The knots of a camera that has a spline ([`crate::geometry::camera::SplinedStereographic`]), each a common unknown of its own: an image
-/// steps with those about it alone.
+/// Knots of a camera with a spline ([`crate::geometry::camera::SplinedStereographic`]), each a shared parameter: an image depends only on
+/// neighbouring knots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knots {
-    /// The camera.
+    /// Camera.
     pub camera: usize,
-    /// The knots, row by row.
+    /// Knots, row by row.
     pub commons: Vec<usize>,
 }
 
 impl Knots {
-    /// The name under which [`super::Passage::from_numbers`] knows it.
+    /// Name in [`super::Passage::from_numbers`].
     pub const NAME: &'static str = "knots";
 
-    /// The knots, and the camera.
+    /// Indices: knots, camera.
     pub(super) fn from_numbers(commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
         let (&[camera], []) = (of, numbers) else { return None };
         Some(Self { camera, commons: commons.to_vec() })

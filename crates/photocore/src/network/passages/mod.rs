@@ -1,7 +1,6 @@
-//! What images pass beside pose, point and camera: the figure of a target, and whatever else has common unknowns that the computed
-//! positions of images step with.
+//! Corrections applied to an image after projection: board deformation, spline knots, film. Each depends on shared parameters.
 //!
-//! Each kind is a file with a type that implements [`PassageModel`], and a line of `kinds!` below.
+//! Each type is a file with an implementation of [`PassageModel`], and a line of `kinds!` below.
 
 use std::ops::Deref;
 
@@ -12,34 +11,34 @@ use super::film::{FilmAt, FilmOf};
 use crate::geometry::camera::Window;
 use crate::geometry::{Camera, ObjectSpace, Vector3};
 
-/// Something that images pass.
+/// A correction of image positions.
 pub trait PassageModel {
-    /// The common unknowns that it has, with their types.
+    /// Returns its shared parameters, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
 
-    /// The photo whose images pass it, all of them, where there is one.
+    /// Returns the photo if it applies to all images of one photo.
     fn photo(&self) -> Option<usize> {
         None
     }
 
-    /// Those of its common unknowns that whatever passes it steps with.
+    /// Returns its shared parameters on which every corrected image depends.
     fn everywhere(&self) -> Vec<usize> {
         vec![]
     }
 
-    /// Whether it is one of a network: points, photos and cameras are there, and such as it may have.
+    /// Returns true if it fits a network: its points, photos and cameras exist and have valid types.
     fn is_of(&self, network: &Facts<'_>) -> bool;
 }
 
-/// What passages ask of a network.
+/// Properties of a network that corrections require.
 pub struct Facts<'a> {
-    /// Coordinates of its points.
+    /// Coordinate system of its points.
     pub space: ObjectSpace,
-    /// Of each point, whether it is given and nothing but images is of it.
+    /// Whether each point is fixed and has images only.
     pub given: Vec<bool>,
     /// Its cameras.
     pub cameras: Vec<&'a Camera>,
-    /// Of each photo, which camera it has.
+    /// Camera of each photo.
     pub photos: Vec<usize>,
 }
 
@@ -48,7 +47,7 @@ macro_rules! kinds {
         $(mod $module;
         pub use $module::$name;)*
 
-        /// A passage of any kind.
+        /// A correction of any type.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Passage {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
@@ -61,8 +60,8 @@ macro_rules! kinds {
         })*
 
         impl Passage {
-            /// The passage of the kind of that name, of these common unknowns, points, photos or cameras and numbers; None where there is no
-            /// such kind, or they are not as many as it has.
+            /// Returns the correction of a named type from shared parameters, points, photos or cameras, and numbers. None for an unknown
+            /// name or wrong counts.
             pub fn from_numbers(kind: &str, commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
                 match kind {
                     $($name::NAME => $name::from_numbers(commons, of, numbers).map(Self::from),)*
@@ -89,29 +88,27 @@ kinds! {
     scan::Scan;
 }
 
-/// The common unknowns that an image steps with, each once.
+/// Distinct shared parameters of an image.
 pub(super) type Own = SmallVec<[usize; 32]>;
 
-/// The passages of a model, by what they belong to; nothing at all where there are none.
+/// Corrections of a model, indexed by their objects; empty without corrections.
 #[derive(Debug, Default)]
 pub(super) struct Passages {
     figures: Vec<Figure>,
-    /// By point of the model: its figure, and its number there.
+    /// Figure of each point of the model, and the index of the point there.
     of_point: Vec<Option<(usize, usize)>>,
     lenses: Vec<Knots>,
-    /// By photo: which of them its camera has.
     of_photo: Vec<Option<usize>>,
-    /// By image of the model: the knots that it may step with. None at all before they are known.
+    /// Active knots of each image of the model; empty before they are determined.
     windows: Vec<Option<Window>>,
     scans: Vec<Scan>,
-    /// By photo: its scan.
     scan_of: Vec<Option<usize>>,
-    /// By image of the model the cell of the pattern where it is; none where there are no patterns of several.
+    /// Pattern cell of each image of the model; empty if all patterns consist of one cell.
     pub cells: Vec<usize>,
 }
 
 impl Passages {
-    /// Those of a network of so many points, of which these take part, and of photos with these cameras.
+    /// Returns the corrections of a network of `count` points, of which `points` are active, and photos with these cameras.
     pub fn new(
         passages: &[Passage],
         (points, count): (&[usize], usize),
@@ -149,17 +146,16 @@ impl Passages {
         self.figures.is_empty() && self.lenses.is_empty() && self.scans.is_empty()
     }
 
-    /// Whether there are points that are shifted.
+    /// Returns true if some points are displaced.
     pub fn have_figures(&self) -> bool {
         !self.figures.is_empty()
     }
 
-    /// The film of a photo.
     pub fn film(&self, photo: usize) -> Option<&FilmOf> {
         Some(&self.scans[(*self.scan_of.get(photo)?)?].film)
     }
 
-    /// The films of all photos at given values of the common unknowns; nothing at all where there are none.
+    /// Returns the films of all photos at given values of the shared parameters; empty without films.
     pub fn films(&self, commons: &[CommonState]) -> Vec<Option<FilmAt>> {
         if self.scans.is_empty() {
             return vec![];
@@ -168,48 +164,46 @@ impl Passages {
         (0..self.scan_of.len()).map(at).collect()
     }
 
-    /// The common unknowns of films, with their photos.
+    /// Returns the shared parameters of films, with their photos.
     pub fn own(&self) -> impl Iterator<Item = (usize, usize)> {
         self.scans.iter().flat_map(|own| own.unknowns().into_iter().map(|(common, _)| (common, own.photo)))
     }
 
-    /// The cell of the pattern where an image is.
     pub fn cell(&self, image: usize) -> usize {
         self.cells.get(image).copied().unwrap_or(0)
     }
 
-    /// The lenses whose knots are unknown.
+    /// Returns the lenses with free knots.
     pub fn lenses(&self) -> &[Knots] {
         &self.lenses
     }
 
-    /// Which of them a photo has.
     pub fn lens(&self, photo: usize) -> Option<usize> {
         *self.of_photo.get(photo)?
     }
 
-    /// Says which knots each image may step with.
+    /// Sets the active knots of each image.
     pub fn open(&mut self, windows: Vec<Option<Window>>) {
         self.windows = windows;
     }
 
-    /// The knots that an image may step with.
+    /// Returns the active knots of an image.
     pub fn window(&self, image: usize) -> Option<&Window> {
         self.windows.get(image)?.as_ref()
     }
 
-    /// The figure of a point, and its number there.
+    /// Returns the figure of a point, and the index of the point there.
     pub fn figure(&self, point: usize) -> Option<(&Figure, usize)> {
         let (figure, k) = *self.of_point.get(point)?.as_ref()?;
         Some((&self.figures[figure], k))
     }
 
-    /// How far a point is from where it is given, common unknowns being these vectors.
+    /// Returns the displacement of a point, given the vectors of shared parameters.
     pub fn shift(&self, point: usize, common: impl Fn(usize) -> Vector3) -> Vector3 {
         self.figure(point).map_or_else(Vector3::zeros, |(own, k)| own.shift(k, &common(own.common)))
     }
 
-    /// The common unknowns that the image of a point by a photo, with a camera of so many knots in a row, steps with.
+    /// Returns the shared parameters of an image; `columns` is the number of knots per row of its camera.
     pub fn commons(&self, (image, photo, point): (usize, usize, usize), columns: usize) -> Own {
         let mut all: Own = self.figure(point).map(|(own, _)| own.common).into_iter().collect();
         if let (Some(lens), Some(window)) = (self.lens(photo), self.window(image)) {

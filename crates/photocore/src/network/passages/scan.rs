@@ -1,20 +1,20 @@
-//! Photos that are scanned films, or plates measured on a comparator.
+//! Scanned films, or plates measured on a comparator.
 
 use super::{Facts, PassageModel};
 use crate::network::commons::CommonKind;
 use crate::network::film::FilmOf;
 
-/// The images of a photo are readings: those that its film, its scanner have where its camera has the image.
+/// Images of this photo are scanner readings: camera image -> film -> scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// The photo.
+    /// Photo.
     pub photo: usize,
-    /// Its film.
+    /// Film of the photo.
     pub film: FilmOf,
 }
 
 impl Scan {
-    /// The name under which [`super::Passage::from_numbers`] knows it.
+    /// Name in [`super::Passage::from_numbers`].
     pub const NAME: &'static str = "scan";
 
     /// See [`FilmOf::from_numbers`].
@@ -34,13 +34,13 @@ impl PassageModel for Scan {
         Some(self.photo)
     }
 
-    /// All but weights of a pattern of several cells.
+    /// All except the weights of a pattern of several cells.
     fn everywhere(&self) -> Vec<usize> {
         let all = self.unknowns().into_iter().map(|(own, _)| own);
         all.filter(|own| !(self.film.has_cells() && self.film.weights.contains(own))).collect()
     }
 
-    /// Knots of a lens step with images of the camera alone.
+    /// Lenses with knots are excluded, because their partials require images in the camera.
     fn is_of(&self, network: &Facts<'_>) -> bool {
         let camera = network.photos.get(self.photo).map(|&camera| network.cameras[camera]);
         camera.is_some_and(|own| own.knots().is_none()) && self.film.is_sound()

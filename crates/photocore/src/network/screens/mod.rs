@@ -1,4 +1,4 @@
-//! What leaves a network for the good of the rest: screens, each of which looks at how an adjustment has ended and names what leaves.
+//! Screens: each checks the final state of an adjustment and lists points and photos to exclude.
 
 mod leaving;
 mod near_station;
@@ -13,19 +13,19 @@ use super::selection::LeftOut;
 
 pub(super) use leaving::{Begin, Ended};
 
-/// Whether it is on, what it does, and where an adjustment begins without what it names.
+/// Switch and function of a screen, and the start of the adjustment after its exclusions.
 type Screen = (fn(&Screens) -> bool, fn(&Ended<'_>) -> Leaves, Begin);
 
-/// What makes an adjustment go wrong as a whole, the surest first.
+/// Causes of a failed adjustment, the most certain first.
 const GONE_WRONG: [Screen; 3] = [
     (|on| on.not_determined, not_determined::look, Begin::AsBefore),
     (|on| on.ran_off, ran_off::look, Begin::FromStart),
     (|on| on.at_station, near_station::at_station, Begin::FromStart),
 ];
-/// What an adjustment has stopped for. Points that ran off are told from those that ran into a station at the end only.
+/// Cause of a stopped adjustment. Points that ran off and points at a station are distinguished only at the end.
 const STOPPED: Screen = (|on| on.ran_into_station || on.ran_off, ran_into_station::look, Begin::FromHere);
 
-/// All screens, and what has left so far.
+/// All screens, and the exclusions so far.
 #[derive(Debug)]
 pub(super) struct Screening {
     pub leaving: Leaving,
@@ -38,7 +38,7 @@ impl Screening {
         Self { near_station: NearStation::Untried(leaving.clone()), leaving }
     }
 
-    /// Takes out what has to leave; None where all may stay.
+    /// Excludes harmful points and photos; returns None if all remain.
     pub fn look(&mut self, ended: &Ended<'_>) -> Option<Begin> {
         if self.near_station.is_untried() && self.near_station.tries(ended, &mut self.leaving) {
             return Some(Begin::FromStart);
@@ -47,7 +47,7 @@ impl Screening {
         if gone_wrong.is_some() {
             return gone_wrong;
         }
-        // Whether it has gone better without is known when nothing else was wrong.
+        // The improvement without points near stations is judged after all other causes.
         if !self.near_station.is_untried() && self.near_station.tries(ended, &mut self.leaving) {
             return Some(Begin::FromStart);
         }

@@ -1,25 +1,25 @@
-//! Points at a station, and points that are held near one that sees them: a wrong image of one turns photos as no other can.
+//! Points at a station, and fixed or weighted points near a station: a single wrong image of one rotates its photo strongly.
 
 use super::leaving::{Ended, FEW, Leaves, Leaving};
 use crate::adjustment::{AdjustError, Adjustment, Method, Status};
 use crate::network::problem::Assembled;
 use crate::network::selection::{Dropped, Reason};
 
-/// A point so many times as near to the nearest station as others stands near to it, first values of stations being coarse.
+/// Ratio of median to own station distance above which a point counts as near, for approximate initial values.
 const NEAR: f64 = 10.0;
-/// Variance of unit weight of an adjustment that has gone wrong,
+/// Variance of unit weight of a failed adjustment.
 const WRONG: f64 = 25.0;
-/// and by what it must fall for points to be the reason.
+/// Required decrease factor of the variance if the points are the cause.
 const FALLS: f64 = 4.0;
-/// Points that must be held besides.
+/// Minimum number of other fixed or weighted points.
 const HELD: usize = 3;
 
-/// Whether an adjustment that goes wrong goes better without such points, which is tried once.
+/// State of the single trial without points near stations.
 #[derive(Debug)]
 pub(super) enum NearStation {
-    /// What the adjustment does without in any case.
+    /// Exclusions that apply in any case.
     Untried(Leaving),
-    /// They are out. With them the variance of unit weight was this, infinite without convergence, and this was left out.
+    /// Trial without the points; `variance` (infinite without convergence) and the exclusions `with` belong to the state before.
     Out {
         points: Vec<usize>,
         variance: f64,
@@ -33,9 +33,9 @@ impl NearStation {
         matches!(self, Self::Untried(_))
     }
 
-    /// Whether an adjustment has to begin again, with or without them, and what it then does without.
+    /// Returns true if the adjustment must be repeated with or without the points, and sets its exclusions.
     ///
-    /// Only where a variance tells: by least squares, and not under the rules of a program of its time.
+    /// The variance is significant only for least squares without the rules of historic programs.
     pub fn tries(&mut self, ended: &Ended<'_>, leaving: &mut Leaving) -> bool {
         let options = &ended.options.adjustment;
         let tells = options.loss.is_none() && !matches!(options.method, Method::Full(_));
@@ -69,7 +69,7 @@ impl NearStation {
     }
 }
 
-/// Of unit weight: infinite where an adjustment has not converged, or determines not all; None where that is not asked yet.
+/// Returns the variance of unit weight: infinite without convergence or with undetermined parameters; None if it is not yet required.
 fn variance(ended: &Result<Adjustment, AdjustError>) -> Option<f64> {
     match ended {
         Ok(ended) if !ended.collapsed.is_empty() => None,
@@ -84,7 +84,7 @@ fn variance(ended: &Result<Adjustment, AdjustError>) -> Option<f64> {
 }
 
 impl Assembled {
-    /// Points with held coordinates whose first values are near a station that sees them, where they are few and others are held.
+    /// Returns the fixed or weighted points with initial values near a station, if they are few and enough others are given.
     fn held_near_stations(&self) -> Vec<usize> {
         let model = &self.problem.model;
         let is_held = |&local: &usize| model.points[local].held() != [false; 3];
@@ -100,7 +100,7 @@ impl Assembled {
     }
 }
 
-/// Points given at the place of a station that sees them: nothing can be computed of them.
+/// Returns points at the position of a station that observes them: their images are undefined.
 pub(super) fn at_station(ended: &Ended<'_>) -> Leaves {
     let Err(AdjustError::NotFinite) = ended.adjusted else { return Leaves::default() };
     let squares = ended.assembled.nearest_stations(&ended.assembled.problem.initial);

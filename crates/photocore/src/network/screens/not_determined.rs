@@ -1,14 +1,14 @@
-//! Points and photos that their images do not determine, where they are few.
+//! Points and photos that their images do not determine, if these are few.
 
 use super::leaving::{Ended, FEW, Leaves};
 use crate::adjustment::{AdjustError, Adjustment};
 use crate::network::problem::Assembled;
 use crate::network::selection::{Dropped, Reason};
 
-/// Photos that are not determined, each by itself, are few where there are so many times as many: a network of some photos has few.
+/// Minimum ratio of all photos to undetermined ones, for which these count as few.
 const HALF: usize = 2;
 
-/// What an adjustment has ended with because its images do not determine it.
+/// Returns the undetermined points and photos at which the adjustment has ended.
 pub(super) fn look(ended: &Ended<'_>) -> Leaves {
     match ended.adjusted {
         Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) => {
@@ -24,8 +24,8 @@ pub(super) fn look(ended: &Ended<'_>) -> Leaves {
 }
 
 impl Assembled {
-    /// The points that an adjustment has ended with because their rays do not determine them, where they are so few that the others make
-    /// up a network without them: indices into it. None where observations beside images touch them.
+    /// Returns the points that their rays do not determine, as indices into the network. The list is empty if they are many, or for points
+    /// with additional observations.
     fn few_points(&self, error: &AdjustError) -> Vec<usize> {
         let AdjustError::UndeterminedLocals(locals) = error else { return vec![] };
         let free = |&local: &usize| self.problem.model.points[local].held() == [false; 3];
@@ -33,7 +33,7 @@ impl Assembled {
         if few { locals.iter().map(|&local| self.points[local]).collect() } else { vec![] }
     }
 
-    /// The photos that an adjustment has ended with because their images do not determine them, each by itself, where they are few.
+    /// Returns the photos that their images individually do not determine, if these are few.
     fn few_photos(&self, error: &AdjustError) -> Vec<usize> {
         let AdjustError::Undetermined(combinations) = error else { return vec![] };
         let model = &self.problem.model;

@@ -1,4 +1,4 @@
-//! Points that run into a station while a network is adjusted.
+//! Points that move to the position of a station during the adjustment.
 
 use super::leaving::{Ended, Leaves};
 use crate::network::Image;
@@ -7,16 +7,15 @@ use crate::network::model::Bundle;
 use crate::network::selection::{Dropped, Reason};
 use crate::network::stations::{Station, Stations};
 
-/// A point has run into a station when its share in what the station learns is so many times that of the others in the mean: it is
-/// ten thousand times nearer than they are, and rounding leaves eight digits of what they say.
+/// Ratio of a point's share of the station's information to the mean of the others, above which it is at the station. The point is 10,000
+/// times nearer, and rounding leaves eight digits for the others.
 const NEAR: f64 = 1e8;
-/// A point a hundred times nearer than the others is on its way there,
+/// Ratio above which a point is approaching the station: it is 100 times nearer than the others.
 const ON_ITS_WAY: f64 = 1e4;
-/// when no other photo tells it from the station: their images there, before and after a step, are closer than so many standard
-/// deviations.
+/// Distance of point and station in other photos, in standard deviations, below which their images are equal (before and after a step).
 const SAME_PLACE: f64 = 3.0;
 
-/// Points that an adjustment has stopped for, so that it can go on without them: they have run into a station, or out of the network.
+/// Returns the points for which an adjustment has stopped: they ran into a station or out of the network.
 pub(super) fn look(ended: &Ended<'_>) -> Leaves {
     let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
     if adjusted.collapsed.is_empty() {
@@ -35,11 +34,11 @@ pub(super) fn look(ended: &Ended<'_>) -> Leaves {
 struct NearStation {
     point: usize,
     photo: usize,
-    /// Its share in what the station learns, in those of the others in the mean.
+    /// Ratio of its share of the station's information to the mean of the others.
     share: f64,
 }
 
-/// What the points that a photo sees have as shares in what its station learns.
+/// Shares of the points of a photo in the information of its station.
 #[derive(Debug, Clone, Copy, Default)]
 struct Shares {
     sum: f64,
@@ -52,7 +51,7 @@ impl Shares {
         self.largest = self.largest.max(share);
     }
 
-    /// A share in those of the others in the mean, of so many images; None unless it is much larger.
+    /// Returns the ratio of a share to the mean of the others, for `images` images; None unless it is large.
     fn ratio(&self, own: f64, images: usize) -> Option<f64> {
         let others = (self.sum - own).max(0.0) / (images as f64 - 1.0).max(1.0);
         (others > 0.0 && own > ON_ITS_WAY * others).then(|| own / others)
@@ -60,7 +59,7 @@ impl Shares {
 }
 
 impl Bundle {
-    /// Points that have run into a station, or are on their way there: two rays that meet there ask for it.
+    /// Returns points at a station or approaching it, to which their rays lead them.
     pub fn run_into_stations(&self, before: &[f64], after: &Stations) -> Vec<usize> {
         let mut near = self.near_stations(after);
         if !near.is_empty() {
@@ -71,10 +70,10 @@ impl Bundle {
         near.iter().map(|near| near.point).collect()
     }
 
-    /// Points much nearer to a station than the others that it sees.
+    /// Returns points much nearer to a station than its other points.
     ///
-    /// The image of a point turns by 1 / distance when point or station move; what its station learns from it, and loses again when
-    /// the point is eliminated, is the square of that.
+    /// The image of a point rotates by 1 / distance per displacement of point or station. Its share of the station's information, which the
+    /// elimination of the point removes again, is the square of this.
     fn near_stations(&self, stations: &Stations) -> Vec<NearStation> {
         let share = |point: usize, image: &Image| {
             let centre = stations.photos[image.photo].orientation.centre();
@@ -98,7 +97,7 @@ impl Bundle {
         (0..self.points.len()).flat_map(of_point).collect()
     }
 
-    /// Whether nothing but its image on that photo tells a point from the station it is near to, a step having changed nothing in that.
+    /// Returns true if, before and after the step, all other images of a point agree with the image of the station.
     fn is_same_place(&self, near: &NearStation, before: &Stations, after: &Stations) -> bool {
         let is_same = |image: &Image| {
             let images = [before, after].map(|stations| {

@@ -1,4 +1,4 @@
-//! Points that leave for infinity while a network is adjusted.
+//! Points that diverge to infinity during the adjustment.
 
 use super::leaving::{Ended, FEW, Leaves};
 use crate::adjustment::{Method, Status};
@@ -8,20 +8,20 @@ use crate::network::model::Bundle;
 use crate::network::selection::{Dropped, Reason};
 use crate::network::stations::{Station, Stations};
 
-/// A point so many times as far from the nearest station as others is on its way out of the network,
+/// Ratio of own to median station distance above which a point may be diverging.
 const FAR: f64 = 100.0;
-/// when no photo tells its place from infinity: its images there are closer than a standard deviation,
+/// Distance of its images from the images of infinity, in standard deviations, below which the point may be at infinity.
 const AT_INFINITY: f64 = 1.0;
-/// and the distance still grows, by more than this part of it in a step.
+/// Minimum relative growth of its distance in a step.
 const GROWS: f64 = 0.003;
-/// Times the distance of a point that stand for infinity.
+/// Multiple of the distance of a point that represents infinity.
 const INFINITE: f64 = 1e6;
-/// A point so many times as far from the nearest station as others, or as near, has left the network.
+/// Ratio to the median station distance above which (or below its reciprocal) a point has diverged.
 const ASTRAY: f64 = 1e3;
 
-/// Free points that iterations which have not converged have led out of the network, or to a station, where they are few.
+/// Returns free points that an adjustment without convergence has moved out of the network or to a station, if these are few.
 ///
-/// Rays that part before the cameras fit best at infinity, where least squares creeps to, and photos are turned until they do.
+/// Diverging rays fit best at infinity, which least squares approaches slowly while photos rotate accordingly.
 pub(super) fn look(ended: &Ended<'_>) -> Leaves {
     let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
     let damped = matches!(ended.options.adjustment.method, Method::Damped(_));
@@ -44,10 +44,10 @@ pub(super) fn look(ended: &Ended<'_>) -> Leaves {
 }
 
 impl Bundle {
-    /// Free points that rays which part, or are parallel, lead out of the network, where they are few.
+    /// Returns free points that diverging or parallel rays move out of the network, if these are few.
     ///
-    /// Steps are taken in coordinates, and a place at infinity is a limit that they creep to: what images lose on the way goes with the
-    /// reciprocal of the distance.
+    /// Steps are changes of coordinates, so that a point at infinity is only a limit: the image residuals decrease with the reciprocal
+    /// distance.
     pub fn lead_nowhere(&self, before: &[f64], after: &Stations) -> Vec<usize> {
         let squares: Vec<f64> = (0..self.locals).map(|point| self.nearest(point, after)).collect();
         let Some(middle) = median(squares.clone()) else { return vec![] };
@@ -63,7 +63,7 @@ impl Bundle {
         if FEW * out.len() <= self.locals { out } else { vec![] }
     }
 
-    /// The square of the distance of a point from the nearest station that sees it.
+    /// Returns the squared distance of a point from the nearest station that observes it.
     fn nearest(&self, point: usize, stations: &Stations) -> f64 {
         let place = stations.points[point].position();
         let square =
@@ -71,7 +71,7 @@ impl Bundle {
         self.images_of(point).iter().map(square).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a free point could as well be at infinity, on the ray on which its first image has it.
+    /// Returns true if a free point may as well be at infinity, on the ray of its first image.
     fn is_at_infinity(&self, point: usize, stations: &Stations) -> bool {
         let images = self.images_of(point);
         let Some(first) = images.first().filter(|_| self.points[point].held() == [false; 3]) else {

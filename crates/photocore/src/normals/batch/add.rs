@@ -1,4 +1,4 @@
-//! What the elimination of a batch leaves, added to a front.
+//! Assembly of an eliminated batch into a front.
 
 use pulp::Simd;
 
@@ -8,7 +8,7 @@ use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, Rows, run_for_any_local, run_unsized, size};
 
 impl Batch {
-    /// Adds what the elimination leaves to columns of the front of the node.
+    /// Adds the equations and Schur complement of the batch to columns of its front.
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
         let (rows, l) = (layout.rows(), layout.local_dim());
         run_for_any_local(layout, self.retained_dim(), AddSlots { batch: self, columns, rows, l });
@@ -19,13 +19,13 @@ impl Batch {
         }
     }
 
-    /// What has products with others by the elimination: all of these, or none.
+    /// Returns the blocks with products in the Schur complement: all of the given ones, or none.
     #[inline(always)]
     fn coupled_to<'a, T>(&self, all: &'a [T]) -> &'a [T] {
         if self.coupled { all } else { &[] }
     }
 
-    /// Adds what concerns main blocks alone.
+    /// Adds products of main blocks only.
     #[inline(always)]
     fn add_slots<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
         for (index, slot) in self.slots.iter().enumerate() {
@@ -46,7 +46,7 @@ impl Batch {
         }
     }
 
-    /// Adds what segments that stand below their main blocks have in common with these.
+    /// Adds products of segments with main blocks above them in the front.
     #[inline(always)]
     fn add_below_slots<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
         for slot in &self.slots {
@@ -66,13 +66,12 @@ impl Batch {
         }
     }
 
-    /// Adds the products of what groups have in common with others, with itself and with their main blocks, that do not stand together
-    /// with others.
+    /// Adds products of shared blocks with themselves and with main blocks that are not part of a run.
     #[inline(always)]
     fn add_parts<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
         for slot in &self.slots {
             let width = slot.dim;
-            // Where each local block has one group on the main block, the equations of all of them stand one after the other.
+            // With one group per local block on the main block, the equations of all local blocks are contiguous.
             let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
             for (k, p) in slot.groups.clone().enumerate() {
@@ -110,7 +109,7 @@ impl Batch {
         }
     }
 
-    /// Adds what stands together in the columns of the segments, and takes off what the elimination takes there.
+    /// Adds products of runs in the columns of segments, and subtracts the Schur complement there.
     #[inline(always)]
     fn add_segments<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
         for (index, segment) in self.segments.iter().enumerate() {
@@ -144,7 +143,7 @@ impl Batch {
     }
 }
 
-/// Adds A^T B, or its transpose: what stands lower in the front gives the rows.
+/// Adds A^T B or its transpose, so that the lower strip in the front gives the rows.
 #[inline(always)]
 fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: Strip<'_>, b: Strip<'_>) {
     let (lower, upper) = if a.at > b.at { (a, b) } else { (b, a) };
@@ -167,7 +166,7 @@ impl Kernel for AddSlots<'_, '_> {
     }
 }
 
-/// Shared blocks have any size. A product is compiled for all widths wherever it stands: it stands in few places.
+/// Kernel of shared blocks, which have any size. The product is compiled for all widths at each call, so it has few calls.
 struct AddSegments<'a, 'b> {
     batch: &'a Batch,
     columns: &'a mut Columns<'b>,

@@ -1,7 +1,7 @@
-//! Groups that stand apart: their products with themselves are all that they leave.
+//! Independent groups: only the products of their equations are assembled.
 //!
-//! What such a group has in common with others may be many narrow parts (the knots about an image). Their products are summed as those of one
-//! matrix, side by side in lanes, and then spread over the front.
+//! The shared part of such a group may consist of many narrow pieces (spline knots near an image point). Their products are computed as one
+//! matrix product in lanes, and then distributed over the front.
 
 use pulp::Simd;
 
@@ -11,11 +11,11 @@ use crate::normals::layout::Layout;
 use crate::normals::triangle::Triangle;
 use crate::normals::vectorised::{Kernel, LANES, Rows, add_products, add_right, dot, run_unsized};
 
-/// Parts that are narrower than this, in the mean, are multiplied together.
+/// Mean width of parts below which they are multiplied jointly.
 const NARROW: usize = LANES;
 
 impl Batch {
-    /// Groups apart have nothing to be eliminated.
+    /// Sets the elimination results of independent groups to zero.
     pub(super) fn leave_apart(&mut self, layout: &Layout) {
         let constants = &self.constants[..self.places.len() * self.locals.len() * layout.rows()];
         self.sum_of_squares = dot(constants, constants);
@@ -30,12 +30,12 @@ impl Batch {
         }
     }
 
-    /// Whether what the groups have in common with others is multiplied together.
+    /// Whether the shared parts of the groups are multiplied jointly.
     pub(super) fn is_together(&self) -> bool {
         self.apart && !self.together.products.is_empty()
     }
 
-    /// Adds what groups apart that are multiplied together have in common with others.
+    /// Adds the joint products of shared parts of independent groups.
     pub(super) fn add_together(&self, columns: &mut Columns<'_>) {
         let (Some(slot), Some(place)) = (self.slots.first(), self.places.first()) else { return };
         let (width, Together { products, right, runs }) = (place.width, &self.together);
@@ -50,7 +50,7 @@ impl Batch {
         }
     }
 
-    /// Finds the columns that stand together in the front.
+    /// Finds the columns that are contiguous in the front.
     fn find_columns(&mut self) {
         let mut runs = std::mem::take(&mut self.together.runs);
         runs.clear();

@@ -1,4 +1,4 @@
-//! The right-hand sides that a batch leaves, without its coupling.
+//! Contributions of a batch to right-hand sides, without the coupling matrix.
 
 use pulp::Simd;
 use smallvec::SmallVec;
@@ -9,22 +9,22 @@ use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, add_right, dot, run, size};
 
 impl Batch {
-    /// Eliminates the unknowns of the local blocks from the right-hand sides alone: v, and l - A N^-1 A^T l in the place of l, with what priors
-    /// add. Of that, A^T l of the others is what the elimination leaves them.
+    /// Eliminates the local unknowns from the right-hand sides only. Computes v and replaces l by l - A N^-1 A^T l, including priors. A^T
+    /// of it is the contribution to the other unknowns.
     pub fn eliminate_from_rights(&mut self, layout: &Layout, prior: &Prior) {
         run(layout, self.retained_dim(), FromRights { batch: self, layout, prior });
     }
 
-    /// Adds A^T l of all that the local blocks are tied to: main blocks before segments.
+    /// Adds A^T l for all coupled blocks: main blocks before segments.
     pub fn add_rights_of_others(&self, layout: &Layout, rights: &mut [f64]) {
         run(layout, self.retained_dim(), OfOthers { batch: self, rows: layout.rows(), rights });
     }
 
-    /// Adds A^T l of what groups have in common with others; the unknowns of each segment start at `starts`.
+    /// Adds A^T l for shared blocks; the unknowns of each segment start at `starts`.
     #[inline(always)]
     fn add_rights_of_common<S: Simd>(&self, simd: S, rows: usize, starts: &[usize], rights: &mut [f64]) {
         for slot in &self.slots {
-            // Where each local block has one group on the main block, the equations of all of them stand one after the other.
+            // With one group per local block on the main block, the equations of all local blocks are contiguous.
             let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
             for (k, p) in slot.groups.clone().enumerate() {

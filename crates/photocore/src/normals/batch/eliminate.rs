@@ -1,4 +1,4 @@
-//! The local blocks of a batch, eliminated.
+//! Elimination of the local blocks of a batch.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::normals::triangle::Triangle;
 use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 
 impl Batch {
-    /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
+    /// Eliminates the unknowns of the local blocks. `damping` is the fraction of the diagonal that is added to it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
         if self.apart {
             return self.leave_apart(layout);
@@ -37,7 +37,7 @@ impl Batch {
         }
     }
 
-    /// The same of some, side by side: at most as many as there are lanes.
+    /// Factors and reduces at most [`LANES`] local blocks in parallel lanes.
     #[inline(always)]
     fn factor_some<S: Simd, const L: usize>(
         &mut self,
@@ -59,7 +59,7 @@ impl Batch {
             }
             rights[lane] = right;
         }
-        // What lanes without a local block make of their zeros is not looked at.
+        // Results in lanes without a local block are ignored.
         let (triangles, regular) = Triangle::factor_lanes::<S, L>(simd, &normals);
         for (lane, t) in locals.enumerate() {
             if regular[lane] == 0.0 {
@@ -100,7 +100,7 @@ impl Batch {
         }
     }
 
-    /// Computes the coupling V of all local blocks to everything else.
+    /// Computes the coupling V of all local blocks to the other blocks.
     #[inline(always)]
     fn couple<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
         let own = self.places.len() * self.locals.len() * rows * L;
@@ -112,13 +112,13 @@ impl Batch {
         }
     }
 
-    /// To main blocks.
+    /// Computes the coupling to main blocks.
     #[inline(always)]
     fn couple_slots<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
         let depth = self.locals.len();
         for slot in &self.slots {
             let dim = size::<D>(slot.dim);
-            // Not zipped: in a kernel that is a call for each main block.
+            // An explicit loop: zipped iterators would cause a call per main block.
             for (t, triangle) in self.triangles.iter().enumerate() {
                 let coupling = &mut self.coupling[slot.coupling + t * L * dim..][..L * dim];
                 for first in (0..dim).step_by(LANES) {
@@ -135,7 +135,7 @@ impl Batch {
         }
     }
 
-    /// To segments that runs are all of.
+    /// Computes the coupling to segments that consist of complete runs.
     #[inline(always)]
     fn couple_runs<S: Simd, const L: usize>(&mut self, simd: S, rows: usize) {
         let depth = self.locals.len();
@@ -165,7 +165,7 @@ impl Batch {
         }
     }
 
-    /// Of local block `t` of the batch to the other segments.
+    /// Computes the coupling of local block `t` of the batch to the other segments.
     #[inline(always)]
     fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize) {
         let triangle = self.triangles[t];
@@ -194,8 +194,7 @@ impl Batch {
     }
 }
 
-/// A group that touches all of a segment: where its coefficients for the first local block stand, and how far the rows of those in common with
-/// others lie apart.
+/// Group that involves a complete segment: offsets of its coefficients for the first local block, and stride of the shared rows.
 struct Group {
     local: usize,
     shared: usize,
@@ -219,8 +218,8 @@ impl Kernel for Eliminate<'_> {
     }
 }
 
-/// Adds to row d of the sums, over some equations, their coefficients d of a local block times as many others as there are lanes, whose
-/// rows lie `stride` apart.
+/// Adds to row d of the sums, over some equations, the local coefficient d times one vector of other coefficients, whose rows have the
+/// given `stride`.
 #[inline(always)]
 fn add_rows<S: Simd, const L: usize>(
     simd: S,
@@ -240,7 +239,7 @@ fn add_rows<S: Simd, const L: usize>(
     }
 }
 
-/// Writes sums to the columns of a coupling of so many from `first` on.
+/// Writes sums to the columns of a coupling matrix of `width` columns, from column `first`.
 #[inline(always)]
 fn write_sums<S: Simd, const L: usize>(
     simd: S,
@@ -255,7 +254,7 @@ fn write_sums<S: Simd, const L: usize>(
     }
 }
 
-/// target[d][c] += sum over rows of local[row][d] * other[row][columns[c]]; `stride` and `width` are those of target and other.
+/// target[d][c] += sum over rows of local[row][d] * other[row][columns[c]], with `stride` of the target and `width` of other.
 #[inline(always)]
 fn add_product<const L: usize>(
     target: &mut [f64],

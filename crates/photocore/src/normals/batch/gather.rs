@@ -1,4 +1,4 @@
-//! The equations of a batch, gathered.
+//! Evaluation of the equations of a batch.
 
 use smallvec::{SmallVec, smallvec};
 
@@ -7,14 +7,14 @@ use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::system::System;
 
 impl Batch {
-    /// Gathers the equations of units of one pattern.
+    /// Evaluates the equations of units of one pattern.
     pub fn gather(&mut self, equations: &dyn Equations, system: &System, units: &[u32]) {
         self.place(system, units);
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);
         let mut groups: SmallVec<[u32; 32]> = smallvec![0; depth];
         for slot in &self.slots {
-            // Where each local block has one group on the main block, all of them stand one after the other.
+            // With one group per local block on the main block, the groups of all local blocks are contiguous.
             let together = if slot.groups.len() == 1 { depth } else { 1 };
             let count = together * rows;
             for (k, p) in slot.groups.clone().enumerate() {

@@ -1,4 +1,4 @@
-//! Local blocks whose equations touch the same unknowns, gathered and eliminated side by side.
+//! Batches: local blocks with equal patterns, gathered and eliminated in parallel lanes.
 
 mod add;
 mod apart;
@@ -18,117 +18,117 @@ use super::vectorised::{Rows, size};
 
 pub(super) use place::{parts_of, unite};
 
-/// A main retained block that the local blocks are tied to.
+/// Main retained block that is coupled to the local blocks.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
-    /// Its place in the order of elimination.
+    /// Position in elimination order.
     pub position: usize,
-    /// Its first row in the front.
+    /// First row in the front.
     pub row: usize,
-    /// Its unknowns.
+    /// Number of unknowns.
     pub dim: usize,
-    /// Its groups, counted in the pattern.
+    /// Groups of the pattern on this block.
     pub groups: Range<usize>,
     constants: usize,
     retained: usize,
     coupling: usize,
 }
 
-/// Consecutive unknowns of a shared block that the local blocks are tied to. They stand in the order of their
-/// positions, and so of their rows in the front.
+/// Consecutive unknowns of a shared block that are coupled to the local blocks. Segments are in the order of their positions, which is the
+/// order of their rows in the front.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
-    /// Place of the block in the order of elimination.
+    /// Position of the block in elimination order.
     pub position: usize,
-    /// Counted from the start of the block.
+    /// Range of unknowns in the block.
     pub unknowns: Range<usize>,
-    /// Its first row in the front.
+    /// First row in the front.
     pub row: usize,
     coupling: usize,
-    /// The groups that touch all of it, each the only one on its main block.
+    /// Runs of groups that involve the complete segment, each the only group on its main block.
     runs: SmallVec<[Run; 4]>,
-    /// Whether they are all that touch it.
+    /// Whether other groups do not involve the segment.
     plain: bool,
 }
 
-/// Consecutive groups of the pattern whose coefficients in a segment stand one below the other.
+/// Consecutive groups of the pattern whose coefficients in a segment form one matrix.
 #[derive(Debug, Clone)]
 struct Run {
     places: Range<usize>,
-    /// The first of their columns among those that each has in common with others.
+    /// First column in the shared coefficients of each group.
     column: usize,
 }
 
 impl Segment {
-    /// The run that a group of the pattern belongs to.
+    /// Returns the run of a group of the pattern.
     #[inline(always)]
     fn run_of(&self, p: usize) -> Option<&Run> {
         self.runs.iter().find(|run| run.places.contains(&p))
     }
 
-    /// Where its unknowns stand in the order of elimination.
+    /// Returns the range of the unknowns in elimination order.
     pub fn range(&self, symbolic: &Symbolic) -> Range<usize> {
         let start = symbolic.range(self.position).start;
         start + self.unknowns.start..start + self.unknowns.end
     }
 }
 
-/// A group of equations in the pattern: what it has in common with others.
+/// Shared coefficients of one group of the pattern.
 #[derive(Debug, Clone)]
 struct Place {
-    /// Among the parts of the batch.
+    /// Range in the parts of the batch.
     parts: Range<usize>,
-    /// Of all its parts.
+    /// Number of columns of all its parts.
     width: usize,
     rows: usize,
 }
 
-/// What some groups of the pattern have in common with others.
+/// Shared block list of some groups of the pattern.
 #[derive(Debug, Clone)]
 struct Common {
-    /// Its number, and a group that has it.
+    /// Number of the list, and an example group.
     number: u32,
     group: usize,
-    /// Among the parts of the batch.
+    /// Range in the parts of the batch.
     parts: Range<usize>,
-    /// Of all its parts.
+    /// Number of columns of all its parts.
     width: usize,
-    /// The first position of its shared blocks; that of none.
+    /// First position of its shared blocks; `usize::MAX` for an empty list.
     first: usize,
 }
 
-/// A part of what a group has in common with others: unknowns of a shared block that are not held.
+/// Part of the shared coefficients of a group: consecutive free unknowns of a shared block.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     position: usize,
     unknowns: Range<usize>,
-    /// The segment that it lies in, and how far from its start.
+    /// Segment that contains the part, and offset in it.
     pub segment: usize,
     pub shift: usize,
-    /// The first of its columns among those that the group has in common with others.
+    /// First column in the shared coefficients of the group.
     column: usize,
 }
 
 impl Part {
-    /// How many unknowns it has.
+    /// Number of unknowns.
     pub fn width(&self) -> usize {
         self.unknowns.len()
     }
 }
 
-/// Sums over the equations of groups apart that have a number of columns in common with others.
+/// Sums over the equations of independent groups with many narrow shared parts.
 #[derive(Debug, Default)]
 struct Together {
-    /// Of the products of these columns with themselves, from the diagonal down, and with those of the main block: column by column, as many
-    /// rows as there are of the first; empty where parts are multiplied one by one.
+    /// Products of the shared columns with themselves, from the diagonal, and with the columns of the main block. Stored by columns, one
+    /// row per shared column; empty if parts are multiplied separately.
     products: Vec<f64>,
-    /// Of their products with the right-hand sides.
+    /// Products of the shared columns with the right-hand sides.
     right: Vec<f64>,
-    /// The columns that stand together in the front.
+    /// Columns that are contiguous in the front.
     runs: Vec<Stretch>,
 }
 
-/// Consecutive columns, from one on, that are consecutive in the front.
+/// Consecutive columns that are also consecutive in the front.
 #[derive(Debug)]
 struct Stretch {
     at: usize,
@@ -136,42 +136,42 @@ struct Stretch {
     width: usize,
 }
 
-/// The equations of some local blocks of one pattern and what their elimination leaves: for each of them, with N = L L^T its
-/// normal matrix, v = L^-1 n and V = L^-1 N_local,other. The normal equations of the others lose V^T V, their right-hand side V^T v.
+/// Equations of local blocks of one pattern, with their elimination. With the normal matrix N = L L^T of a local block, v = L^-1 n and V =
+/// L^-1 N_local,other. The Schur complement subtracts V^T V from the other normal equations, and V^T v from their right-hand side.
 ///
-/// What belongs to one retained block stands together, local block by local block.
+/// Data of one retained block is contiguous, local block by local block.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
-    /// The local block of each unit.
+    /// Local block of each unit.
     pub locals: Vec<u32>,
-    /// Whether the units are groups apart.
+    /// Whether the units are independent groups.
     pub apart: bool,
     pub slots: Vec<Slot>,
     pub segments: Vec<Segment>,
     pub triangles: Vec<Triangle>,
     /// Sum of squares of the right-hand sides of the equations.
     pub sum_of_squares: f64,
-    /// Sum of |v|^2: the decrease of the sum of squares that the local unknowns bring about.
+    /// Sum of |v|^2: decrease of the sum of squares by the local unknowns.
     pub decrease: f64,
     /// Local blocks that their equations do not determine.
     pub deficient: Vec<usize>,
-    /// Whether V is anything but zero: local blocks that are held leave nothing to others.
+    /// Whether V is nonzero; fixed local blocks have zero coupling.
     coupled: bool,
     together: Together,
     places: Vec<Place>,
-    /// The supernode that the local blocks are assembled in.
+    /// Assembly node of the local blocks.
     node: usize,
-    /// The set of what their groups have in common with others, and what is in it, by number.
+    /// Set of shared block lists of the batch, and these lists, by number.
     set: Option<u32>,
     commons: Vec<Common>,
     parts: Vec<Part>,
-    /// Room for the unknowns of the segments.
+    /// Scratch memory for the unknowns of the segments.
     spans: Vec<(usize, Range<usize>)>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     retained_rows: Vec<f64>,
     shared_rows: Vec<f64>,
-    /// V, from `start` to `end`: what is kept of batches before may stand before it.
+    /// V, from `start` to `end`; cached data of earlier batches may precede it.
     pub coupling: Vec<f64>,
     pub start: usize,
     pub end: usize,
@@ -179,19 +179,19 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    /// Unknowns of every main block that the local blocks are tied to, where all have the same number: kernels are chosen by it.
+    /// Returns the number of unknowns per main block, if it is equal for all: it selects the kernel.
     pub fn retained_dim(&self) -> Option<usize> {
         let dim = self.slots.first()?.dim;
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
     }
 
-    /// How many local blocks have a coupling: none of groups apart.
+    /// Number of local blocks with a coupling: zero for independent groups.
     #[inline(always)]
     fn coupled_locals(&self) -> usize {
         if self.apart { 0 } else { self.locals.len() }
     }
 
-    /// The coupling of local blocks of l unknowns to a main block, local block by local block.
+    /// Returns the coupling of local blocks with l unknowns to a main block, local block by local block.
     #[inline(always)]
     pub fn slot_coupling<const D: usize>(&self, slot: &Slot, l: usize) -> Strip<'_> {
         let (width, count) = (size::<D>(slot.dim), self.coupled_locals() * l);
@@ -199,7 +199,7 @@ impl Batch {
         Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
     }
 
-    /// The coupling of local blocks of l unknowns to a segment, local block by local block.
+    /// Returns the coupling of local blocks with l unknowns to a segment, local block by local block.
     #[inline(always)]
     pub fn segment_coupling(&self, segment: &Segment, l: usize) -> Strip<'_> {
         let (width, count) = (segment.unknowns.len(), self.coupled_locals() * l);
@@ -207,13 +207,13 @@ impl Batch {
         Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
     }
 
-    /// Where the unknowns that it is tied to stand in the order of elimination: main blocks before segments.
+    /// Returns the ranges of coupled unknowns in elimination order: main blocks before segments.
     pub fn ranges<'s>(&'s self, symbolic: &'s Symbolic) -> impl Iterator<Item = Range<usize>> + 's {
         let of_segments = self.segments.iter().map(|segment| segment.range(symbolic));
         self.slots.iter().map(|slot| symbolic.range(slot.position)).chain(of_segments)
     }
 
-    /// The coefficients of a main block in all its equations, local block by local block.
+    /// Returns the coefficients of a main block in all equations, local block by local block.
     #[inline(always)]
     pub fn slot_rows<const D: usize>(&self, slot: &Slot, rows: usize) -> Strip<'_> {
         let (width, count) = (size::<D>(slot.dim), slot.groups.len() * self.locals.len() * rows);
@@ -221,13 +221,13 @@ impl Batch {
         Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
     }
 
-    /// The coefficients of local block `t` of the batch in group `p` of the pattern.
+    /// Returns the coefficients of local block `t` of the batch in group `p` of the pattern.
     #[inline(always)]
     pub fn local_rows<const L: usize>(&self, t: usize, p: usize, rows: usize) -> &[[f64; L]] {
         self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L].as_chunks().0
     }
 
-    /// The coefficients of a segment in all equations of some groups of one of its runs, group by group and local block by local block.
+    /// Returns the coefficients of a segment in all equations of some groups of a run, by group and local block.
     #[inline(always)]
     fn run_rows(&self, segment: &Segment, run: &Run, places: Range<usize>, rows: usize) -> Strip<'_> {
         let Place { width: stride, rows: start, .. } = self.places[places.start];
@@ -236,13 +236,13 @@ impl Batch {
         Strip { at: segment.row, rows: Rows { values, width: segment.unknowns.len(), stride, count } }
     }
 
-    /// What group `p` of the pattern has in common with others.
+    /// Returns the shared parts of group `p` of the pattern.
     #[inline(always)]
     pub fn parts(&self, p: usize) -> &[Part] {
         &self.parts[self.places[p].parts.clone()]
     }
 
-    /// The coefficients of a part of group `p` of the pattern in some of its equations, which are counted local block by local block.
+    /// Returns the coefficients of a part of group `p` of the pattern in a range of its equations, which are numbered by local block.
     #[inline(always)]
     pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> Strip<'_> {
         let Place { width: stride, rows: start, .. } = self.places[p];

@@ -1,4 +1,4 @@
-//! Where the equations of a batch and what they touch stand.
+//! Buffer layout of a batch: offsets of equations and coupled blocks.
 
 use std::ops::Range;
 
@@ -11,11 +11,11 @@ use crate::normals::system::System;
 use crate::normals::triangle::Triangle;
 use crate::normals::vectorised::LANES;
 
-/// Parts that are looked at for one that is the same: the cameras of a flight are few.
+/// Number of previous parts that are compared for equality: a flight has few cameras.
 const FEW: usize = 4;
 
 impl Batch {
-    /// Lays out the buffers for units of one pattern.
+    /// Assigns buffers for units of one pattern.
     pub(super) fn place(&mut self, system: &System, units: &[u32]) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
         let (rows, l, depth) = (layout.rows(), layout.local_dim(), units.len());
@@ -45,7 +45,7 @@ impl Batch {
         self.end = coupling;
         make_room(&mut self.constants, groups.len() * rows * depth);
         make_room(&mut self.local_rows, groups.len() * rows * depth * l);
-        // Products read beyond the end.
+        // Vector loads read beyond the end.
         make_room(&mut self.retained_rows, retained + LANES);
         make_room(&mut self.shared_rows, shared + LANES);
         let behind = self.numbers_beside(layout).max(LANES);
@@ -72,8 +72,8 @@ impl Batch {
         }
     }
 
-    /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the batch
-    /// before stay where that was assembled in the same front and had the same in shared.
+    /// Determines the shared parts of each group and the segments; returns the number of shared coefficients. The segments of the previous
+    /// batch are reused if it has the same front and the same set of shared block lists.
     fn place_commons(&mut self, system: &System, unit: usize) -> usize {
         let (layout, incidence, symbolic) = (&system.layout, &system.incidence, &*system.symbolic);
         let set = incidence.set_of(unit);
@@ -103,7 +103,7 @@ impl Batch {
         end
     }
 
-    /// Finds the parts of what groups have in common with others, and unites those that overlap or meet in one block.
+    /// Determines the parts of all shared block lists, and merges overlapping or adjacent ones in a block.
     fn place_parts(&mut self, layout: &Layout, symbolic: &Symbolic) {
         self.parts.clear();
         for shared in &mut self.commons {
@@ -134,7 +134,7 @@ impl Batch {
         }
     }
 
-    /// Finds the groups whose coefficients in a segment stand one below the other.
+    /// Finds the runs: groups whose coefficients in a segment form one matrix.
     fn find_runs(&mut self) {
         self.segments.iter_mut().for_each(|segment| segment.runs.clear());
         let single = self.slots.iter().filter(|slot| slot.groups.len() == 1).map(|slot| slot.groups.start);
@@ -165,7 +165,7 @@ impl Batch {
 }
 
 impl Common {
-    /// What has a number.
+    /// Creates the shared block list with a number.
     fn of(system: &System, number: u32) -> Self {
         let (layout, group) = (&system.layout, system.incidence.group_with(number));
         let shared = layout.shared_of(group).iter();
@@ -175,15 +175,15 @@ impl Common {
     }
 }
 
-/// Makes a buffer so long at least; what it holds is of no use.
+/// Extends a buffer to a minimum length; its contents are undefined.
 fn make_room(buffer: &mut Vec<f64>, length: usize) {
     if buffer.len() < length {
         buffer.resize(length, 0.0);
     }
 }
 
-/// The parts of what a group has in common with others: the position of a block, some of its unknowns, and the first of their columns
-/// among those that the group has in shared.
+/// Returns the parts of the shared coefficients of a group: position of a block, range of free unknowns, and first column in the shared
+/// coefficients.
 pub(in crate::normals) fn parts_of<'a>(
     layout: &'a Layout,
     symbolic: &'a Symbolic,
@@ -200,13 +200,13 @@ pub(in crate::normals) fn parts_of<'a>(
     })
 }
 
-/// Puts ranges of the unknowns of blocks into `spans`, those that overlap or meet united, in the order of their positions.
+/// Writes ranges of unknowns of blocks to `spans`, sorted by position, with overlapping or adjacent ranges merged.
 pub(in crate::normals) fn unite(
     parts: impl Iterator<Item = (usize, Range<usize>)>,
     spans: &mut Vec<(usize, Range<usize>)>,
 ) {
     spans.clear();
-    // Most groups have the same in shared as one of the few before.
+    // Most groups repeat one of the last few ranges.
     parts.for_each(|part| {
         if !spans.iter().rev().take(FEW).any(|other| *other == part) {
             spans.push(part);

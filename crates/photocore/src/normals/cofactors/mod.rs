@@ -1,4 +1,4 @@
-//! Cofactors of every unknown and of every adjusted equation, from the selected inverse.
+//! Cofactors of all unknowns and adjusted equations, from the selected inverse.
 
 mod others;
 
@@ -16,41 +16,41 @@ use crate::parallel;
 
 pub(super) use others::AtNode;
 
-/// Cofactors: the inverse normal matrix where it is needed. All blocks are square, row by row.
+/// Cofactors: required blocks of the inverse normal matrix. All blocks are square, row by row.
 #[derive(Debug, Clone)]
 pub struct Cofactors {
-    /// Of each local block, one after the other.
+    /// Blocks of the local blocks, one after the other.
     pub local: Vec<f64>,
-    /// Of each retained block, one after the other.
+    /// Blocks of the retained blocks, one after the other.
     pub retained: Vec<f64>,
-    /// a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows: the leverage of the equation that its own
-    /// unknowns take up. One minus it is the redundancy number of an observation.
+    /// Leverage a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows. One minus the leverage is the
+    /// redundancy number of an observation.
     pub equations: Vec<f64>,
-    /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
+    /// Leverage matrices a Q a^T of ties, square blocks row by row, one after the other.
     pub ties: Vec<f64>,
-    /// Of the pairs of retained blocks that were asked for, one after the other.
+    /// Blocks of the requested pairs of retained blocks, one after the other.
     pub pairs: Vec<f64>,
-    /// What the equations of each group have to do with each other, where that was asked for.
+    /// Leverage matrices of groups, if requested.
     pub groups: Option<GroupCofactors>,
-    /// Diagonal of the normal equations of the unknowns of all retained blocks before any elimination, priors counted: the reciprocal cofactor
-    /// that each would have if all other unknowns were known.
+    /// Diagonal of the normal equations of all retained unknowns before any elimination, including priors. It is the reciprocal cofactor of
+    /// an unknown if all others are fixed.
     pub information: Vec<f64>,
 }
 
-/// What the equations a of each group have to do with each other. All blocks are square, row by row, one after the other.
+/// Leverage matrices of the equations a of each group. All blocks are square, row by row, one after the other.
 #[derive(Debug, Clone)]
 pub struct GroupCofactors {
-    /// a Q a^T of every two equations of a group. The identity minus it is the cofactor matrix of residuals of unit weight.
+    /// a Q a^T of all pairs of equations in a group. The identity minus this matrix is the cofactor matrix of residuals of unit weight.
     pub leverages: Vec<f64>,
-    /// The same with all unknowns known but those of the local block.
+    /// The same with only the unknowns of the local block free.
     pub by_local: Vec<f64>,
-    /// Of each local block, all others being known.
+    /// Cofactors of each local block if all other unknowns are fixed.
     pub alone: Vec<f64>,
 }
 
 impl Cofactors {
-    /// Puts together what was found at each supernode, and last for the local blocks without equations, with `retained` and `pairs` of
-    /// the inverse and the information; None without memory.
+    /// Collects the results of each supernode, and last of local blocks without equations. Adds `retained` and `pairs` of the inverse, and
+    /// the information. None if memory is insufficient.
     pub(super) fn collect(
         system: &System,
         control: &Control,
@@ -94,7 +94,7 @@ impl Cofactors {
 }
 
 impl GroupCofactors {
-    /// Puts together what was found at each supernode, and last for the local blocks without equations; None without memory.
+    /// Collects the results of each supernode, and last of local blocks without equations; None if memory is insufficient.
     pub(super) fn collect(system: &System, control: &Control, found: &[AtNode]) -> Option<Self> {
         let layout = &system.layout;
         let (size, l) = (layout.rows() * layout.rows(), layout.local_dim());
@@ -120,11 +120,11 @@ impl GroupCofactors {
     }
 }
 
-/// Local blocks at one supernode from which on several threads work at them.
+/// Minimum number of local blocks at a supernode for several threads.
 const MANY: usize = 256;
 
 impl AtNode {
-    /// `front` is the inverse over the rows of the front of the supernode, full square, of the order `height`.
+    /// Computes the cofactors at a supernode. `front` is the inverse over the rows of its front, full square, of order `height`.
     pub fn new(
         system: &System,
         index: usize,
@@ -170,7 +170,7 @@ impl AtNode {
     }
 }
 
-/// a Q a^T of the equations of the ties assembled in a supernode, a square block for each.
+/// Computes a Q a^T of the equations of each tie at a supernode, one square block per tie.
 fn ties_at_node(
     system: &System,
     index: usize,
@@ -183,7 +183,7 @@ fn ties_at_node(
         tie.gather(system, equations, index, each as usize);
         let columns = tie.columns();
         for (own, _) in tie.rows() {
-            // a Q, the columns of the tie.
+            // a Q for the columns of the tie.
             let by_column = |&column: &usize| {
                 columns.iter().zip(own).map(|(&row, value)| front[column * height + row] * value).sum::<f64>()
             };

@@ -1,4 +1,4 @@
-//! Cofactors of local blocks and of their equations, from the inverse over everything that they are tied to.
+//! Cofactors of local blocks and their equations, from the inverse over all coupled unknowns.
 
 use pulp::{NullaryFnOnce, Simd};
 use smallvec::{SmallVec, smallvec};
@@ -7,46 +7,46 @@ use crate::normals::batch::{Batch, Part, Slot};
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, LANES, Rows, add_rows, copy_few, dot, run, size};
 
-/// The cofactors of the local blocks assembled in one supernode, and of their equations, in the order of the incidence.
+/// Cofactors of the local blocks at one supernode and of their equations, in the order of the incidence.
 #[derive(Default)]
 pub(in crate::normals) struct AtNode {
     pub local: Vec<f64>,
     pub equations: Vec<f64>,
-    /// Of the equations of the ties assembled there, in their order: a square block for each.
+    /// Leverage matrices of the ties at this supernode, in order.
     pub ties: Vec<f64>,
-    /// See [`GroupCofactors`](super::GroupCofactors); in the order of the incidence too, empty where they are not asked for.
+    /// See [`GroupCofactors`](super::GroupCofactors); in the order of the incidence, empty if not requested.
     pub leverages: Vec<f64>,
     pub by_local: Vec<f64>,
     pub alone: Vec<f64>,
-    /// Time that it took.
+    /// Computing time in seconds.
     pub seconds: f64,
 }
 
-/// Everything that the local blocks of a batch are tied to: main blocks in the order of the slots, then segments.
+/// Inverse over all unknowns coupled to the local blocks of a batch: main blocks in the order of the slots, then segments.
 #[derive(Default)]
 pub(super) struct Others {
-    /// The first row in the front, the first row here and the width of each.
+    /// First row in the front, first row here and width of each block.
     strips: Vec<(usize, usize, usize)>,
     width: usize,
-    /// From the start of a row of the following matrices to that of the next: full vectors, zero beyond the width.
+    /// Row stride of the following matrices: full vectors, zero beyond the width.
     stride: usize,
-    /// Q, the inverse over them, full square, row by row; then zeros, which products read.
+    /// Q, the inverse over the coupled unknowns, full square, row by row, followed by zeros for vector loads.
     inverse: Vec<f64>,
     /// H = N_ll^-1 N_lo, row by row.
     h: Vec<f64>,
-    /// H Q, row by row; then zeros.
+    /// H Q, row by row, followed by zeros.
     hq: Vec<f64>,
-    /// Whether to find [`GroupCofactors`](super::GroupCofactors) besides.
+    /// Whether to compute [`GroupCofactors`](super::GroupCofactors).
     by_group: bool,
 }
 
 /// Coefficients of two equations in consecutive unknowns.
 #[derive(Clone, Copy)]
 struct Tied<'a> {
-    /// The place of the first among the others.
+    /// Index of the first unknown in the coupled unknowns.
     start: usize,
     width: usize,
-    /// They go on for [`LANES`] elements at least.
+    /// Coefficients, followed by at least [`LANES`] readable elements.
     x: [&'a [f64]; 2],
 }
 
@@ -57,7 +57,7 @@ impl<'a> Tied<'a> {
     }
 }
 
-/// A group of equations: of a local block of the batch, in a slot that starts there, and in the pattern.
+/// Group of equations: local block of the batch, slot, first coupled unknown of the slot, and indices in slot and pattern.
 #[derive(Clone, Copy)]
 struct Group<'a> {
     t: usize,
@@ -73,7 +73,7 @@ impl Others {
         Self { by_group, ..Self::default() }
     }
 
-    /// Collects the inverse over everything that a batch is tied to; it stays as it is where the last batch was tied to the same.
+    /// Collects the inverse over the unknowns coupled to a batch; reused if the previous batch has the same.
     pub fn gather(&mut self, batch: &Batch, front: &[f64], height: usize) {
         let slots = batch.slots.iter().map(|slot| (slot.row, slot.dim));
         let segments = batch.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
@@ -104,8 +104,8 @@ impl Others {
         }
     }
 
-    /// With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and
-    /// a Q a^T for each equation.
+    /// Computes cofactors. With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and a
+    /// Q a^T for each equation.
     pub fn cofactors(&mut self, batch: &Batch, layout: &Layout, found: &mut AtNode) {
         run(layout, batch.retained_dim(), Find { others: self, batch, rows: layout.rows(), found });
     }
@@ -133,7 +133,7 @@ impl Others {
         }
     }
 
-    /// a Q a^T of each equation of a group; where that is asked for, a Q b^T of every two of them besides.
+    /// Computes a Q a^T of each equation of a group and, if requested, a Q b^T of each pair.
     #[inline(always)]
     fn equations<S: Simd, const L: usize, const D: usize>(
         &self,
@@ -163,7 +163,7 @@ impl Others {
             [i, j] = match self.by_group {
                 true if j + 1 < i => [i, j + 1],
                 true => [i + 1, 0],
-                // Two at a time; the last of an odd number with itself.
+                // Two equations at a time; the last of an odd number is paired with itself.
                 false => [(j + 3).min(last), j + 2],
             };
         }
@@ -175,7 +175,7 @@ impl Others {
         }
     }
 
-    /// Computes H = L^-T V, for local block `t` of the batch.
+    /// Computes H = L^-T V for local block `t` of the batch.
     #[inline(always)]
     fn reduce<const L: usize>(&mut self, batch: &Batch, t: usize) {
         let stride = self.stride;
@@ -191,7 +191,7 @@ impl Others {
         batch.triangles[t].backward::<L>(&mut self.h, stride);
     }
 
-    /// H and H Q of a group apart, and its Q_ll: nothing.
+    /// Sets H and H Q of an independent group to zero, and returns zero as its Q_ll.
     fn without_local<const L: usize>(&mut self) -> [[f64; L]; L] {
         for (matrix, rows) in [(&mut self.h, L), (&mut self.hq, L + 1)] {
             matrix.clear();
@@ -206,7 +206,7 @@ impl Others {
         self.hq.resize((L + 1) * self.stride, 0.0);
         let (mut first, vectors) = (0, self.stride / S::F64_LANES);
         while first < vectors {
-            // Five vectors are three and two, not four and one whose sums wait for each other.
+            // Five vectors are split into three and two, not four and one, for independent operations.
             first += match vectors - first {
                 _ if const { S::F64_LANES == 1 } => self.multiply_vectors::<S, L, 1>(simd, first),
                 1 => self.multiply_vectors::<S, L, 1>(simd, first),
@@ -217,7 +217,7 @@ impl Others {
         }
     }
 
-    /// V vectors of the columns of H Q; returns V.
+    /// Computes V vectors of the columns of H Q; returns V.
     #[inline(always)]
     fn multiply_vectors<S: Simd, const L: usize, const V: usize>(&mut self, simd: S, first: usize) -> usize {
         let vectors = self.stride / S::F64_LANES;
@@ -239,7 +239,7 @@ impl Others {
         V
     }
 
-    /// Q_ll of local block `t` of the batch, which is found, and N_ll^-1 besides where that is asked for.
+    /// Computes Q_ll of local block `t` of the batch and, if requested, N_ll^-1.
     #[inline(always)]
     fn own<S: Simd, const L: usize>(
         &self,
@@ -272,7 +272,7 @@ impl Others {
         own
     }
 
-    /// What local blocks alone make of the leverages of a group (see [`GroupCofactors`](super::GroupCofactors)).
+    /// Computes the leverages of a group with only local unknowns free (see [`GroupCofactors`](super::GroupCofactors)).
     #[inline(always)]
     fn by_local<const L: usize>(&self, batch: &Batch, group: Group<'_>, found: &mut AtNode) {
         let Group { t, p, rows, .. } = group;
@@ -294,7 +294,7 @@ impl Others {
         }
     }
 
-    /// a Q b^T of every two of two rows of a group.
+    /// Computes a Q b^T of all pairs of two rows of a group.
     #[inline(always)]
     fn leverages<S: Simd, const L: usize, const D: usize>(
         &self,
@@ -329,7 +329,7 @@ impl Others {
         found
     }
 
-    /// The coefficients of a part of what a group has in common with others, in some of its rows.
+    /// Returns the coefficients of a shared part of a group in two of its rows.
     #[inline(always)]
     fn shared<'s>(
         &self,
@@ -343,8 +343,8 @@ impl Others {
         Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
     }
 
-    /// Adds what coefficients x of further unknowns make of a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, a those of the local unknowns, and y
-    /// those that were added before; in lanes. What they make of a Q b^T is the mean of two elements.
+    /// Adds the contribution of coefficients x of further unknowns to a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, in lanes. Here a belongs to the
+    /// local unknowns, and y to unknowns added before. The contribution to a Q b^T is the mean of two elements.
     #[inline(always)]
     fn tied<S: Simd, const L: usize>(
         &self,
@@ -381,7 +381,7 @@ impl Others {
     }
 }
 
-/// Compiled once for retained blocks of all sizes: Q_ll of a local block of a batch, with H and H Q.
+/// Computation of Q_ll, H and H Q of a local block, compiled once for all sizes of retained blocks.
 struct OfLocal<'a, S, const L: usize> {
     simd: S,
     others: &'a mut Others,
@@ -402,7 +402,7 @@ impl<S: Simd, const L: usize> NullaryFnOnce for OfLocal<'_, S, L> {
     }
 }
 
-/// The same: what the coefficients of shared blocks make of the leverages of two rows of a group.
+/// Contribution of shared coefficients to the leverages of two rows of a group, compiled once for all sizes.
 struct OfShared<'a, 'b, S: Simd, const L: usize> {
     simd: S,
     others: &'a Others,
@@ -429,7 +429,7 @@ impl<S: Simd, const L: usize> NullaryFnOnce for OfShared<'_, '_, S, L> {
     }
 }
 
-/// The places of the lanes.
+/// Indices of the lanes.
 const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 struct Find<'a> {

@@ -1,11 +1,11 @@
-//! A system described, block by block, and what contradicts itself refused.
+//! Construction and validation of layouts.
 
 use std::ops::Range;
 
 use super::{Layout, LayoutError, Tie};
 
 impl Layout {
-    /// Describes a system of main blocks alone.
+    /// Describes a system without shared blocks.
     ///
     /// * `rows`: equations in each group (2 for an image point);
     /// * `local_dim`: unknowns of a local block, 1 to 3;
@@ -65,7 +65,7 @@ impl Layout {
         })
     }
 
-    /// Adds the place of each retained block in some cartesian space: nested dissection cuts across it.
+    /// Adds the position of each retained block in a cartesian frame, for nested dissection.
     pub fn with_places(mut self, places: Vec<[f64; 3]>) -> Result<Self, LayoutError> {
         if places.len() != self.retained() {
             return Err(LayoutError::Places { places: places.len(), blocks: self.retained() });
@@ -74,8 +74,7 @@ impl Layout {
         Ok(self)
     }
 
-    /// Adds shared blocks: group `g` touches `blocks[ptr[g]..ptr[g + 1]]` besides its main one, in an order of its own, in which
-    /// its coefficients are written.
+    /// Adds shared blocks: group `g` has `blocks[ptr[g]..ptr[g + 1]]` besides its main block, in the order of its coefficients.
     pub fn with_shared(mut self, ptr: Vec<usize>, blocks: Vec<u32>) -> Result<Self, LayoutError> {
         let rising = ptr.is_sorted() && ptr.first() == Some(&0) && ptr.last() == Some(&blocks.len());
         if !rising || ptr.len() != self.groups() + 1 {
@@ -120,8 +119,8 @@ impl Layout {
         Ok(self)
     }
 
-    /// Says which unknowns are held whatever their equations are asked for: `held` of all unknowns. Their coefficients, which must be zero,
-    /// are left out of the products of what groups have in common with others; local blocks that are held as a whole tie no groups together.
+    /// Marks fixed unknowns, one flag per unknown. Their coefficients must be zero and are omitted from products of shared blocks. Groups
+    /// of a completely fixed local block become independent units.
     pub fn with_held(mut self, held: &[bool]) -> Self {
         let of_locals = held.get(self.all_locals()).unwrap_or_default().chunks_exact(self.local_dim);
         let known = of_locals.enumerate().filter(|(_, own)| !own.contains(&false)).map(|(local, _)| local);
@@ -136,7 +135,7 @@ impl Layout {
         self
     }
 
-    /// Asks for the cofactors of pairs of retained blocks, the first of which have the rows. The pattern of the factor includes all pairs.
+    /// Requests the cofactors of pairs of retained blocks (row block, column block). The pattern of the factor includes all pairs.
     pub fn with_pairs(mut self, mut pairs: Vec<[u32; 2]>) -> Result<Self, LayoutError> {
         pairs.sort_unstable();
         pairs.dedup();
@@ -153,10 +152,10 @@ impl Layout {
         Ok(self)
     }
 
-    /// Makes the system a part of a larger one: a node of its elimination tree.
+    /// Makes the system part of a larger one: a node of its elimination tree.
     ///
-    /// * `outer`: retained blocks that stay, in an order of their own: a system above eliminates them;
-    /// * `contributions`: for each system below the retained blocks that it leaves something for, in its order.
+    /// * `outer`: retained blocks that the parent system eliminates, in any order;
+    /// * `contributions`: the retained blocks of each child system's contribution, in its order.
     pub fn as_part(mut self, outer: Vec<u32>, contributions: Vec<Vec<u32>>) -> Result<Self, LayoutError> {
         numbered(contributions.len())?;
         let sound = |blocks: &[u32]| {
@@ -175,12 +174,12 @@ impl Layout {
     }
 }
 
-/// Refuses more than 32 bits number; the greatest of their numbers stands for none.
+/// Rejects counts of `u32::MAX` or more; `u32::MAX` itself means no index.
 fn numbered(count: usize) -> Result<(), LayoutError> {
     if count < u32::MAX as usize { Ok(()) } else { Err(LayoutError::TooMany(count)) }
 }
 
-/// The runs of what is not held.
+/// Returns the ranges of consecutive free unknowns.
 fn free_ranges(held: &[bool]) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for k in (0..held.len()).filter(|&k| !held[k]) {

@@ -1,4 +1,4 @@
-//! What is eliminated as one.
+//! Units of elimination: local blocks, and groups of fixed local blocks.
 
 use std::ops::Range;
 
@@ -6,26 +6,24 @@ use smallvec::SmallVec;
 
 use super::Layout;
 
-/// A *unit* is what is eliminated as one: a local block with all its groups. The elimination of a block that is held leaves nothing to others,
-/// and ties none of its groups to another: each of them is a unit by itself, *apart*, numbered behind the local blocks, and the block is one
-/// without groups.
+/// A *unit* is eliminated in one operation: a local block with all its groups. The elimination of a fixed block leaves no contribution and
+/// does not couple its groups. Each of these groups is therefore an *independent* unit, numbered after the local blocks, and the block
+/// itself has no groups.
 impl Layout {
-    /// Number of units.
     pub(in crate::normals) fn units(&self) -> usize {
         self.locals + self.apart.len()
     }
 
-    /// Whether a unit is a group apart.
+    /// Whether a unit is an independent group.
     pub(in crate::normals) fn is_apart(&self, unit: usize) -> bool {
         unit >= self.locals
     }
 
-    /// The local block of a unit.
+    /// Returns the local block of a unit.
     pub(in crate::normals) fn local_of(&self, unit: usize) -> usize {
         unit.checked_sub(self.locals).map_or(unit, |apart| self.apart[apart][1] as usize)
     }
 
-    /// The groups of a unit.
     pub(in crate::normals) fn groups_of_unit(&self, unit: usize) -> Range<usize> {
         if let Some(apart) = unit.checked_sub(self.locals) {
             let group = self.apart[apart][0] as usize;
@@ -35,23 +33,23 @@ impl Layout {
         if self.stands_apart(unit) { own.start..own.start } else { own }
     }
 
-    /// Whether the groups of a local block stand apart: no equations tie those that it is seen from together.
+    /// Whether the groups of a local block are independent units, because the block is fixed.
     pub fn stands_apart(&self, local: usize) -> bool {
         !self.apart_of(local).is_empty()
     }
 
-    /// The groups of a local block that stand apart, as units.
+    /// Returns the independent groups of a local block, as unit numbers.
     pub(in crate::normals) fn apart_of(&self, local: usize) -> Range<usize> {
         let before = |end: usize| self.locals + self.apart.partition_point(|own| (own[1] as usize) < end);
         before(local)..before(local + 1)
     }
 
-    /// The main retained blocks of the groups of a unit.
+    /// Returns the main retained blocks of the groups of a unit.
     pub(in crate::normals) fn main_blocks_of(&self, unit: usize) -> &[u32] {
         &self.group_retained[self.groups_of_unit(unit)]
     }
 
-    /// The shared blocks of the groups of a unit.
+    /// Returns the shared blocks of the groups of a unit.
     pub(in crate::normals) fn all_shared_of(&self, unit: usize) -> &[u32] {
         let Range { start, end } = self.groups_of_unit(unit);
         match self.shared_ptr.get(start..=end) {
@@ -60,7 +58,7 @@ impl Layout {
         }
     }
 
-    /// The unknowns of retained blocks, a main one counted for each of its groups, that lose products when a unit is reduced out.
+    /// Number of retained unknowns in the Schur complement of a unit; a main block is counted once per group.
     pub(in crate::normals) fn reduced_width(&self, unit: usize) -> usize {
         if self.is_apart(unit) {
             return 0;

@@ -1,6 +1,6 @@
-//! The adjustment of a calibration.
+//! Adjustment of a comparator calibration.
 //!
-//! The observation equations of a calibration.
+//! Observation equations of a calibration.
 
 use std::ops::{ControlFlow, Range};
 
@@ -12,18 +12,18 @@ use crate::normals::{GroupRows, Layout, Ordering, System};
 use crate::sorting::order;
 
 impl Calibration {
-    /// Adjusts everything together by least squares. `watch` is called on the calling thread; when it breaks, the adjustment stops, on threads of its own.
+    /// Adjusts all unknowns together by least squares, on a new thread pool.
     ///
     /// # Errors
-    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
+    /// The errors of [`Calibration::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &adjustment::Options) -> Result<Solution, CalibrationError> {
         self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
     }
 
-    /// The same on threads of the caller.
+    /// Adjusts on the caller's threads. `watch` is called on the calling thread and stops the adjustment by returning `Break`.
     ///
     /// # Errors
-    /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
+    /// An inconsistent calibration, undetermined unknowns, or an interruption.
     pub fn adjust_on(
         &self,
         options: &adjustment::Options,
@@ -66,7 +66,7 @@ impl Calibration {
         }
     }
 
-    /// The least-squares problem: grid points are local blocks of two, cases retained blocks of three, the comparator one that all share.
+    /// Builds the problem: grid points are local blocks of two, cases retained blocks of three, the comparator one shared block.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
         let point = |i: usize| self.measurements[i].point;
         let order = order(self.measurements.len(), &|a, b| point(a).cmp(&point(b)));
@@ -146,15 +146,15 @@ fn squares<const N: usize>(values: Option<&[f64]>, count: usize) -> Vec<[[f64; N
     (0..count).map(|k| leading_matrix(values.map(|all| &all[N * N * k..]))).collect()
 }
 
-/// Plates compared with a comparator.
+/// Model of plates measured on a comparator.
 #[derive(Debug)]
 pub struct Comparison {
     pub basis: Basis,
-    /// Of each case.
+    /// Whether the comparator is left-handed against the plate, per case.
     pub left_handed: Vec<bool>,
-    /// The measurements, point by point: the groups of observations.
+    /// Measurements sorted by point: the observations.
     pub measurements: Vec<Measurement>,
-    /// Index of each of them in the calibration.
+    /// Index of each measurement in the calibration.
     pub order: Vec<usize>,
 }
 
@@ -167,7 +167,7 @@ struct At<'a> {
 }
 
 impl Comparison {
-    /// Puts values of the groups back into the order of the calibration.
+    /// Restores the order of the calibration for values per observation.
     pub fn in_given_order(&self, of_groups: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
         let mut values = vec![[f64::NAN; 2]; of_groups.len()];
         for (value, &measurement) in of_groups.into_iter().zip(&self.order) {

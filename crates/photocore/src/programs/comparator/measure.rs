@@ -1,10 +1,10 @@
-//! What a comparator reads where a point of a plate is, with partial derivatives.
+//! Comparator readings of plate points, with partial derivatives.
 
-/// Rotation and translation of a plate: grid = M(rotation) (corrected - centre) + translation, with
-/// M = [[cos, sin], [-sin, cos]] (NOAA TR NOS 57, equation 36) and the centre of the [`Basis`].
+/// Rotation and translation of a plate: grid = M(rotation) (corrected - centre) + translation, with M = [[cos, sin], [-sin, cos]] (NOAA TR
+/// NOS 57, equation 36) and the centre of the [`Basis`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Radians.
+    /// Rotation in radians.
     pub rotation: f64,
     /// Grid coordinates of the centre of the basis.
     pub translation: [f64; 2],
@@ -16,25 +16,25 @@ impl From<[f64; 3]> for Placement {
     }
 }
 
-/// The functions that both polynomials are made of: u^d, v^d, ... u^2, v^2 with u = (x - centre) / half range, likewise v. They span,
-/// together with the linear transformation, the same space as those of equation 59, and are well conditioned.
+/// Basis functions of both polynomials: u^d, v^d, ... u^2, v^2 with u = (x - centre) / half range, likewise v. Together with the linear
+/// transformation they span the same space as equation 59, and are well conditioned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Basis {
-    /// Highest degree d; there are no functions below 2.
+    /// Highest degree d; the lowest is 2.
     pub degree: u32,
-    /// Middle of the measured range.
+    /// Centre of the measured range.
     pub centre: [f64; 2],
     /// Half of the measured range.
     pub half_range: [f64; 2],
 }
 
 impl Basis {
-    /// Number of functions.
+    /// Returns the number of functions.
     pub fn functions(&self) -> usize {
         2 * (self.degree as usize).saturating_sub(1)
     }
 
-    /// Functions and their derivatives at a place: each depends on one coordinate only, x for even and y for odd indices.
+    /// Evaluates functions and derivatives at a position: each depends on one coordinate only, x for even and y for odd indices.
     fn evaluate(&self, place: [f64; 2], values: &mut [f64], slopes: &mut [f64]) {
         for axis in 0..2 {
             let u = (place[axis] - self.centre[axis]) / self.half_range[axis];
@@ -47,43 +47,43 @@ impl Basis {
     }
 }
 
-/// A comparator: x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34); corrected = x' + P(x') (equation 63).
+/// Comparator: x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34); corrected = x' + P(x') (equation 63).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparator {
     /// Scales in x and y.
     pub scale: [f64; 2],
-    /// Lack of orthogonality alpha in radians: positive when the y axis leans toward +x.
+    /// Nonorthogonality alpha in radians: positive if the y axis is inclined towards +x.
     pub nonorthogonality: f64,
-    /// The functions of the polynomials.
+    /// Basis functions of the polynomials.
     pub basis: Basis,
-    /// Their coefficients in x and in y, in the unit of the coordinates.
+    /// Coefficients of x and of y, in the unit of the coordinates.
     pub coefficients: [Vec<f64>; 2],
 }
 
-/// A reading, and its partials.
+/// Computed reading and its partials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Computed reading.
     pub xy: [f64; 2],
-    /// By the grid point, in the handedness of the comparator.
+    /// Partials with respect to the grid point, in the handedness of the comparator.
     pub point: [[f64; 2]; 2],
-    /// By rotation and translation of the case.
+    /// Partials with respect to rotation and translation of the case.
     pub case: [[f64; 3]; 2],
-    /// By scales, lack of orthogonality, coefficients of x, coefficients of y.
+    /// Partials with respect to scales, nonorthogonality, coefficients of x, coefficients of y.
     pub comparator: [Vec<f64>; 2],
 }
 
-/// Steps of Newton's method for the inverse correction: the first leaves the square of a correction of 1e-5 or so.
+/// Newton steps of the inverse correction: the first step reduces an error of about 1e-5 to its square.
 const STEPS: usize = 4;
 
 impl Comparator {
-    /// Its unknowns in the order of the partials.
+    /// Returns the unknowns in the order of the partials.
     pub fn unknowns(&self) -> Vec<f64> {
         let [x, y] = &self.coefficients;
         [&self.scale[..], &[self.nonorthogonality], x, y].concat()
     }
 
-    /// The comparator whose unknowns, in the order of the partials, these are.
+    /// Creates a comparator from its unknowns, in the order of the partials.
     pub fn from_unknowns(basis: Basis, unknowns: &[f64]) -> Self {
         let (x, y) = unknowns[3..].split_at(basis.functions());
         Self {
@@ -94,7 +94,7 @@ impl Comparator {
         }
     }
 
-    /// Reads a grid point, given in the handedness of the comparator, of a plate that lies as it is placed.
+    /// Computes the reading of a grid point, given in the handedness of the comparator, for a placed plate.
     pub fn measure(&self, point: [f64; 2], placement: &Placement) -> Measured {
         let (s, c) = placement.rotation.sin_cos();
         let d: [f64; 2] = std::array::from_fn(|k| point[k] - placement.translation[k]);
@@ -105,7 +105,7 @@ impl Comparator {
         let [sx, sy] = self.scale;
         let y = linear[1] / (sy * cos);
         let x = (linear[0] - sy * sin * y) / sx;
-        // Readings by linearly corrected, then by corrected coordinates.
+        // Partials of the readings with respect to linearly corrected, then to corrected coordinates.
         let unlinear = [[1.0 / sx, -sin / (cos * sx)], [0.0, 1.0 / (sy * cos)]];
         let back = product(unlinear, inverse);
         let turned = product(back, [[c, -s], [s, c]]);
@@ -130,7 +130,7 @@ impl Comparator {
         }
     }
 
-    /// Linearly corrected coordinates x' with x' + P(x') = corrected, the functions there, and the partials of x' by corrected.
+    /// Returns the linear coordinates x' with x' + P(x') = corrected, the functions there, and the partials dx' / d corrected.
     fn before_polynomials(&self, corrected: [f64; 2]) -> ([f64; 2], Vec<f64>, [[f64; 2]; 2]) {
         let mut values = vec![0.0; self.basis.functions()];
         let mut slopes = values.clone();

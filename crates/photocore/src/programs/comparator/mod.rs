@@ -1,10 +1,10 @@
-//! Calibration of a two-axis comparator from a grid plate measured in several placements (cases), all adjusted together.
+//! Calibration of a two-axis comparator from a grid plate measured in several placements (cases), in one adjustment.
 //!
-//! Unknowns are the coordinates of the grid points (each weighted from free to fixed), rotation and translation of every case, and
-//! the comparator itself: two scales, lack of orthogonality, and two polynomials (NOAA TR NOS 57, equations 36 and 59, without the
-//! terms of first and zeroth degree, which those of the linear transformation repeat). Observations are measured coordinates.
+//! Unknowns are the coordinates of the grid points (each weighted from free to fixed), rotation and translation of every case, and the
+//! comparator: two scales, nonorthogonality, and two polynomials. The polynomials (NOAA TR NOS 57, equations 36 and 59) exclude degrees 0
+//! and 1, which equal the linear transformation. Observations are measured coordinates.
 //!
-//! Nine points of a plate, measured in two placements by a comparator whose x is too short by ten millionths:
+//! Example: nine points of a plate, measured in two placements by a comparator whose x scale is wrong by ten millionths:
 //!
 //! ```
 //! use photocore::adjustment::Options;
@@ -47,16 +47,16 @@ use crate::normals::LayoutError;
 
 pub use measure::{Basis, Comparator, Measured, Placement};
 
-/// A placement of a plate as it is known beforehand.
+/// A-priori placement of a plate.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
     /// Initial rotation and translation.
     pub placement: Placement,
-    /// Whether the comparator is left-handed against the plate, so that X and Y of the grid change places.
+    /// Whether the comparator is left-handed against the plate, so that X and Y of the grid are swapped.
     pub left_handed: bool,
 }
 
-/// A point of a plate as it is known beforehand.
+/// A-priori point of a plate.
 #[derive(Debug, Clone, Copy)]
 pub struct GridPoint {
     /// Coordinates in the axes of the plate.
@@ -65,7 +65,7 @@ pub struct GridPoint {
     pub sd: [f64; 2],
 }
 
-/// The mean of the pointings on a point in one case.
+/// Mean of the pointings on a point in one case.
 #[derive(Debug, Clone, Copy)]
 pub struct Measurement {
     /// Index of the case.
@@ -74,63 +74,62 @@ pub struct Measurement {
     pub point: usize,
     /// Measured coordinates.
     pub xy: [f64; 2],
-    /// Their standard deviations.
+    /// Standard deviations of the coordinates.
     pub sd: [f64; 2],
 }
 
-/// Everything measured on one comparator. All lengths are in one unit, that of the coefficients too.
+/// Calibration data of one comparator. All lengths, including the coefficients, have the same unit.
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// Initial scales, lack of orthogonality and coefficients.
+    /// Initial scales, nonorthogonality and coefficients.
     pub comparator: Comparator,
-    /// Standard deviations of the coefficients, about their initial values: infinite free, zero fixed.
+    /// Standard deviations of the coefficients about their initial values: infinite free, zero fixed.
     pub coefficient_sd: [Vec<f64>; 2],
-    /// The cases.
+    /// Cases.
     pub cases: Vec<Case>,
-    /// The grid points, of all plates.
+    /// Grid points of all plates.
     pub points: Vec<GridPoint>,
-    /// The measurements.
+    /// Measurements.
     pub measurements: Vec<Measurement>,
 }
 
-/// Why a calibration cannot be adjusted. Cases and points are indices into the calibration.
+/// Reason why a calibration cannot be adjusted. Cases and points are indices into the calibration.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum CalibrationError {
-    /// A measurement names a case or point that is not there.
+    /// A measurement has an invalid index of a case or point.
     #[error("measurement {0} names a case or point that is not in the calibration")]
     Index(usize),
-    /// Coefficients or their standard deviations are not as many as the basis has functions.
+    /// Wrong number of coefficients or of their standard deviations.
     #[error("the polynomials have {expected} coefficients each, not {found}")]
     Coefficients {
-        /// Functions of the basis.
+        /// Number of functions of the basis.
         expected: usize,
-        /// Coefficients or standard deviations given.
+        /// Number of coefficients or standard deviations given.
         found: usize,
     },
-    /// Points whose measurements do not determine them.
+    /// Points that are not determined by their measurements.
     #[error("{} grid points are not determined by their measurements", .0.len())]
     UndeterminedPoints(Vec<usize>),
-    /// Combinations of unknowns that the measurements do not determine; for each the cases it moves, and whether it changes
-    /// the comparator.
+    /// Undetermined combinations of unknowns: the cases that each combination moves, and whether it changes the comparator.
     #[error("{} combinations of the unknowns are not determined", .0.len())]
     Undetermined(Vec<(Vec<usize>, bool)>),
     /// The initial values give coordinates that are not finite.
     #[error("the initial values give coordinates that are not finite")]
     NotFinite,
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was stopped by the caller, or lacks memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// More than can be numbered.
+    /// The number of unknowns exceeds the index range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }
 
-/// An adjusted calibration. Cofactors are for a priori unit weight.
+/// Adjusted calibration. Cofactors are for a priori unit weight.
 #[derive(Debug)]
 pub struct Solution {
-    /// Scales, lack of orthogonality, coefficients of x, coefficients of y.
+    /// Scales, nonorthogonality, coefficients of x, coefficients of y.
     pub comparator: Vec<f64>,
-    /// Their cofactors, square, row by row.
+    /// Cofactors of the comparator parameters, square, row by row.
     pub comparator_cofactors: Vec<f64>,
     /// Rotation and translation of each case.
     pub cases: Vec<Placement>,
@@ -140,15 +139,15 @@ pub struct Solution {
     pub points: Vec<[f64; 2]>,
     /// Cofactors of each grid point.
     pub point_cofactors: Vec<[[f64; 2]; 2]>,
-    /// Redundancy numbers of the coordinates of each grid point as observations of themselves.
+    /// Redundancy numbers of the coordinates of each grid point as observations.
     pub point_redundancy: Vec<[f64; 2]>,
-    /// Observed minus computed, measurement by measurement.
+    /// Observed minus computed, per measurement.
     pub residuals: Vec<[f64; 2]>,
     /// Redundancy numbers of the measured coordinates.
     pub redundancy: Vec<[f64; 2]>,
     /// Weighted sum of squares of measurements and grid points.
     pub sum_of_squares: f64,
-    /// Measurements and weighted unknowns less unknowns.
+    /// Number of measurements and weighted unknowns minus number of unknowns.
     pub degrees_of_freedom: i64,
     /// Status, iterations and times.
     pub adjustment: Adjustment,

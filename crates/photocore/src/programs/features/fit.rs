@@ -1,12 +1,12 @@
-//! The feature from which the squares of the points' distances sum to the least, and how it follows the points.
+//! Least-squares fit of a feature to points, and the derivatives of the feature with respect to the points.
 //!
-//! With F(q, x) = 1/2 sum d^2 over all deviations, q the motions of the frame: the steps are Newton's, -F_qq^-1 F_q (Gauss-Newton's where
-//! F_qq is not positive definite). At the end F_q = 0 for any points, so that dq/dx = -F_qq^-1 F_qx: exactly, also where the form
-//! deviates much.
+//! With F(q, x) = 1/2 sum d^2 over all deviations and q the motions of the frame, the iteration uses Newton steps -F_qq^-1 F_q.
+//! Gauss-Newton steps replace them if F_qq is not positive definite. At the minimum F_q = 0 for any points, so that dq/dx = -F_qq^-1 F_qx
+//! exactly, even for large form deviations.
 //!
-//! A feature in its place.
+//! The fitted feature is given by its frame and radius.
 //!
-//! First values: the main axes of the points, circles and spheres by linear equations, axes of cylinders from all directions.
+//! Initial values: principal axes of the points, circles and spheres by linear equations, cylinder axes from all directions.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 
@@ -15,20 +15,20 @@ use super::{FeatureError, Form};
 use crate::geometry::{Matrix3, Vector3, angle_axis_rotation, principal_axes};
 use crate::sorting::sort_by;
 
-/// Steps at the most, and the step below which the feature rests; lengths are those of points with a mean square distance of 1.
+/// Maximum number of steps, and the step size that ends the iteration; lengths are relative to the root mean square distance of the points.
 const STEPS: usize = 200;
 const AT_REST: f64 = 1e-13;
-/// A step of which rounding may be all, and the part of a sum of squares that is rounding.
+/// Step size that may be pure rounding, and the relative rounding of a sum of squares.
 const SMALL: f64 = 1e-9;
 const SUMS_ROUND: f64 = 1e-12;
-/// Halvings of a step that makes the sum larger.
+/// Maximum number of halvings of a step that increases the sum of squares.
 const HALVINGS: usize = 30;
-/// Pivots of the scaled normal equations below which points do not determine a feature.
+/// Smallest pivot of the scaled normal equations of a determined feature.
 const DETERMINED: f64 = 1e-10;
-/// Another feature fits as well if its sum of squares is at most this many times that of the best one, or rounding.
+/// Ratio of sums of squares up to which a second feature fits as well as the best one; rounding of a sum of squares.
 const RIVAL: f64 = 4.0;
 const ROUNDING: f64 = 1e-20;
-/// The cosine of axes, above which two features are the same one.
+/// Cosine between axes above which two features are identical.
 const SAME: f64 = 1.0 - 1e-6;
 
 /// Sums over the points.
@@ -38,7 +38,7 @@ struct Sums {
     newton: Curvature,
 }
 
-/// Fits a feature to points that are counted from their mean and scaled to a mean square of 1.
+/// Fits a feature to points that are relative to their mean and scaled to a mean square distance of 1.
 pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
     let starts = starts(form, points);
     if starts.is_empty() {
@@ -62,7 +62,7 @@ pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
     Ok(best.oriented(form))
 }
 
-/// Where the steps from a start end.
+/// Iterates from an initial feature to the minimum.
 fn at_rest(form: Form, points: &[Vector3], start: Placed) -> Result<Placed, FeatureError> {
     let mut at = start;
     let mut sum = at.square_sum(form, points);
@@ -86,7 +86,7 @@ fn at_rest(form: Form, points: &[Vector3], start: Placed) -> Result<Placed, Feat
             return Err(FeatureError::NotAtRest(form));
         }
         let size = step.amax();
-        // Steps of rounding grow no smaller.
+        // Steps caused by rounding do not decrease further.
         if size <= AT_REST || (size < SMALL && size > 0.5 * before) {
             return Ok(at);
         }
@@ -95,7 +95,7 @@ fn at_rest(form: Form, points: &[Vector3], start: Placed) -> Result<Placed, Feat
     Err(FeatureError::NotAtRest(form))
 }
 
-/// (7, 3n) how the motions follow the points, along the axes of the points; 0 for motions that change nothing.
+/// Returns the partials of the motions with respect to the points, (7, 3n), along the axes of the points; 0 for motions without effect.
 pub fn by_points(form: Form, placed: &Placed, points: &[Vector3]) -> Result<DMatrix<f64>, FeatureError> {
     let partials = placed.linearize(form, points);
     let sums = sums(&partials);
@@ -129,7 +129,7 @@ fn sums(partials: &[Partials]) -> Sums {
     sums
 }
 
-/// The factor of the equations of the motions that count; None where they are not positive definite, by far more than rounding.
+/// Factors the equations of the effective motions; None unless they are positive definite by far more than rounding.
 fn factored(form: Form, matrix: &Curvature) -> Option<Cholesky<f64, Dyn>> {
     let own = matrix.select_rows(form.motions()).select_columns(form.motions());
     let factor = Cholesky::new(own.clone())?;
@@ -149,29 +149,29 @@ fn all_motions(form: Form, own: &DVector<f64>) -> ByMotions {
     all
 }
 
-/// A feature in its place.
+/// Frame and radius of a feature.
 #[derive(Debug, Clone)]
 pub struct Placed {
-    /// The origin of its frame.
+    /// Origin of the frame.
     pub centre: Vector3,
     /// Unit vectors of the frame, in columns.
     pub axes: Matrix3,
-    /// The radius; 0 where there is none.
+    /// Radius; 0 for features without radius.
     pub radius: f64,
 }
 
 impl Placed {
-    /// The third axis.
+    /// Returns the third axis.
     pub fn axis(&self) -> Vector3 {
         self.axes.column(2).into()
     }
 
-    /// A point in the frame.
+    /// Returns a point in the frame.
     pub fn own(&self, point: &Vector3) -> Vector3 {
         self.axes.transpose() * (point - self.centre)
     }
 
-    /// The sum of the squares of all deviations.
+    /// Returns the sum of squares of all deviations.
     pub fn square_sum(&self, form: Form, points: &[Vector3]) -> f64 {
         let of = |p: &Vector3| {
             let y = self.own(p);
@@ -180,7 +180,7 @@ impl Placed {
         points.iter().map(of).sum()
     }
 
-    /// The deviations of all points, point by point.
+    /// Returns the deviations of all points with their partials, point by point.
     pub fn linearize(&self, form: Form, points: &[Vector3]) -> Vec<Partials> {
         let of = |p: &Vector3| {
             let y = self.own(p);
@@ -189,7 +189,7 @@ impl Placed {
         points.iter().flat_map(of).collect()
     }
 
-    /// After motions of its frame.
+    /// Returns the feature after motions of its frame.
     pub(super) fn moved(&self, motions: &ByMotions) -> Self {
         let turn = angle_axis_rotation(&motions.fixed_rows::<3>(3).into());
         Self {
@@ -199,8 +199,8 @@ impl Placed {
         }
     }
 
-    /// The same feature: the largest component of its axis is positive, and along what does not change it the origin of the frame is at
-    /// the foot of the mean of the points, which is 0.
+    /// Normalizes the representation. The largest component of the axis is positive. Along motions without effect the origin is the foot of
+    /// the mean of the points, which is 0.
     pub(super) fn oriented(mut self, form: Form) -> Self {
         let axis = self.axis();
         if axis[axis.iamax()] < 0.0 {
@@ -213,13 +213,13 @@ impl Placed {
     }
 }
 
-/// Directions of the axis of a cylinder that are tried, over half a sphere: one every 8 degrees.
+/// Number of trial directions of a cylinder axis over a hemisphere: one per 8 degrees.
 const DIRECTIONS: usize = 300;
-/// Of these the best, no two nearer to each other than this cosine (15 degrees).
+/// Number of best trial axes, and the minimum separation of two of them as a cosine (15 degrees).
 const TAKEN: usize = 8;
 const APART: f64 = 0.966;
 
-/// Where to begin, the likeliest first; points are counted from their mean. None where there is nothing to begin with.
+/// Returns initial features, most probable first, for points relative to their mean; empty for degenerate points.
 pub fn starts(form: Form, points: &[Vector3]) -> Vec<Placed> {
     let Some(axes) = main_axes(points) else { return vec![] };
     let at = |axis: Vector3| placed(form, points, &axis);
@@ -230,13 +230,13 @@ pub fn starts(form: Form, points: &[Vector3]) -> Vec<Placed> {
     }
 }
 
-/// Unit vectors along which the points extend most, less, least.
+/// Returns the principal axes of the points, largest extent first.
 fn main_axes(points: &[Vector3]) -> Option<Matrix3> {
     let scatter: Matrix3 = points.iter().map(|p| p * p.transpose()).sum();
     principal_axes(&scatter).map(|(_, axes)| axes)
 }
 
-/// A feature with a given axis through the mean of the points, its centre and radius by linear equations.
+/// Returns a feature with a given axis through the mean of the points; centre and radius follow from linear equations.
 fn placed(form: Form, points: &[Vector3], axis: &Vector3) -> Option<Placed> {
     let axes = frame_about(axis);
     let count = match form {
@@ -250,7 +250,7 @@ fn placed(form: Form, points: &[Vector3], axis: &Vector3) -> Option<Placed> {
     Some(Placed { centre: axes * centre, axes, radius })
 }
 
-/// The centre and radius that fit best in |y|^2 = 2 c y + k, of the first two or three coordinates.
+/// Solves |y|^2 = 2 c y + k for centre and radius by least squares, with the first two or three coordinates.
 fn round(count: usize, points: impl Iterator<Item = Vector3>) -> Option<(Vector3, f64)> {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     for y in points {
@@ -268,9 +268,9 @@ fn round(count: usize, points: impl Iterator<Item = Vector3>) -> Option<(Vector3
     (square > 0.0 && square.is_finite()).then(|| (centre, square.sqrt()))
 }
 
-/// Cylinders about the best of many directions, and about the main axes.
+/// Returns cylinders about the best of many directions, and about the principal axes.
 fn cylinders(points: &[Vector3], axes: &Matrix3) -> Vec<Placed> {
-    // A spiral with the golden angle covers the half sphere evenly.
+    // A spiral with the golden angle covers the hemisphere evenly.
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let spiral = (0..DIRECTIONS).map(|k| {
         let z = (k as f64 + 0.5) / DIRECTIONS as f64;
@@ -293,7 +293,7 @@ fn cylinders(points: &[Vector3], axes: &Matrix3) -> Vec<Placed> {
     taken
 }
 
-/// Right-handed axes of which the third is given.
+/// Returns right-handed axes with the given third axis.
 fn frame_about(axis: &Vector3) -> Matrix3 {
     let z = axis.normalize();
     let x = z.cross(&Vector3::ith(z.iamin(), 1.0)).normalize();

@@ -1,40 +1,39 @@
-//! How far a point is from a feature, with first and second partials.
+//! Deviation of a point from a feature, with first and second partials.
 //!
-//! A feature stands in a frame of its own: a plane is z = 0, lines, circles and cylinders have z as their axis, spheres and circles the
-//! origin as their centre. With y the point in the frame at its present place, and the frame moved by t, turned by w (small), the point
-//! is at
+//! A feature is defined in its own frame: a plane is z = 0; lines, circles and cylinders have the axis z; spheres and circles are centred
+//! at the origin. y is the point in the current frame. If the frame is shifted by t and rotated by a small w, the point is at
 //!
 //! v = exp(-\[w\]) (y - t) = y - t - w x (y - t) + 1/2 w x (w x y) + ...,
 //!
-//! and a deviation is a coordinate of v, or the length of its first coordinates less the radius. What kinds of features differ in is
-//! which motions change them.
+//! A deviation is a coordinate of v, or the length of its first coordinates minus the radius. Feature types differ in the motions that
+//! change them.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::Form;
 use crate::geometry::{Matrix3, Vector3};
 
-/// Motions of the frame: shifts along its axes, rotations about them, the radius.
+/// Number of motions of the frame: shifts along its axes, rotations about them, the radius.
 pub const MOTIONS: usize = 7;
-/// The place of the radius among the motions.
+/// Index of the radius among the motions.
 pub const RADIUS: usize = 6;
 
-/// Of one number by the motions.
+/// Partials of a number with respect to the motions.
 pub type ByMotions = SVector<f64, MOTIONS>;
-/// Second partials by the motions.
+/// Second partials with respect to the motions.
 pub type Curvature = SMatrix<f64, MOTIONS, MOTIONS>;
 
-/// What a deviation is, in the frame.
+/// Type of a deviation in the frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Deviation {
-    /// The coordinate along an axis.
+    /// Coordinate along an axis.
     Along(usize),
-    /// The length of so many coordinates less the radius.
+    /// Length of the first n coordinates minus the radius.
     Round(usize),
 }
 
 impl Form {
-    /// The deviations of a point: their squares sum to the square of its distance.
+    /// Returns the deviations of a point: their squares sum to its squared distance.
     pub const fn deviations(self) -> &'static [Deviation] {
         match self {
             Self::Line => &[Deviation::Along(0), Deviation::Along(1)],
@@ -45,7 +44,7 @@ impl Form {
         }
     }
 
-    /// The motions that change the feature.
+    /// Returns the motions that change the feature.
     pub const fn motions(self) -> &'static [usize] {
         match self {
             Self::Line => &[0, 1, 3, 4],
@@ -57,23 +56,23 @@ impl Form {
     }
 }
 
-/// A deviation d with its partials.
+/// Deviation d with its partials.
 #[derive(Debug, Clone)]
 pub struct Partials {
     /// d.
     pub value: f64,
-    /// By the motions.
+    /// With respect to the motions.
     pub motions: ByMotions,
-    /// By the point, along the axes of the frame.
+    /// With respect to the point, along the axes of the frame.
     pub point: Vector3,
-    /// Second ones by the motions.
+    /// Second partials with respect to the motions.
     pub curvature: Curvature,
-    /// Second ones by the motions and the point.
+    /// Second partials with respect to the motions and the point.
     pub mixed: SMatrix<f64, MOTIONS, 3>,
 }
 
 impl Deviation {
-    /// The deviation of a point y of the frame.
+    /// Returns the deviation of a point y of the frame.
     pub fn value(self, y: &Vector3, radius: f64) -> f64 {
         match self {
             Self::Along(axis) => y[axis],
@@ -81,7 +80,7 @@ impl Deviation {
         }
     }
 
-    /// The same with its partials; those of a length of 0 are 0.
+    /// Returns the deviation with its partials; the partials of a zero length are 0.
     pub fn linearize(self, y: &Vector3, radius: f64) -> Partials {
         let (point, bending) = self.by_point(y);
         let units = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -111,7 +110,7 @@ impl Deviation {
         Partials { value: self.value(y, radius), motions, point, curvature, mixed }
     }
 
-    /// First and second partials by the point.
+    /// Returns first and second partials with respect to the point.
     fn by_point(self, y: &Vector3) -> (Vector3, Matrix3) {
         match self {
             Self::Along(axis) => (Vector3::ith(axis, 1.0), Matrix3::zeros()),

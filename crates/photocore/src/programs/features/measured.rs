@@ -1,4 +1,4 @@
-//! What is said of a feature: values with their standard deviations, deviations of points, whether these are more than errors.
+//! Reported values of a feature: parameters with standard deviations, point deviations, and the test of the form.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3xX, RowDVector};
 
@@ -8,68 +8,68 @@ use super::form::{Partials, RADIUS};
 use super::{FeatureError, Form};
 use crate::geometry::{Matrix3, Vector3};
 
-/// Relative standard deviation of a radius, and that of a direction in radians, above which partials no longer tell the spread.
+/// Maximum relative standard deviation of a radius, and of a direction in radians, for linear error propagation.
 const LOOSE: f64 = 0.2;
 
-/// A number with its standard deviation.
+/// Value with its standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// What it is: `diameter`, `centre x`, `axis x`, `flatness` ...
+    /// Name: `diameter`, `centre x`, `axis x`, `flatness` ...
     pub name: &'static str,
-    /// Whether it is a length; otherwise a component of a unit vector.
+    /// Whether the value is a length; otherwise it is a component of a unit vector.
     pub is_length: bool,
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub sd: f64,
 }
 
-/// How far a point is from a feature: outside positive, of a plane on the side of its normal; from a line always positive.
+/// Deviation of a point from a feature: positive outside, or on the normal's side of a plane; always positive for a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointDeviation {
-    /// The distance; of a circle that of its own plane's radius.
+    /// Distance; for a circle the radial deviation.
     pub value: f64,
-    /// Its standard deviation; NaN on a line.
+    /// Standard deviation of the distance; NaN on a line.
     pub sd: f64,
-    /// Of a circle, out of its plane; otherwise 0, as its standard deviation.
+    /// Out-of-plane deviation of a circle; 0 for other features, with standard deviation 0.
     pub axial: f64,
-    /// The standard deviation of that.
+    /// Standard deviation of the out-of-plane deviation.
     pub axial_sd: f64,
 }
 
-/// Whether all deviations together are more than the errors of the points: `statistic` is d' C_d^- d, of chi-square where they are not.
+/// Test of the form deviations against the errors of the points. `statistic` is d' C_d^- d, chi-square distributed without form deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FormTest {
-    /// The weighted sum of squares.
+    /// Weighted sum of squares.
     pub statistic: f64,
-    /// Deviations beyond those that any points have none of.
+    /// Degrees of freedom: deviations minus unknowns.
     pub freedom: usize,
 }
 
-/// A feature as it is reported.
+/// Reported feature.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Values.
     pub quantities: Vec<Quantity>,
-    /// (q, q) their joint covariance.
+    /// (q, q) joint covariance of the values.
     pub covariance: DMatrix<f64>,
-    /// Of each point.
+    /// Deviations of the points.
     pub deviations: Vec<PointDeviation>,
-    /// None where points without errors, or no more of them than needed, cannot be tested.
+    /// None if the points are error-free or without redundancy.
     pub test: Option<FormTest>,
 }
 
 impl Measured {
-    /// A quantity by its name.
+    /// Returns a quantity by name.
     pub fn of(&self, name: &str) -> Option<&Quantity> {
         self.quantities.iter().find(|each| each.name == name)
     }
 }
 
-/// The distance of two points with the (6, 6) covariance of both.
+/// Returns the distance of two points; the covariance of both is (6, 6).
 ///
 /// # Errors
-/// What is no number, another shape, points in one place.
+/// Values that are not finite, another shape, coincident points.
 pub fn distance(points: &[Vector3; 2], covariance: &DMatrix<f64>) -> Result<Measured, FeatureError> {
     check(points, covariance)?;
     let between = points[1] - points[0];
@@ -86,10 +86,10 @@ pub fn distance(points: &[Vector3; 2], covariance: &DMatrix<f64>) -> Result<Meas
     Ok(lines.propagated(covariance, vec![], None))
 }
 
-/// Fits a feature to n points with their joint (3n, 3n) covariance: coordinates of a point stand together.
+/// Fits a feature to n points with their joint (3n, 3n) covariance, ordered point by point.
 ///
 /// # Errors
-/// [`FeatureError`]: too few points, points that leave the feature open or fit several, what is no number, another shape.
+/// [`FeatureError`]: too few points, undetermined or ambiguous features, values that are not finite, another shape.
 pub fn measure(form: Form, points: &[Vector3], covariance: &DMatrix<f64>) -> Result<Measured, FeatureError> {
     check(points, covariance)?;
     let count = points.len();
@@ -125,7 +125,7 @@ fn check(points: &[Vector3], covariance: &DMatrix<f64>) -> Result<(), FeatureErr
     if known { Ok(()) } else { Err(FeatureError::NotFinite) }
 }
 
-/// Quantities with a row of partials by the points each.
+/// Quantities, each with a row of partials with respect to the points.
 #[derive(Default)]
 struct Lines {
     named: Vec<(&'static str, bool, f64)>,
@@ -170,7 +170,7 @@ impl Lines {
 }
 
 impl Measured {
-    /// The same, if partials tell how it spreads.
+    /// Returns the values if linear error propagation is valid.
     fn determined(self, form: Form) -> Result<Self, FeatureError> {
         for each in &self.quantities {
             let (what, sd) = match each.name {
@@ -186,7 +186,7 @@ impl Measured {
     }
 }
 
-/// A feature in its place, with points counted from their mean and scaled.
+/// Fitted feature, with points relative to their mean and scaled.
 struct Fitted {
     form: Form,
     mean: Vector3,
@@ -194,12 +194,12 @@ struct Fitted {
     placed: Placed,
     points: Vec<Vector3>,
     partials: Vec<Partials>,
-    /// (7, 3n) how the motions follow the points.
+    /// (7, 3n) partials of the motions with respect to the points.
     follows: DMatrix<f64>,
 }
 
 impl Fitted {
-    /// What is reported, with its partials.
+    /// Returns the reported quantities with their partials.
     fn lines(&self, deviations: &[PointDeviation]) -> Lines {
         let (axes, form) = (&self.placed.axes, self.form);
         let mut lines = Lines::default();
@@ -228,7 +228,7 @@ impl Fitted {
         lines
     }
 
-    /// Ranges of deviations; of a line, the diameter of the cylinder about it that holds all points.
+    /// Adds the ranges of the deviations; for a line, the diameter of the enclosing cylinder.
     fn push_forms(&self, lines: &mut Lines, deviations: &[PointDeviation]) {
         let range = |of: fn(&PointDeviation) -> f64| {
             let order = |&a: &usize, &b: &usize| of(&deviations[a]).total_cmp(&of(&deviations[b]));
@@ -259,8 +259,8 @@ impl Fitted {
         }
     }
 
-    /// (3, 3n) shifts of the centre in the frame. Along what does not change the feature it is the foot of the mean of the points, which
-    /// goes with that mean, and where the axis turns beside it.
+    /// Returns the (3, 3n) partials of the centre in the frame. Along motions without effect the centre is the foot of the mean of the
+    /// points. It moves with the mean, and with rotations of the axis if the mean is off the axis.
     fn centre_follows(&self) -> Matrix3xX<f64> {
         let (motions, count) = (self.form.motions(), self.points.len());
         let mean = self.placed.own(&Vector3::zeros());
@@ -280,7 +280,7 @@ impl Fitted {
         shift
     }
 
-    /// (3, 3n) changes w x z of the axis in the frame.
+    /// Returns the (3, 3n) partials w x z of the axis in the frame.
     fn axis_follows(&self) -> Matrix3xX<f64> {
         let mut turned = Matrix3xX::zeros(self.follows.ncols());
         turned.set_row(0, &self.follows.row(4));
@@ -288,7 +288,7 @@ impl Fitted {
         turned
     }
 
-    /// Partials of a deviation by all points.
+    /// Returns the partials of a deviation with respect to all points.
     fn deviation(&self, row: usize) -> RowDVector<f64> {
         let (each, point) = (&self.partials[row], row / self.form.deviations().len());
         let mut by = each.motions.transpose() * &self.follows;
@@ -297,7 +297,7 @@ impl Fitted {
         by
     }
 
-    /// Partials of the first deviation of a point, or of its distance from a line.
+    /// Returns the partials of the first deviation of a point, or of its distance from a line.
     fn distance(&self, point: usize) -> RowDVector<f64> {
         if self.form != Form::Line {
             return self.deviation(point * self.form.deviations().len());
@@ -306,12 +306,12 @@ impl Fitted {
         (x * self.deviation(2 * point) + y * self.deviation(2 * point + 1)) / x.hypot(y)
     }
 
-    /// Deviations beyond the unknowns of the feature.
+    /// Returns the number of deviations minus the unknowns of the feature.
     fn freedom(&self) -> usize {
         self.partials.len().saturating_sub(self.form.motions().len())
     }
 
-    /// Deviations of all points with their standard deviations; a row of all partials would be as long as all points for each.
+    /// Returns the deviations of all points with their standard deviations, without storing a full row of partials per point.
     fn deviations(&self, covariance: &DMatrix<f64>) -> Vec<PointDeviation> {
         let together = covariance * self.follows.transpose();
         let motions = &self.follows * &together;
@@ -345,8 +345,8 @@ impl Fitted {
         (0..self.points.len()).map(of).collect()
     }
 
-    /// d' C_d^- d. It is the least sum of squares over all motions with the covariance S of the deviations of a feature that stays where
-    /// it is; S + J J', which does not change it, is regular where the datum of the points leaves motions of the feature out of S.
+    /// Returns d' C_d^- d: the minimum sum of squares over all motions, with the deviations' covariance S for a fixed feature. S + J J'
+    /// replaces S: the result is the same, and the matrix is regular even if the datum of the points fixes motions.
     fn test(&self, covariance: &DMatrix<f64>) -> Option<FormTest> {
         let (rows, form) = (self.partials.len(), self.form);
         if self.freedom() == 0 {

@@ -1,10 +1,9 @@
 //! Features of measured objects: lines, planes, circles, spheres and cylinders through adjusted points, and distances.
 //!
-//! The feature is the one from which the squares of the distances of the points, at right angles, sum to the least: the Gaussian
-//! associated feature of coordinate metrology (A. B. Forbes, *Least-squares best-fit geometric elements*, NPL report DITC 140/89, 1989;
-//! C. M. Shakarji, J. Res. NIST 103, 1998). Points have no weights: what is reported as form is what they deviate by, and it does not
-//! depend on how well a point was measured. How well the feature is known does: everything is propagated from the joint covariance of
-//! the points with the exact derivatives of the feature by the points ([`fit`]).
+//! The fitted feature minimizes the sum of squared orthogonal distances of the points: the Gaussian associated feature of coordinate
+//! metrology (A. B. Forbes, *Least-squares best-fit geometric elements*, NPL report DITC 140/89, 1989; C. M. Shakarji, J. Res. NIST 103,
+//! 1998). Points have equal weights, so that the reported form deviation is independent of the precision of the points. The precision of
+//! the feature is propagated from the joint covariance of the points, with exact derivatives ([`fit`]).
 //!
 //! ```
 //! use photocore::geometry::Vector3;
@@ -29,30 +28,30 @@ pub use measured::{FormTest, Measured, PointDeviation, Quantity, distance, measu
 
 use thiserror::Error;
 
-/// What goes through points.
+/// Type of a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// A straight line.
+    /// Straight line.
     Line,
-    /// A plane.
+    /// Plane.
     Plane,
-    /// A circle in space.
+    /// Circle in space.
     Circle,
-    /// A sphere.
+    /// Sphere.
     Sphere,
-    /// A cylinder.
+    /// Cylinder.
     Cylinder,
 }
 
 impl Form {
-    /// The form of a name.
+    /// Returns the form with a name.
     pub fn named(name: &str) -> Option<Self> {
         [Self::Line, Self::Plane, Self::Circle, Self::Sphere, Self::Cylinder]
             .into_iter()
             .find(|form| form.name() == name)
     }
 
-    /// What it is called.
+    /// Returns the name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Line => "line",
@@ -63,7 +62,7 @@ impl Form {
         }
     }
 
-    /// How many points it takes. Six cylinders go through five points.
+    /// Returns the minimum number of points. Six cylinders pass through five points.
     pub const fn needed(self) -> usize {
         match self {
             Self::Line => 2,
@@ -73,7 +72,7 @@ impl Form {
         }
     }
 
-    /// Where points lie that leave it open.
+    /// Describes the degenerate configuration of the points.
     const fn degenerate(self) -> &'static str {
         match self {
             Self::Line => "in one place",
@@ -84,53 +83,53 @@ impl Form {
     }
 }
 
-/// Why there is no feature.
+/// Reason why a feature cannot be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum FeatureError {
-    /// Fewer points than it takes.
+    /// Fewer points than the form needs.
     #[error("a {} takes {} points, not {given}", .form.name(), .form.needed())]
     TooFew {
-        /// What was asked for.
+        /// Requested form.
         form: Form,
-        /// The number of points.
+        /// Number of points.
         given: usize,
     },
-    /// Coordinates or covariances that are no numbers.
+    /// Coordinates or covariances that are not finite.
     #[error("coordinates and covariances of the points are not all known")]
     NotFinite,
-    /// A covariance matrix of another number of points.
+    /// Covariance matrix for another number of points.
     #[error("{points} points have {} x {} covariances, not {rows} x {columns}", 3 * points, 3 * points)]
     Shape {
-        /// The number of points.
+        /// Number of points.
         points: usize,
-        /// Rows of the matrix.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Number of columns of the matrix.
         columns: usize,
     },
-    /// A distance of two points in one place.
+    /// Distance of two coincident points.
     #[error("the two points are in one place: their distance has no direction")]
     Coincident,
-    /// The points leave it open.
+    /// The points do not determine the form.
     #[error("the points do not determine a {}: they are {}, or nearly so", .0.name(), .0.degenerate())]
     Undetermined(Form),
-    /// The points leave it open within their standard deviations.
+    /// The points do not determine the form within their standard deviations.
     #[error(
         "the points determine a {} too badly ({what} to {:.2} of itself): they are nearly {}",
         .form.name(), .sd, .form.degenerate()
     )]
     Loose {
-        /// What was asked for.
+        /// Requested form.
         form: Form,
-        /// What is known badly.
+        /// Name of the imprecise quantity.
         what: &'static str,
-        /// Its relative standard deviation; radians of a direction.
+        /// Relative standard deviation; radians for a direction.
         sd: f64,
     },
-    /// Several features fit alike.
+    /// Several features fit equally well.
     #[error("more than one {} fits the points as well: take points in other places", .0.name())]
     Ambiguous(Form),
-    /// The iteration does not end.
+    /// The iteration does not converge.
     #[error("no {} is found that fits the points best", .0.name())]
     NotAtRest(Form),
 }

@@ -1,6 +1,6 @@
-//! Models of photos of which nothing but images is known: a pair, and what can be chained to it.
+//! Models of photos without a-priori orientation: relative orientation of a pair, extended by further photos.
 //!
-//! Models joined by a similarity: on common points, control, and observed projection centres.
+//! Models are joined by similarities from common points, control, and observed projection centres.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +13,13 @@ use crate::programs::sampling::Samples;
 use crate::programs::similarity::{Similarity, Station, closed_form};
 use crate::sorting::sort_by;
 
-/// Common points that a pair needs: five, and three to check.
+/// Minimum number of common points of a pair: five, and three for a check.
 pub(super) const COMMON: usize = 8;
-/// Pairs that are oriented before one is chosen.
+/// Maximum number of pairs that are oriented before one is chosen.
 const TRIED: usize = 12;
-/// Angles at which rays meet count up to this, radians: wider ones are no better.
+/// Intersection angle, radians, above which a pair gains no further merit.
 const WIDE: f64 = 0.5;
-/// A pair holds when two fifths of its points fit within this angle, radians.
+/// Angle, radians, within which two fifths of the points of a valid pair fit.
 const LIMIT: f64 = 0.01;
 
 struct Pair {
@@ -29,14 +29,14 @@ struct Pair {
 }
 
 impl Search<'_> {
-    /// A model of some of the free photos: None where no two of them can be oriented to each other.
+    /// Returns a model of some of the free photos; None if no pair can be oriented.
     pub fn relative_model(&mut self, free: &[bool]) -> Result<Option<Model>, FirstValuesError> {
         let mut pairs: Vec<Pair> =
             self.pairs(free).into_iter().filter_map(|photos| self.oriented(photos)).collect();
         sort_by(&mut pairs, &|a, b| b.merit.total_cmp(&a.merit));
         let mut best: Option<Model> = None;
         for pair in &pairs {
-            // Where two poses fit alike (a plane), the other photos decide.
+            // If two poses fit equally well (a plane), the other photos decide.
             for candidate in &pair.candidates {
                 let mut model = self.of_pair(pair.photos, candidate)?;
                 self.grow(&mut model, &|photo| free[photo])?;
@@ -52,7 +52,7 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Pairs of free photos with enough common points, those with most first.
+    /// Returns pairs of free photos with enough common points, largest number first.
     fn pairs(&self, free: &[bool]) -> Vec<[usize; 2]> {
         let mut common: BTreeMap<[usize; 2], usize> = BTreeMap::new();
         for images in &self.of_point {
@@ -92,7 +92,7 @@ impl Search<'_> {
         Some(Pair { photos, candidates, merit })
     }
 
-    /// The model of two photos, adjusted.
+    /// Returns the adjusted model of two photos.
     fn of_pair(
         &mut self,
         [first, second]: [usize; 2],
@@ -109,29 +109,29 @@ impl Search<'_> {
     }
 }
 
-/// More images that fit, then the smaller median.
+/// Ranks by the number of fitting image observations, then by the smaller median.
 fn rank(search: &Search<'_>, model: &Model) -> (usize, f64) {
     let misfits = model.misfits(search);
     let middle = median(misfits.iter().map(|(_, misfit)| *misfit).collect()).unwrap_or(1.0);
     (misfits.len(), -middle)
 }
 
-/// What two models must have in common.
+/// Minimum number of common positions of two models.
 const JOINT: usize = 3;
-/// Samples of three that are solved.
+/// Number of samples of three positions.
 const SAMPLES: usize = 60;
-/// A similarity holds when half of what is common fits within this part of its extent,
+/// Relative misfit, as a fraction of the extent, within which half of the common positions of a valid similarity fit.
 const JOINT_MISFIT: f64 = 0.05;
-/// and what fits within this multiple of the median, or part of the extent, takes part.
+/// Multiple of the median misfit, or fraction of the extent, within which a position is used.
 const SPREAD: f64 = 5.0;
 const ROUNDING: f64 = 1e-6;
-/// What rays of two models may miss each other by at first, in what they may in each.
+/// Initial tolerance of rays of joined models, as a multiple of the tolerance of each model.
 const WIDER: f64 = 3.0;
-/// Common points are on one line when their extent across it is this part of that along it.
+/// Ratio of width to length below which common points are collinear.
 const LINE: f64 = 0.02;
 
 impl Search<'_> {
-    /// Joins what can be joined to the object, and resects what that makes known.
+    /// Joins models to the object as far as possible, and resects the photos that become solvable.
     pub fn join_all(&mut self, object: &mut Model, apart: &mut Vec<Model>) -> Result<(), FirstValuesError> {
         while let Some((index, similarity)) = self.next_join(object, apart) {
             let carried = apart.remove(index).carried(&similarity);
@@ -140,8 +140,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// A model that can be joined, and how. One that agrees with what was known beforehand, but not with a smaller object, takes the
-    /// place of what was resected: four points of which one is wrong may give a pose.
+    /// Returns the next model that can be joined, with its similarity. A larger model that agrees only with the a-priori data replaces
+    /// resected photos: four points, one of them wrong, may give a false pose.
     fn next_join(&self, object: &mut Model, apart: &[Model]) -> Option<(usize, Similarity)> {
         let join = |object: &Model| {
             let similarity = |(index, model)| Some((index, self.onto(&self.common(object, model))?));
@@ -161,14 +161,14 @@ impl Search<'_> {
         })
     }
 
-    /// Joins models that are not the object's among each other.
+    /// Joins the models outside of the object with each other.
     pub fn join_among(&mut self, apart: &mut Vec<Model>) -> Result<(), FirstValuesError> {
         let mut index = 0;
         while index < apart.len() {
             let mut model = apart.remove(index);
             let before = apart.len();
             self.join_all(&mut model, apart)?;
-            // It may have taken in those before it, too.
+            // The join may have removed earlier models.
             apart.insert(index.min(apart.len()), model);
             index = if before + 1 > apart.len() { 0 } else { index + 1 };
         }
@@ -185,7 +185,7 @@ impl Search<'_> {
         self.grow(object, &|_| true)
     }
 
-    /// Pairs of positions, in the first model and in the second: points, and observed projection centres if the first is the object.
+    /// Returns pairs of positions in the two models: points, and observed projection centres if the first model is the object.
     pub fn common(&self, object: &Model, model: &Model) -> Vec<[Vector3; 2]> {
         let pair = |(a, b): (&Option<Vector3>, &Option<Vector3>)| Some([(*a)?, (*b)?]);
         let points = object.points.iter().zip(&model.points).filter_map(pair);
@@ -198,7 +198,7 @@ impl Search<'_> {
         points.chain((0..model.poses.len()).filter_map(centre)).collect()
     }
 
-    /// The similarity that carries a model onto what it has in common; None where that does not say, or does not agree.
+    /// Returns the similarity that maps a model onto the common positions; None if undetermined or inconsistent.
     fn onto(&self, common: &[[Vector3; 2]]) -> Option<Similarity> {
         if common.len() < JOINT {
             return None;
@@ -237,7 +237,7 @@ fn fitted(common: &[[Vector3; 2]]) -> Option<Similarity> {
     closed_form(&common.iter().map(station).collect::<Vec<_>>()).ok()
 }
 
-/// How far the positions reach; None where they are on one line.
+/// Returns the extent of the positions; None if they are collinear.
 fn extent(common: &[[Vector3; 2]]) -> Option<f64> {
     let centre = common.iter().map(|[own, _]| own).sum::<Vector3>() / common.len() as f64;
     let from = |[own, _]: &[Vector3; 2]| own - centre;

@@ -1,4 +1,4 @@
-//! The search for first values.
+//! Search for initial values.
 
 use std::ops::ControlFlow;
 
@@ -9,18 +9,18 @@ use crate::adjustment::Event;
 use crate::geometry::Pose;
 use crate::network::median;
 
-/// Directions further than this from the plane of the projection centre are seen in front (radians).
+/// Minimum inclination, radians, of a usable direction to the plane of the projection centre.
 const SIDE: f64 = 0.02;
-/// Adjustments at the end, at the most.
+/// Maximum number of final adjustments.
 const ROUNDS: usize = 6;
 
 impl FirstValues {
-    /// Finds first values of photos and points.
+    /// Finds initial values of photos and points.
     ///
-    /// `watch` is called on the calling thread while adjustments run; when it breaks, the search stops.
+    /// `watch` is called on the calling thread during adjustments and stops the search by returning `Break`.
     ///
     /// # Errors
-    /// Images of what is not there, an interruption, memory that is not to be had.
+    /// Invalid indices of observations, an interruption, or lack of memory.
     pub fn find(
         &self,
         threads: &Threads,
@@ -33,7 +33,7 @@ impl FirstValues {
             else {
                 return Err(FirstValuesError::Index(index));
             };
-            // What lies at the side of the camera or behind it has no place in the plane at unit distance.
+            // Directions at the side of the camera or behind it cannot be projected to the plane at unit distance.
             if sighting.direction.iter().all(|u| u.is_finite()) && sighting.direction.z < -SIDE {
                 photo.push(index);
                 point.push(index);
@@ -71,7 +71,7 @@ impl Search<'_> {
         Ok(self.found(object, &apart, frame))
     }
 
-    /// Poses of photos whose position and attitude were observed.
+    /// Adds the poses of photos with observed position and attitude.
     fn take_observed(&self, object: &mut Model) {
         for (photo, known) in self.given.photos.iter().enumerate() {
             if let (None, Some(position), Some(attitude)) =
@@ -83,7 +83,7 @@ impl Search<'_> {
         object.intersect(self);
     }
 
-    /// Everything together, robustly: twice, since what fits shows after the first time; more often while images contradict control.
+    /// Adjusts all photos robustly: twice, to use the fit of the first time; more often while observations contradict control.
     fn finish(&mut self, object: &mut Model) -> Result<(), FirstValuesError> {
         for round in 0..ROUNDS {
             if !object.is_empty() && (round < 2 || object.contradicted.contains(&true)) {
@@ -94,7 +94,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// A pose that hardly any image fits is none.
+    /// Removes poses that fit hardly any observation.
     fn leave_out_misfits(&self, object: &mut Model) {
         let mut fitting = vec![0; self.given.photos.len()];
         object.misfits(self).iter().for_each(|(image, _)| fitting[self.given.sightings[*image].photo] += 1);

@@ -1,13 +1,12 @@
-//! First values: poses of photos from what is known, before any adjustment.
+//! Initial values: poses of photos from the available data, before any adjustment.
 //!
-//! In this order: given poses are taken; rays are intersected where photos are known; photos with four known points are resected; what
-//! GNSS and inertial units observed gives poses; photos of which nothing but images is known are oriented relative to each other, pair
-//! and chain, and the model is joined to the rest, or carried onto control and observed positions, by a similarity. Where there is
-//! nothing to carry it onto, the first photo is the datum and the first base has length 1. At the end everything is adjusted with a
-//! robust loss.
+//! The steps are: copy given poses, intersect rays of known photos, resect photos with four known points, use GNSS and inertial poses.
+//! Photos without a-priori data are oriented relative to each other, first a pair, then further photos. The resulting model is transformed
+//! by a similarity to the rest, or to control and observed positions. Without these, the first photo is the datum and the first base has
+//! length 1. Finally all photos and points are adjusted with a robust loss.
 //!
-//! Images come as directions in the photos' axes, so that any camera will do; the adjustments in between see them in the plane at unit
-//! distance. Object space is cartesian.
+//! Observations are directions in the photos' axes, for any camera model; intermediate adjustments use the plane at unit distance. The
+//! object space is cartesian.
 
 mod chained;
 mod find;
@@ -22,34 +21,34 @@ use crate::adjustment::Event;
 use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::{Stopped, Threads};
 
-/// What is known of a photo.
+/// A-priori data of a photo.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct KnownPhoto {
-    /// Its pose.
+    /// Given pose.
     pub pose: Option<Pose>,
-    /// The position of its projection centre as observed.
+    /// Observed position of the projection centre.
     pub position: Option<Vector3>,
-    /// Its attitude, photo to object, as observed.
+    /// Observed attitude, photo to object.
     pub attitude: Option<Matrix3>,
 }
 
-/// What is known of a point.
+/// A-priori data of a point.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownPoint {
-    /// Its coordinates; NaN where nothing is known.
+    /// Coordinates; NaN if unknown.
     pub coordinates: [f64; 3],
-    /// Standard deviations; infinite where they are not held.
+    /// Standard deviations; infinite for free coordinates.
     pub sd: [f64; 3],
 }
 
 impl KnownPoint {
-    /// Its position, where all of it is held.
+    /// Returns the position if all coordinates are weighted or fixed.
     pub(super) fn position(&self) -> Option<Vector3> {
         let full = self.sd.iter().chain(&self.coordinates).all(|value| value.is_finite());
         full.then(|| self.coordinates.into())
     }
 
-    /// A position with the components that are held, and the standard deviation of these.
+    /// Returns a position with its weighted and fixed components replaced by the a-priori values, and their standard deviation.
     pub(super) fn at(&self, position: &Vector3) -> (Vector3, f64) {
         let held = |k: usize| self.sd[k].is_finite() && self.coordinates[k].is_finite();
         let own = Vector3::from_fn(|k, _| if held(k) { self.coordinates[k] } else { position[k] });
@@ -57,100 +56,100 @@ impl KnownPoint {
     }
 }
 
-/// The image of a point.
+/// Image observation of a point, as a direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighting {
-    /// Index of its photo.
+    /// Index of the photo.
     pub photo: usize,
-    /// Index of its point.
+    /// Index of the point.
     pub point: usize,
-    /// Unit direction in the photo's axes; not finite where the camera has none.
+    /// Unit direction in the photo's axes; not finite outside of the camera's range.
     pub direction: Vector3,
-    /// Its standard deviation, radians.
+    /// Standard deviation of the direction, radians.
     pub sd: f64,
 }
 
-/// What is known of photos and points, and what was seen.
+/// Input of the search: a-priori data of photos and points, and image observations.
 #[derive(Debug, Clone)]
 pub struct FirstValues {
-    /// The photos.
+    /// Photos.
     pub photos: Vec<KnownPhoto>,
-    /// The points.
+    /// Points.
     pub points: Vec<KnownPoint>,
-    /// The images.
+    /// Image observations.
     pub sightings: Vec<Sighting>,
 }
 
-/// Where the pose of a photo came from.
+/// Source of the pose of a photo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// It was given.
+    /// Given.
     Given,
-    /// From points whose positions were known.
+    /// Resection from known points.
     Resected,
-    /// From its observed position and attitude.
+    /// Observed position and attitude.
     Observed,
-    /// From another photo with common points.
+    /// Relative orientation to another photo with common points.
     Oriented,
 }
 
-/// Why a photo has no pose.
+/// Reason for a missing pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// So many of its points have positions, too few for a resection.
+    /// Number of points with positions, too few for a resection.
     Points(usize),
-    /// So many of its points have positions, but no pose shows most of them where they are.
+    /// Number of points with positions; every pose contradicts most of their observations.
     Misfit(usize),
-    /// It belongs to a model of so many photos that has so many points and observed positions in common with what is known.
+    /// The photo belongs to a separate model with too few points and observed positions in common with the known ones.
     Apart {
-        /// Photos of the model.
+        /// Number of photos of the model.
         photos: usize,
-        /// What it has in common.
+        /// Number of common points and positions.
         common: usize,
     },
 }
 
-/// What coordinates refer to.
+/// Reference frame of the coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
     /// Given poses, control, observed positions.
     Known,
-    /// The first photo, and a base of length 1.
+    /// First photo, and a base of length 1.
     FirstPhoto(usize),
 }
 
-/// What was found.
+/// Result of the search.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// Poses of the photos.
     pub poses: Vec<Result<(Pose, Source), Missing>>,
-    /// Positions of points whose rays meet, and of control.
+    /// Positions of intersected points and of control.
     pub points: Vec<Option<Vector3>>,
-    /// Whether an image does not fit the poses and was set aside.
+    /// Whether an observation contradicts the poses and was rejected.
     pub set_aside: Vec<bool>,
-    /// Whether the images of a control point agree with each other but not with its coordinates.
+    /// Whether the observations of a control point agree with each other but contradict its coordinates.
     pub contradicted: Vec<bool>,
-    /// What coordinates refer to.
+    /// Reference frame of the coordinates.
     pub frame: Frame,
     /// Median of the angles between observed and computed directions, radians; None without any.
     pub misfit: Option<f64>,
 }
 
-/// Why nothing could be found.
+/// Reason for a failed search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FirstValuesError {
-    /// An image names a photo or point that is not there.
+    /// An observation has an invalid index of a photo or point.
     #[error("image {0} names a photo or point that is not there")]
     Index(usize),
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was stopped by the caller, or lacks memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
 
-/// Known points that it takes to resect a photo: three, and one to check.
+/// Minimum number of known points of a resection: three, and one for a check.
 const RESECTED: usize = 4;
 
-/// What is given, arranged by photo and by point, with the means to adjust.
+/// Input sorted by photo and by point, with the threads and callback of the adjustments.
 struct Search<'a> {
     given: &'a FirstValues,
     of_photo: Vec<Vec<usize>>,

@@ -1,6 +1,6 @@
-//! A model: photos and points in one frame, and the intersection of its rays.
+//! Model: photos and points in one frame, and the intersection of its rays.
 //!
-//! The adjustments in between: the network engine on images in the plane at unit distance, with a robust loss.
+//! Intermediate adjustments use the network engine with images in the plane at unit distance and a robust loss.
 
 use super::{FirstValues, FirstValuesError, KnownPoint, Search, Sighting, Source};
 use crate::adjustment::{Loss, Method, Options as AdjustmentOptions, Stop};
@@ -10,16 +10,16 @@ use crate::network::{
 };
 use crate::programs::similarity::Similarity;
 
-/// Rays of a point must meet at this angle, radians: below it their point says little along them.
+/// Minimum intersection angle of the rays of a point, radians.
 const LEAST_ANGLE: f64 = 0.01;
-/// An image fits within this multiple of the standard deviation that the median of all says, and of its own.
+/// Multiples of the standard deviation (from the median of all misfits, and a priori) within which an observation fits.
 pub(super) const FITS: f64 = 6.0;
 const FITS_OWN: f64 = 4.0;
-/// Control further from its rays than this, radians, does not count.
+/// Maximum angle, radians, between used control and its rays.
 const NEAR: f64 = 0.1;
-/// Pairs of rays that are tried where not all rays of a point meet, at the most.
+/// Maximum number of trial pairs if the rays of a point do not all intersect.
 const PAIRS: usize = 45;
-/// The length of a vector with two components of standard deviation 1 has this median.
+/// Median length of a vector with two components of standard deviation 1.
 pub(super) const MEDIAN_LENGTH: f64 = 1.1774;
 
 /// Photos and points in one frame.
@@ -27,18 +27,18 @@ pub(super) const MEDIAN_LENGTH: f64 = 1.1774;
 pub struct Model {
     pub poses: Vec<Option<(Pose, Source)>>,
     pub points: Vec<Option<Vector3>>,
-    /// The images that do not fit.
+    /// Whether each observation is rejected.
     pub aside: Vec<bool>,
-    /// The control points whose images agree with each other but not with the coordinates.
+    /// Whether the observations of a control point agree with each other but contradict its coordinates.
     pub contradicted: Vec<bool>,
-    /// Angle within which an image fits, radians.
+    /// Angle within which an observation fits, radians.
     pub tolerance: f64,
-    /// Whether control belongs to it.
+    /// Whether the frame is the object space, so that control applies.
     pub object: bool,
 }
 
 impl Model {
-    /// No photo and no point.
+    /// Returns a model without photos and points.
     pub fn empty(given: &FirstValues) -> Self {
         Self {
             poses: vec![None; given.photos.len()],
@@ -50,7 +50,7 @@ impl Model {
         }
     }
 
-    /// Given poses and control.
+    /// Returns the model of given poses and control.
     pub fn of_known(search: &Search<'_>) -> Self {
         let mut model = Self::empty(search.given);
         model.object = true;
@@ -61,7 +61,7 @@ impl Model {
         model
     }
 
-    /// Number of its photos.
+    /// Returns the number of photos with a pose.
     pub fn count(&self) -> usize {
         self.poses.iter().flatten().count()
     }
@@ -70,7 +70,7 @@ impl Model {
         self.poses.iter().all(Option::is_none)
     }
 
-    /// Whether control or observed positions say where it is.
+    /// Returns whether control or observed positions define the datum.
     pub fn is_anchored(&self, search: &Search<'_>) -> bool {
         let held = |sd: &f64| sd.is_finite();
         search.given.points.iter().any(|point| point.sd.iter().any(held))
@@ -83,7 +83,7 @@ impl Model {
         Some(Ray { origin: pose.position, direction: pose.attitude * sighting.direction })
     }
 
-    /// The rays of a point, with their images.
+    /// Returns the rays of a point with their observations.
     fn rays(&self, search: &Search<'_>, point: usize) -> Vec<(usize, Ray)> {
         search.of_point[point].iter().filter_map(|&image| Some((image, self.ray(search, image)?))).collect()
     }
@@ -92,14 +92,14 @@ impl Model {
         misfit(ray, at) <= self.tolerance.max(FITS_OWN * search.given.sightings[*image].sd)
     }
 
-    /// Whether a ray fits a position with a standard deviation.
+    /// Returns whether a ray agrees with a position that has a standard deviation.
     fn reaches(&self, search: &Search<'_>, at: &Vector3, sd: f64, ray: &(usize, Ray)) -> bool {
         let towards = at - ray.1.origin;
         let least = misfit(&ray.1, at) - FITS * sd / towards.norm();
         least <= self.tolerance.max(FITS_OWN * search.given.sightings[ray.0].sd)
     }
 
-    /// Intersects all points anew: first to see how well rays meet, then with those that fit.
+    /// Intersects all points twice: first to estimate the tolerance, then with the fitting rays.
     pub fn intersect(&mut self, search: &Search<'_>) {
         if self.tolerance == 0.0 {
             self.tolerance = f64::INFINITY;
@@ -109,13 +109,13 @@ impl Model {
         (0..self.points.len()).for_each(|point| self.place(search, point));
     }
 
-    /// Takes what fits from the median of all.
+    /// Estimates the tolerance from the median of all misfits.
     pub fn narrow(&mut self, search: &Search<'_>) {
         let sizes = self.misfits(search).into_iter().map(|(_, misfit)| misfit).collect();
         self.tolerance = median(sizes).map_or(0.0, |middle| FITS * middle / MEDIAN_LENGTH);
     }
 
-    /// Images of points that have a place, and by what angle they miss it; those set aside are left out.
+    /// Returns the angular misfits of the observations of known points, without rejected ones.
     pub fn misfits(&self, search: &Search<'_>) -> Vec<(usize, f64)> {
         let of = |image: usize| {
             let point = self.points[search.given.sightings[image].point]?;
@@ -124,7 +124,7 @@ impl Model {
         (0..self.aside.len()).filter(|&image| !self.aside[image]).filter_map(of).collect()
     }
 
-    /// Puts a point where its rays meet, or at its control coordinates if as many rays meet there. Sets rays aside that do not fit.
+    /// Intersects a point, or uses its control coordinates if equally many rays agree with them. Rejects rays that do not fit.
     pub fn place(&mut self, search: &Search<'_>, point: usize) {
         let rays = self.rays(search, point);
         let known = Some(&search.given.points[point]).filter(|_| self.object);
@@ -141,7 +141,7 @@ impl Model {
         } else {
             met().filter(|at| at_control.is_none_or(|count| fitting(at) > count)).or(control)
         };
-        // Control counts with its standard deviation, and only in the components that it has.
+        // Control counts with its standard deviation, and only in its known components.
         let contradicted = known.zip(placed).is_some_and(|(known, at)| {
             let (own, sd) = known.at(&at);
             rays.iter().filter(|ray| self.reaches(search, &own, sd, ray)).count() < fitting(&at)
@@ -154,12 +154,12 @@ impl Model {
         self.points[point] = placed.filter(|_| control.is_some() || widest(&all) > LEAST_ANGLE);
     }
 
-    /// Whether all rays of a point pass near a position.
+    /// Returns whether all rays of a point pass near a position.
     fn is_near(&self, search: &Search<'_>, point: usize, at: &Vector3) -> bool {
         self.rays(search, point).iter().all(|(_, ray)| misfit(ray, at) < NEAR)
     }
 
-    /// Where most rays meet, of three or more: pairs propose places.
+    /// Returns the point on which most of three or more rays agree; pairs of rays propose candidates.
     fn consensus(&self, search: &Search<'_>, rays: &[(usize, Ray)]) -> Option<Vector3> {
         if rays.len() < 3 {
             return None;
@@ -173,7 +173,7 @@ impl Model {
         meet(&best)
     }
 
-    /// Carries it by a similarity from object (control) to this model.
+    /// Transforms the model by the inverse of a similarity from object (control) to this model.
     pub fn carried(&self, similarity: &Similarity) -> Self {
         let mut carried = self.clone();
         let attitude = |a: &Matrix3| similarity.rotation.tr_mul(a);
@@ -185,7 +185,7 @@ impl Model {
         carried
     }
 
-    /// Counts it from its first photo, in bases to the farthest one; that photo.
+    /// Makes the first photo the origin and the base to the next photo the unit; returns the index of the first photo.
     pub fn count_from_first_photo(&mut self) -> usize {
         let Some((first, (origin, _))) =
             self.poses.iter().enumerate().find_map(|(k, pose)| Some((k, (*pose)?)))
@@ -206,14 +206,14 @@ impl Model {
     }
 }
 
-/// The angle by which a ray misses a point, radians; more than 1 behind the photo.
+/// Returns the angle between a ray and the direction to a point, radians; more than 1 behind the photo.
 pub(super) fn misfit(ray: &Ray, point: &Vector3) -> f64 {
     let to = point - ray.origin;
     let length = to.norm();
     if length > 0.0 { (to / length - ray.direction).norm() } else { 2.0 }
 }
 
-/// The largest angle between two rays.
+/// Returns the largest angle between two rays.
 fn widest(rays: &[Ray]) -> f64 {
     let angles = rays
         .iter()
@@ -222,16 +222,16 @@ fn widest(rays: &[Ray]) -> f64 {
     angles.fold(0.0, f64::max)
 }
 
-/// Where the loss sets in, in standard deviations that the median of the residuals says.
+/// Threshold of the robust loss, in standard deviations estimated from the median of the residuals.
 const SETS_IN: f64 = 3.0;
-/// Iterations at the most, and the fraction of its standard deviation by which no unknown changes any more.
+/// Maximum number of iterations, and the convergence limit as a fraction of the standard deviation of an unknown.
 const ITERATIONS: usize = 30;
 const FRACTION: f64 = 0.1;
-/// The image plane is at unit distance: x = -u1/u3, y = -u2/u3.
+/// Image plane at unit distance: x = -u1/u3, y = -u2/u3.
 const PRINCIPAL_DISTANCE: f64 = -1.0;
 
 impl Search<'_> {
-    /// Adjusts poses and points of a model, and looks anew at what fits. A model that cannot be adjusted stays as it is.
+    /// Adjusts poses and points of a model and re-evaluates the fit. A model that cannot be adjusted is unchanged.
     pub fn adjust(&mut self, model: &mut Model) -> Result<(), FirstValuesError> {
         let photos: Vec<usize> = (0..model.poses.len()).filter(|&k| model.poses[k].is_some()).collect();
         let misfits = model.misfits(self);
@@ -245,7 +245,7 @@ impl Search<'_> {
         let weighted = |point: usize| {
             let known = &self.given.points[point];
             let at = model.points[point].unwrap_or_default();
-            // Control that its images contradict pulls with one standard deviation; far from its rays it does not count.
+            // Contradicted control gets at least the discrepancy as standard deviation; far from its rays it is ignored.
             let (control, _) = known.at(&at);
             let (counts, least) = match model.contradicted[point] {
                 true => (model.is_near(self, point, &control), (control - at).norm()),
@@ -276,7 +276,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Adjusts the pose of one photo alone, its points fixed; from where it is if that fails.
+    /// Adjusts the pose of one photo with fixed points; returns the initial pose if this fails.
     pub fn adjusted_photo(
         &mut self,
         model: &Model,
@@ -329,7 +329,7 @@ impl Search<'_> {
         }
     }
 
-    /// The adjusted network; None where it cannot be adjusted, or not with a finite result.
+    /// Returns the adjusted network; None if it cannot be adjusted or is not finite.
     fn solved(&mut self, network: &Network) -> Result<Option<Solution>, FirstValuesError> {
         let options = Options {
             adjustment: AdjustmentOptions {
@@ -355,7 +355,7 @@ impl Search<'_> {
     }
 }
 
-/// The standard deviation of a component that the median of the angles says.
+/// Returns the standard deviation of a component, estimated from the median of the angles.
 fn spread(misfits: impl Iterator<Item = f64>) -> f64 {
     crate::network::median(misfits.collect()).map_or(0.0, |middle| middle / MEDIAN_LENGTH)
 }

@@ -1,4 +1,4 @@
-//! Photos from points whose positions are known: three points give poses, the others judge them.
+//! Resection of photos from known points: samples of three points give poses, the other points select among them.
 
 use super::model::Model;
 use super::{FirstValuesError, RESECTED, Search, Source};
@@ -7,29 +7,29 @@ use crate::network::median;
 use crate::programs::resection::three_points;
 use crate::programs::sampling::Samples;
 
-/// Samples of three points that are solved; each is the widest of a few.
+/// Number of samples of three points; each is the widest of a few.
 const SAMPLES: usize = 60;
 const TRIES: usize = 3;
-/// A pose holds when half of the points fit it within this angle, radians, or within so many standard deviations,
+/// Limits within which half of the points of a valid pose fit: an angle in radians, and a multiple of the standard deviation.
 const LIMIT: f64 = 0.01;
 const DEVIATIONS: f64 = 10.0;
-/// and a point fits within this multiple of the median.
+/// Multiple of the median within which a point fits.
 const SPREAD: f64 = 5.0;
 
-/// A pose and how well the points of the photo fit it.
+/// Pose and its misfit.
 struct Judged {
     pose: Pose,
     misfit: f64,
 }
 
 impl Search<'_> {
-    /// Resects photos of a model, one after the other, the one with most known points first, and intersects what they see.
+    /// Resects photos of a model successively, largest number of known points first, and intersects their points.
     pub fn grow(
         &mut self,
         model: &mut Model,
         admitted: &dyn Fn(usize) -> bool,
     ) -> Result<(), FirstValuesError> {
-        // Photos that failed, with the number of points they failed at.
+        // Number of known points at which each photo failed.
         let mut failed = vec![0; self.given.photos.len()];
         let mut since = 0;
         let mut at_rest = true;
@@ -43,7 +43,7 @@ impl Search<'_> {
                 if at_rest {
                     return Ok(());
                 }
-                // What an adjustment moves into place may start others.
+                // An adjustment may improve points so that further photos succeed.
                 self.adjust(model)?;
                 (at_rest, since) = (true, 0);
                 continue;
@@ -64,14 +64,14 @@ impl Search<'_> {
         }
     }
 
-    /// Intersects the points of a photo anew.
+    /// Intersects the points of a photo again.
     pub fn place_points_of(&self, model: &mut Model, photo: usize) {
         for &image in &self.of_photo[photo] {
             model.place(self, self.given.sightings[image].point);
         }
     }
 
-    /// The pose of a photo from its known points; None where too few of them agree.
+    /// Returns the pose of a photo from its known points; None if too few of them agree.
     fn resected(&mut self, model: &Model, photo: usize) -> Result<Option<Pose>, FirstValuesError> {
         let images = self.known_points(model, photo);
         let sights: Vec<(Vector3, Vector3)> = images
@@ -95,7 +95,7 @@ impl Search<'_> {
     }
 }
 
-/// The pose that half of the points fit best, of those that samples of three give.
+/// Returns the pose with the smallest median misfit, among the poses of samples of three points.
 fn consensus(sights: &[(Vector3, Vector3)]) -> Option<Judged> {
     if sights.len() < RESECTED {
         return None;

@@ -1,13 +1,13 @@
 //! Relative orientation from five points: the essential matrix (Nister 2004) by the action matrix of its cubic equations (Stewenius,
 //! Engels and Nister, ISPRS Journal 60, 2006).
 //!
-//! Five equations u1^T E u2 = 0 leave E = x E1 + y E2 + z E3 + E4. Ten cubic equations hold for x, y, z: det E = 0 and
-//! E E^T E - 1/2 tr(E E^T) E = 0. Eliminating the ten monomials of degree three leaves products with x of the ten lower ones: a matrix
-//! whose real eigenvalues are x.
+//! Five equations u1^T E u2 = 0 leave E = x E1 + y E2 + z E3 + E4. x, y, z satisfy ten cubic equations: det E = 0 and E E^T E - 1/2 tr(E
+//! E^T) E = 0. Elimination of the ten monomials of degree three expresses x times the ten lower monomials by the lower ones: an action
+//! matrix with the eigenvalues x.
 //!
-//! Relative orientation over a plane: the homography of four points, and the poses that it stands for.
+//! Relative orientation over a plane: the homography of four points, and its poses.
 //!
-//! With a plane n . P = d in the axes of the first photo, u2 ~ H u1, H = R + t n^T / d, R = A^T and t = -A^T b. The two poses come from
+//! With a plane n . P = d in the axes of the first photo, u2 ~ H u1, H = R + t n^T / d, R = A^T and t = -A^T b. The two poses follow from
 //! the singular values of H (Ma, Soatto, Kosecka and Sastry, An Invitation to 3-D Vision, 2004, section 5.3).
 
 use nalgebra::{SMatrix, SVector, Schur};
@@ -15,10 +15,10 @@ use nalgebra::{SMatrix, SVector, Schur};
 use super::oriented::Oriented;
 use crate::geometry::{Matrix3, Vector3, principal_axes};
 
-/// Steps of the decompositions at the most.
+/// Maximum number of steps of the decompositions.
 const STEPS: usize = 1000;
 
-/// Monomials in x, y, z by their exponents: ten of degree three, then ten below. The first six are x times the first six of the lower.
+/// Exponents of the monomials in x, y, z: ten of degree three, then ten lower ones. The first six are x times the first six lower ones.
 const EXPONENTS: [[usize; 3]; 20] = [
     [3, 0, 0],
     [2, 1, 0],
@@ -42,13 +42,13 @@ const EXPONENTS: [[usize; 3]; 20] = [
     [0, 0, 0],
 ];
 
-/// The imaginary part of an eigenvalue, relative to its size, up to which it counts as real: two that fall together come out as a pair.
+/// Maximum relative imaginary part of a real eigenvalue: rounding makes a double eigenvalue a complex pair.
 const NOT_REAL: f64 = 1e-3;
 
-/// Coefficients of a polynomial of degree three at the most.
+/// Coefficients of a polynomial of degree three or less.
 type Polynomial = [f64; 20];
 
-/// Where a product of monomials stands.
+/// Index of the product of two monomials, by its exponents.
 const PLACE: [[[usize; 4]; 4]; 4] = places();
 
 const fn places() -> [[[usize; 4]; 4]; 4] {
@@ -62,7 +62,7 @@ const fn places() -> [[[usize; 4]; 4]; 4] {
     places
 }
 
-/// The product of two polynomials whose degrees sum to three at the most.
+/// Returns the product of two polynomials; the sum of their degrees is at most three.
 fn product(a: &Polynomial, b: &Polynomial) -> Polynomial {
     let mut sum = [0.0; 20];
     for (p, left) in EXPONENTS.iter().zip(a).filter(|(_, value)| **value != 0.0) {
@@ -73,12 +73,12 @@ fn product(a: &Polynomial, b: &Polynomial) -> Polynomial {
     sum
 }
 
-/// a + f b
+/// Returns a + f b.
 fn plus(a: &Polynomial, f: f64, b: &Polynomial) -> Polynomial {
     std::array::from_fn(|k| a[k] + f * b[k])
 }
 
-/// Every essential matrix E with u1^T E u2 = 0 for five pairs of rays (in the axes of the first and of the second photo): up to ten.
+/// Returns up to ten E with u1^T E u2 = 0 for five pairs of rays, in the axes of the first and of the second photo.
 pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
     let Some(basis) = null_space(pairs) else { return vec![] };
     let entry = |i: usize, j: usize| -> Polynomial {
@@ -102,15 +102,15 @@ pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
         .collect()
 }
 
-/// Equations in the nine elements of a matrix: up to twelve, the others zero.
+/// Up to twelve equations in the nine elements of a matrix; unused rows are zero.
 type Equations = SMatrix<f64, 12, 9>;
 
-/// Right singular vectors, row by row, those of the largest singular values first.
+/// Returns the right singular vectors, row by row, largest singular value first.
 fn right_vectors(equations: Equations) -> Option<SMatrix<f64, 9, 9>> {
     equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t
 }
 
-/// Four matrices that span what the five equations leave.
+/// Returns four matrices that span the null space of the five equations.
 fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
     let mut equations = Equations::zeros();
     for (row, [first, second]) in pairs.iter().enumerate() {
@@ -120,7 +120,7 @@ fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
     Some(std::array::from_fn(|k| Matrix3::from_fn(|i, j| rows[(5 + k, 3 * i + j)])))
 }
 
-/// det E = 0 and E E^T E - 1/2 tr(E E^T) E = 0.
+/// Returns the coefficients of det E = 0 and E E^T E - 1/2 tr(E E^T) E = 0.
 fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
     let sum = |terms: [Polynomial; 3]| plus(&plus(&terms[0], 1.0, &terms[1]), 1.0, &terms[2]);
     let square = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&e[i][k], &e[j][k])));
@@ -139,7 +139,7 @@ fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
     SMatrix::from_fn(|row, column| rows[row][column])
 }
 
-/// Multiplication by x of the ten lower monomials, modulo the equations.
+/// Returns the matrix of the multiplication by x of the ten lower monomials, modulo the equations.
 fn action_matrix(reduced: &SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
     let mut action = SMatrix::<f64, 10, 10>::zeros();
     for row in 0..6 {
@@ -161,7 +161,7 @@ fn roots(action: &SMatrix<f64, 10, 10>) -> Vec<f64> {
     values.iter().filter(|value| value.im.abs() <= NOT_REAL * (1.0 + value.re.abs())).map(|v| v.re).collect()
 }
 
-/// The monomials that belong to a root, by inverse iteration.
+/// Returns the monomials of a root by inverse iteration.
 fn eigenvector(action: &SMatrix<f64, 10, 10>, root: f64) -> Option<SVector<f64, 10>> {
     let near = root + 1e-10 * (1.0 + root.abs());
     let factors = (action - SMatrix::<f64, 10, 10>::identity() * near).lu();
@@ -177,15 +177,15 @@ fn eigenvector(action: &SMatrix<f64, 10, 10>, root: f64) -> Option<SVector<f64, 
     Some(vector)
 }
 
-/// Singular values that differ by less leave no base.
+/// Minimum relative difference of the singular values for a determined base.
 const NO_BASE: f64 = 1e-9;
 
-/// The poses of the second photo in the axes of the first that show four points of a plane as the pairs of rays have them.
+/// Returns the poses of the second photo, in the axes of the first, that agree with four pairs of rays to points of a plane.
 pub fn over_plane(pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
     homography(pairs).map_or(vec![], |h| poses(&h, pairs))
 }
 
-/// H with u2 x (H u1) = 0, of any size.
+/// Returns H with u2 x (H u1) = 0, unscaled.
 fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
     let mut equations = Equations::zeros();
     for (pair, [first, second]) in pairs.iter().enumerate() {
@@ -203,7 +203,7 @@ fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
 fn poses(h: &Matrix3, pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
     let Some((squares, axes)) = principal_axes(&h.tr_mul(h)) else { return vec![] };
     let [v1, v2, v3] = [0, 1, 2].map(|k| Vector3::from(axes.column(k)));
-    // The middle singular value is to be one.
+    // The middle singular value is scaled to one.
     let h = h / squares[1].sqrt();
     let (large, small) = (squares[0] / squares[1], squares[2] / squares[1]);
     let has_base = squares[1] > 0.0 && large - small >= NO_BASE;
@@ -213,7 +213,7 @@ fn poses(h: &Matrix3, pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
     let (p, q) = ((1.0 - small).max(0.0).sqrt(), (large - 1.0).max(0.0).sqrt());
     let root = (large - small).sqrt();
     let of_sign = |sign: f64| -> Option<Oriented> {
-        // In the plane of v2 and u, H keeps lengths.
+        // H preserves lengths in the plane of v2 and u.
         let u = (v1 * p + v3 * (sign * q)) / root;
         let (own, turned) = (frame(&v2, &u), frame(&(h * v2), &(h * u)));
         let to_second = turned * own.transpose();

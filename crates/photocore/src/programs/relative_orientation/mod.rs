@@ -1,10 +1,9 @@
-//! Relative orientation: the pose of one photo in the axes of another, from the rays of common points alone.
+//! Relative orientation: the pose of one photo in the axes of another, from the rays of common points.
 //!
-//! The first photo stands at the origin, its attitude is the identity, and the base has length 1. Samples of five points give essential
-//! matrices ([`five_points`]), samples of four the poses of a homography, the rival where the scene is a plane. Each is judged by the
-//! angle by which the best two fifths of the pairs of rays miss each other at the most, those that meet behind a photo (u3 > 0) missing
-//! altogether; least squares comes
-//! after (`first_values`).
+//! The first photo is at the origin, its attitude is the identity, and the base has length 1. Samples of five points give essential
+//! matrices ([`five_points`]). Samples of four points give the poses of a homography, the alternative for plane scenes. The score of a pose
+//! is the largest angular misfit of the best two fifths of the pairs of rays; pairs that intersect behind a photo (u3 > 0) count as
+//! misfits. Least squares follows in `first_values`.
 //!
 //! ```
 //! use photocore::geometry::{Pose, Vector3, rotation};
@@ -29,28 +28,28 @@ use super::sampling::Samples;
 use crate::geometry::{Matrix3, Vector3};
 use crate::sorting::sort_by;
 
-/// Samples that are drawn: with a third of the pairs wrong, one in eight has none of them.
+/// Number of samples: if a third of the pairs is wrong, one sample in eight is free of errors.
 const SAMPLES: usize = 80;
-/// Pairs by which a pose is judged at the most, evenly taken.
+/// Maximum number of pairs for the score of a pose, evenly distributed.
 const JUDGES: usize = 120;
-/// A rival stays that fits at most this much worse, unless it is like a better one.
+/// Maximum ratio of scores of an alternative and the best pose.
 const RIVAL: f64 = 3.0;
-/// Rivals at the most.
+/// Maximum number of poses returned.
 const MOST: usize = 3;
-/// Steps of a decomposition at the most.
+/// Maximum number of steps of a decomposition.
 const STEPS: usize = 1000;
 
-/// A pose, and how well it fits.
+/// Pose and its score.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// The pose.
+    /// Pose.
     pub oriented: Oriented,
-    /// What two fifths of the pairs of rays do not miss each other by, radians.
+    /// Score: largest misfit of the best two fifths of the pairs of rays, radians.
     pub misfit: f64,
 }
 
-/// Poses of the second photo that explain pairs of unit rays, each in the axes of its photo: the best, and rivals that fit nearly as
-/// well (two over a plane). None with fewer than six pairs, or where no pose has half of them in front.
+/// Returns the poses of the second photo that agree with pairs of unit rays, each in the axes of its photo: the best and similarly good
+/// alternatives (two over a plane). The result is empty for fewer than six pairs, or if every pose has half of them behind.
 pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
     if pairs.len() < 6 {
         return vec![];
@@ -71,7 +70,7 @@ pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
     found
 }
 
-/// The best, and what is unlike it and fits nearly as well.
+/// Returns the best pose, and different poses that fit nearly as well.
 fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
     sort_by(&mut found, &|a, b| a.misfit.total_cmp(&b.misfit));
     let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
@@ -85,7 +84,7 @@ fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
     retained
 }
 
-/// Of the four poses of an essential matrix, E = [b]x A, the one that has most of the pairs in front of both photos.
+/// Returns the pose with most pairs in front of both photos, among the four poses of an essential matrix E = [b]x A.
 fn in_front(e: &Matrix3, pairs: &[[Vector3; 2]]) -> Option<Oriented> {
     let svd = e.try_svd(true, true, f64::EPSILON, STEPS)?;
     let (u, v_t) = (svd.u?, svd.v_t?);

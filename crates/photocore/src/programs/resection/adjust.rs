@@ -1,4 +1,4 @@
-//! The adjustment of a photo.
+//! Adjustment of a single photo.
 
 use std::ops::ControlFlow;
 
@@ -12,21 +12,21 @@ use crate::normals::{Layout, LayoutError, Ordering, System};
 use crate::sorting::sort_by;
 
 impl Resection {
-    /// Adjusts the photo by least squares, on threads of its own.
+    /// Adjusts the photo by least squares, on a new thread pool.
     ///
     /// # Errors
-    /// Those of [`Resection::adjust_on`]; threads that cannot be started.
+    /// The errors of [`Resection::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Solution, ResectionError> {
         self.adjust_on(options, &Threads::new(options.threads)?, &mut adjustment::go_on)
     }
 
-    /// The same on threads of the caller.
+    /// Adjusts the photo on the caller's threads.
     ///
-    /// Without initial values, every distinct pose that a direct method finds is adjusted. The one with the least sum of squares
-    /// is the solution; the others that fit about as well are told too (see [`Alternative`](super::Alternative)).
+    /// Without initial values, every distinct pose of a direct method is adjusted. The solution has the least sum of squares; other poses
+    /// that fit about as well are returned as alternatives (see [`Alternative`](super::Alternative)).
     ///
     /// # Errors
-    /// A configuration that determines no pose, or an interruption by `watch`.
+    /// A configuration without a determined pose, or an interruption by `watch`.
     pub fn adjust_on(
         &self,
         options: &Options,
@@ -35,7 +35,7 @@ impl Resection {
     ) -> Result<Solution, ResectionError> {
         let starts = match self.start {
             Some(start) => {
-                // Rounding may hide from the adjustment that the points determine nothing.
+                // Rounding may hide the rank defect of the points from the adjustment.
                 if self.position.sd.iter().chain(&self.attitude.sd).all(|sd| sd.is_infinite()) {
                     self.enough_points()?;
                 }
@@ -90,7 +90,7 @@ impl Resection {
         Ok(Solved { problem, adjustment, start, origin })
     }
 
-    /// The same pose with |phi| <= 90 degrees, where the iteration has led beyond and nothing is known of the angles.
+    /// Returns the pose with |phi| <= 90 degrees, if the iteration has passed this limit and the angles are free.
     fn upright(&self, solved: &Solved) -> Option<Pose> {
         let Pose { position, attitude } = solved.pose();
         let beyond = attitude[1].abs() > std::f64::consts::FRAC_PI_2;
@@ -98,12 +98,12 @@ impl Resection {
         (beyond && free).then(|| Pose { position, attitude: rotation_angles(&rotation(attitude)) })
     }
 
-    /// What is degenerate about the points seen from a pose.
+    /// Returns the degeneracy of the points seen from a pose.
     fn degeneracy(&self, pose: &Pose) -> Degeneracy {
         Degeneracy::of(&self.sight().points, &self.space.cartesian(pose.position))
     }
 
-    /// Coordinates are counted from here while the photo is adjusted, so that no digits are lost in large ones.
+    /// Returns the local origin of the adjustment, which preserves the digits of large coordinates.
     fn origin(&self, start: &Pose) -> [f64; 3] {
         match self.space {
             ObjectSpace::Rectangular => start.position.map(f64::round),
@@ -111,7 +111,7 @@ impl Resection {
         }
     }
 
-    /// The least-squares problem: points are local blocks of three, the photo is the retained block of six.
+    /// Builds the least-squares problem: points are local blocks of three, the photo is the retained block of six.
     fn problem(&self, start: &Pose, origin: [f64; 3]) -> Result<Problem<SinglePhoto>, LayoutError> {
         let count = self.points.len();
         let shifted = |point: &ControlPoint| ControlPoint {

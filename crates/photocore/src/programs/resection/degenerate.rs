@@ -3,26 +3,26 @@
 use crate::geometry::Vector3;
 use crate::geometry::cramer::unit;
 
-/// Distances of all points from a line, relative to their extent, below which they count as collinear.
+/// Distance of all points from a line, relative to their extent, below which they are collinear.
 const COLLINEAR: f64 = 1e-7;
-/// Distance of the projection centre from the danger cylinder, relative to its radius, at which it counts as on it.
+/// Distance of the projection centre from the danger cylinder, relative to the radius, below which it is on the cylinder.
 const ON_CYLINDER: f64 = 1e-4;
 
-/// Why the observations do not determine the pose.
+/// Reason why the observations do not determine the pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Degeneracy {
     /// Fewer than three points.
     TooFewPoints,
     /// All points are on one line.
     Collinear,
-    /// There are three points, and the projection centre is on the right cylinder over the circle through them.
+    /// Three points, with the projection centre on the right cylinder over the circle through them.
     DangerCylinder,
-    /// None of these.
+    /// Another reason.
     Unnamed,
 }
 
 impl Degeneracy {
-    /// Names what is wrong with points seen from a projection centre (cartesian).
+    /// Classifies points seen from a projection centre (cartesian).
     pub(super) fn of(points: &[Vector3], centre: &Vector3) -> Self {
         let on_cylinder = |(outside, radius): (f64, f64)| outside.abs() <= ON_CYLINDER * radius;
         if points.len() < 3 {
@@ -37,7 +37,7 @@ impl Degeneracy {
     }
 }
 
-/// Whether all points are on one line.
+/// Returns whether all points are on one line.
 pub(super) fn collinear(points: &[Vector3]) -> bool {
     let Some(&first) = points.first() else { return true };
     let offsets: Vec<Vector3> = points.iter().map(|point| point - first).collect();
@@ -50,17 +50,17 @@ pub(super) fn collinear(points: &[Vector3]) -> bool {
     offsets.iter().all(|offset| offset.cross(&farthest).norm_squared() <= limit)
 }
 
-/// Distance of a position from the danger cylinder of three points, the right cylinder over the circle through them, negative
+/// Returns the distance of a position from the danger cylinder of three points (the right cylinder over the circle through them), negative
 /// inside, and its radius. None unless there are exactly three points, and not on one line.
 ///
-/// There the three points do not determine the pose: a small movement along the cylinder changes no angle between their rays
-/// to first order (Finsterwalder 1903). With a fourth point the cylinder is harmless.
+/// On the cylinder three points do not determine the pose: a small movement along it changes no angle between their rays to first order
+/// (Finsterwalder 1903). With a fourth point the cylinder is harmless.
 pub(super) fn outside_cylinder(points: &[Vector3], position: &Vector3) -> Option<(f64, f64)> {
     let &[first, second, third] = points else { return None };
     let (along, side) = (second - first, third - first);
     let normal = along.cross(&side);
     let axis = unit(&normal)?;
-    // The circumcentre of a triangle from one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
+    // Circumcentre of a triangle relative to one corner: (|a|^2 (b x n) + |b|^2 (n x a)) / 2 |n|^2.
     let (p, q) = (side.cross(&normal), normal.cross(&along));
     let offset = (along.norm_squared() * p + side.norm_squared() * q) / (2.0 * normal.norm_squared());
     let radius = offset.norm();

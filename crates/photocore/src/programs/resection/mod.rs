@@ -1,8 +1,8 @@
 //! Resection: position and attitude of one photo from control points, with or without initial values.
 //!
-//! Unknowns are the position and attitude of the photo and the coordinates of the control points, each weighted from free
-//! (the photo) to fixed; observations are image coordinates. Positions are X, Y, Z or longitude, latitude, height. Without
-//! initial values the adjustment starts from poses that three points give directly ([`three_points`]).
+//! Unknowns are the position and attitude of the photo and the coordinates of the control points, each weighted from free (the photo) to
+//! fixed; observations are image coordinates. Positions are X, Y, Z or longitude, latitude, height. Without initial values the adjustment
+//! starts from poses computed directly from three points ([`three_points`]).
 //!
 //! ```
 //! use photocore::adjustment::Options;
@@ -49,25 +49,25 @@ pub use degenerate::Degeneracy;
 pub use solution::{AdjustedControl, AdjustedImage, Alternative, Solution};
 pub use three_points::{Placement, three_points};
 
-/// Three values as they are known beforehand.
+/// A-priori values of three unknowns.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    /// Observed values; NaN where nothing is known.
+    /// Observed values; NaN if unknown.
     pub value: [f64; 3],
     /// Standard deviations: infinite free, zero fixed.
     pub sd: [f64; 3],
 }
 
-/// A control point and its image.
+/// Control point and its image observation.
 #[derive(Debug, Clone, Copy)]
 pub struct ControlPoint {
     /// Coordinates in the object space.
     pub coordinates: [f64; 3],
-    /// Their standard deviations, finite: zero fixed.
+    /// Standard deviations of the coordinates, finite: zero fixed.
     pub sd: [f64; 3],
     /// Image coordinates in millimetres.
     pub xy: [f64; 2],
-    /// Their standard deviations in millimetres.
+    /// Standard deviations of the image coordinates in millimetres.
     pub xy_sd: [f64; 2],
 }
 
@@ -81,7 +81,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The six unknowns of a photo as a pose.
+    /// Converts the six unknowns of a photo to a pose.
     fn from_unknowns(values: &[f64]) -> Self {
         Self {
             position: std::array::from_fn(|k| values[k]),
@@ -94,46 +94,46 @@ impl Pose {
         [x, y, z, omega, phi, kappa]
     }
 
-    /// The same pose, its position counted from an origin.
+    /// Returns the pose with a position relative to an origin.
     fn counted_from(&self, origin: [f64; 3]) -> Self {
         let position = std::array::from_fn(|k| self.position[k] - origin[k]);
         Self { position, attitude: self.attitude }
     }
 }
 
-/// Where the partials of the image coordinates are formed.
+/// Evaluation point of the partials of the image coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Partials {
-    /// At the computed image positions: least squares.
+    /// Computed image positions: least squares.
     #[default]
     AtComputed,
-    /// At the measured image positions, as program W5344 does (USGS Computer Contribution 2, 1969, equations 4 and 5). Its
-    /// solution differs from least squares by residuals relative to the size of the image, in standard deviations.
+    /// Measured image positions, as in program W5344 (USGS Computer Contribution 2, 1969, equations 4 and 5). The relative difference from
+    /// the least-squares solution, in standard deviations, is the ratio of residuals to image size.
     AtMeasured,
 }
 
-/// One photo and its control.
+/// Photo and its control points.
 #[derive(Debug, Clone)]
 pub struct Resection {
-    /// Coordinates of positions and points.
+    /// Object space of positions and points.
     pub space: ObjectSpace,
-    /// Sense of the attitude angles.
+    /// Direction of the rotation matrix of the attitude angles.
     pub sense: RotationSense,
     /// Signed principal distance in millimetres: negative for the positive plane.
     pub principal_distance: f64,
-    /// The points.
+    /// Control points.
     pub points: Vec<ControlPoint>,
-    /// What is known of the position.
+    /// A-priori position.
     pub position: Known,
-    /// What is known of the attitude, omega, phi, kappa in radians.
+    /// A-priori attitude, omega, phi, kappa in radians.
     pub attitude: Known,
-    /// Initial values; without them a direct method finds some.
+    /// Initial values; None for a direct solution.
     pub start: Option<Pose>,
-    /// Where the partials are formed.
+    /// Evaluation point of the partials.
     pub partials: Partials,
 }
 
-/// Why there is no resection.
+/// Reason for a failed resection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum ResectionError {
     /// Fewer than three points.
@@ -142,19 +142,19 @@ pub enum ResectionError {
     /// All points on one line.
     #[error("the points are on one line, about which the photo can turn")]
     Collinear,
-    /// No position in front of which the points lie as they are seen.
+    /// No position has all points in front of the camera in the observed directions.
     #[error("no position sees the points in front of the camera as the image shows them")]
     NoPlacement,
-    /// The observations leave unknowns undetermined.
+    /// The observations do not determine all unknowns.
     #[error("the observations do not determine the pose")]
     Undetermined(Degeneracy),
-    /// The initial values put a point into the plane of the projection centre.
+    /// With the initial values a point is in the plane of the projection centre.
     #[error("the initial values give image coordinates that are not finite")]
     NotFinite,
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was stopped by the caller, or lacks memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// More than can be numbered.
+    /// The number of points exceeds the index range.
     #[error("too many points")]
     TooManyPoints,
 }

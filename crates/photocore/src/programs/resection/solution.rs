@@ -1,6 +1,6 @@
-//! The adjusted photo.
+//! Result of a resection.
 //!
-//! What an adjustment from one start has led to.
+//! Result of the adjustment from one initial pose.
 
 use super::degenerate::{Degeneracy, outside_cylinder};
 use super::{ControlPoint, Partials, Pose, Resection};
@@ -8,82 +8,82 @@ use crate::adjustment::{Adjustment, Evaluated, Model, Problem, Status, leading_m
 use crate::geometry::{ObjectSpace, Point, Projection, RotationSense, View};
 use crate::normals::GroupRows;
 
-/// A control point after the adjustment.
+/// Adjusted control point.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedControl {
     /// Coordinates in the object space.
     pub coordinates: [f64; 3],
-    /// Cofactors (a priori unit weight); NaN when not asked for.
+    /// Cofactors (a priori unit weight); NaN if not requested.
     pub cofactors: [[f64; 3]; 3],
-    /// Redundancy numbers of its coordinates as observations; zero unless weighted, NaN when not asked for.
+    /// Redundancy numbers of the coordinates as observations; zero unless weighted, NaN if not requested.
     pub redundancy: [f64; 3],
 }
 
-/// An image point after the adjustment.
+/// Adjusted image observation.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedImage {
     /// Observed minus computed, in millimetres.
     pub residual: [f64; 2],
-    /// Redundancy numbers; NaN when not asked for.
+    /// Redundancy numbers; NaN if not requested.
     pub redundancy: [f64; 2],
-    /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w); NaN when not asked
-    /// for, and where the redundancy is zero.
+    /// Residual / (standard deviation x root of the redundancy number), a priori unit weight (Baarda's w). NaN if not requested, or if the
+    /// redundancy is zero.
     pub standardized: [f64; 2],
     /// Partials of x and y with respect to position and attitude, at the solution.
     pub partials: [[f64; 6]; 2],
 }
 
-/// Another pose that fits.
+/// Alternative pose that fits the observations.
 #[derive(Debug, Clone, Copy)]
 pub struct Alternative {
-    /// The pose.
+    /// Pose.
     pub pose: Pose,
-    /// Its weighted sum of squares.
+    /// Weighted sum of squares.
     pub sum_of_squares: f64,
 }
 
-/// A resected photo, its points and images as in the input.
+/// Resected photo; points and image observations have the order of the input.
 #[derive(Debug)]
 pub struct Solution {
     /// Position and attitude.
     pub pose: Pose,
-    /// Their cofactors (a priori unit weight); NaN when not asked for.
+    /// Cofactors of the pose (a priori unit weight); NaN if not requested.
     pub cofactors: [[f64; 6]; 6],
-    /// Redundancy numbers of position and attitude as observations; zero unless weighted, NaN when not asked for.
+    /// Redundancy numbers of position and attitude as observations; zero unless weighted, NaN if not requested.
     pub redundancy: [f64; 6],
-    /// The control points.
+    /// Control points.
     pub points: Vec<AdjustedControl>,
-    /// Their images.
+    /// Image observations.
     pub images: Vec<AdjustedImage>,
-    /// The points that stand behind the camera, ascending: the equations hold for them as well.
+    /// Points behind the camera, ascending; the equations do not exclude them.
     pub behind: Vec<usize>,
-    /// Weighted sum of squares of everything observed.
+    /// Weighted sum of squares of all observations.
     pub sum_of_squares: f64,
-    /// Observations and weighted unknowns less unknowns.
+    /// Number of observations and weighted unknowns minus number of unknowns.
     pub degrees_of_freedom: i64,
-    /// The pose from which the adjustment started.
+    /// Initial pose of the adjustment.
     pub start: Pose,
     /// The pose after each iteration.
     pub history: Vec<Pose>,
-    /// Other minima whose sum of squares is larger by at most nine times the variance of unit weight (at least nine).
+    /// Other minima; their sum of squares exceeds the least by at most nine times the variance of unit weight (at least nine).
     pub alternatives: Vec<Alternative>,
-    /// A pose that fits as well, but is not determined, and why: with three points there may be one on the danger cylinder
-    /// beside others that are determined.
+    /// Reason why an alternative pose with a similar fit is not determined. With three points it may be on the danger cylinder, unlike the
+    /// other poses.
     pub undetermined: Option<Degeneracy>,
-    /// Distance of the projection centre from the right cylinder over the circle through three points, negative inside; None
-    /// unless there are exactly three. On this danger cylinder they do not determine the pose.
+    /// Distance of the projection centre from the right cylinder over the circle through three points, negative inside; None unless there
+    /// are exactly three. On this danger cylinder the pose is not determined.
     pub outside_danger_cylinder: Option<f64>,
     /// Status, iterations, counts.
     pub adjustment: Adjustment,
 }
 
-/// Poses that differ by less than this, in radians and in parts of the distance to the points, are the same minimum.
+/// Largest difference of poses of the same minimum, in radians and as a fraction of the distance to the points.
 const SAME: f64 = 1e-6;
-/// How much larger the sum of squares of another pose may be, in variances of unit weight: three standard deviations.
+/// Largest excess of the sum of squares of an alternative, in variances of unit weight: three standard deviations.
 const NINE: f64 = 9.0;
 
 impl Solution {
-    /// Takes the best of the adjustments, the others being alternatives; None where there is none.
+    /// Selects the best adjustment; the others are alternatives. None without any.
     pub(super) fn new(
         resection: &Resection,
         solved: Vec<Solved>,
@@ -154,7 +154,7 @@ impl Solution {
 }
 
 impl Resection {
-    /// Whether two poses are one minimum.
+    /// Returns whether two poses are the same minimum.
     fn same(&self, a: &Pose, b: &Pose) -> bool {
         let cartesian = |pose: &Pose| self.space.cartesian(pose.position);
         let (first, second) = (cartesian(a), cartesian(b));
@@ -167,7 +167,7 @@ impl Resection {
     }
 }
 
-/// Residuals, test values and partials, image by image.
+/// Returns residuals, test values and partials, observation by observation.
 fn images(
     model: &SinglePhoto,
     unknowns: &[f64],
@@ -190,7 +190,7 @@ fn images(
     (0..points.len()).map(image).collect()
 }
 
-/// An adjustment, and the problem it solved.
+/// Adjustment with its problem.
 pub(super) struct Solved {
     pub problem: Problem<SinglePhoto>,
     pub adjustment: Adjustment,
@@ -203,7 +203,7 @@ impl Solved {
         absolute(&self.adjustment.unknowns[self.problem.layout().all_retained()], self.origin)
     }
 
-    /// Weighted sum of squares at the end.
+    /// Returns the final weighted sum of squares.
     pub fn sum_of_squares(&self) -> f64 {
         let last = self.adjustment.iterations.last();
         last.map_or(self.adjustment.initial_sum_of_squares, |iteration| iteration.sum_of_squares)
@@ -218,26 +218,26 @@ impl Solved {
     }
 }
 
-/// A pose counted from the origin of the object space again.
+/// Converts a pose from the local origin to the object space.
 pub(super) fn absolute(values: &[f64], origin: [f64; 3]) -> Pose {
     let local = Pose::from_unknowns(values);
     local.counted_from(origin.map(|value| -value))
 }
 
-/// One photo of control points: the collinearity equations. The local blocks are the points, the retained block is the photo.
+/// Model of one photo of control points: the collinearity equations. The local blocks are the points, the retained block is the photo.
 #[derive(Debug)]
 pub struct SinglePhoto {
     pub space: ObjectSpace,
     pub sense: RotationSense,
-    /// In millimetres, signed.
+    /// Principal distance in millimetres, signed.
     pub principal_distance: f64,
     pub partials: Partials,
-    /// Coordinates counted from the local origin.
+    /// Control points relative to the local origin.
     pub points: Vec<ControlPoint>,
 }
 
 impl SinglePhoto {
-    /// The image of a point with its partials.
+    /// Returns the image of a point with its partials.
     #[inline]
     pub fn linearize(&self, photo: &View, point: &Point, index: usize) -> Projection {
         match self.partials {
@@ -246,7 +246,7 @@ impl SinglePhoto {
         }
     }
 
-    /// The points that stand behind the camera, ascending; the equations hold for them as well.
+    /// Returns the points behind the camera, ascending; the equations do not exclude them.
     pub fn behind(&self, unknowns: &[f64]) -> Vec<usize> {
         let At { photo, .. } = self.evaluated(unknowns);
         let points = unknowns[..3 * self.points.len()].as_chunks().0.iter().enumerate();
@@ -265,7 +265,7 @@ pub struct At<'a> {
 }
 
 impl SinglePhoto {
-    /// Photo and points at given values of the unknowns.
+    /// Evaluates photo and points at given values of the unknowns.
     pub fn evaluated(&self, unknowns: &[f64]) -> At<'_> {
         let (points, photo) = unknowns.split_at(3 * self.points.len());
         let points = points.as_chunks().0.iter().map(|&coordinates| Point::new(self.space, coordinates));

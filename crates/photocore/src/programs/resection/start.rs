@@ -1,4 +1,4 @@
-//! Initial poses without initial values: well-spread triples of points, each checked against all others.
+//! Initial poses from well-distributed triples of points, each checked against all others.
 
 use super::degenerate::collinear;
 use super::three_points::{Placement, three_points};
@@ -10,28 +10,28 @@ use crate::geometry::{
 };
 use crate::sorting::sort_by;
 
-/// Points among which triples are formed, and triples that are solved.
+/// Number of points from which triples are formed, and number of triples.
 const SPREAD_POINTS: usize = 8;
 const TRIPLES: usize = 12;
-/// Poses that are handed to the adjustment, and how far they are apart at least: radians, or parts of the mean distance.
+/// Maximum number of initial poses, and their minimum separation in radians or as a fraction of the mean distance.
 const STARTS: usize = 8;
 const APART: f64 = 0.05;
-/// A pose is tried when it fits at most this much worse than the best, in squared directions.
+/// Largest ratio of squared directional misfits of an initial pose and the best one.
 const WORSE: f64 = 400.0;
 
-/// What the photo sees: unit rays in the photo, and cartesian points.
+/// Unit rays in the photo, and cartesian points.
 pub(super) struct Sight {
     rays: Vec<Vector3>,
     pub points: Vec<Vector3>,
-    /// Mean square of the directional errors that the standard deviations of the image coordinates let expect.
+    /// Expected mean square of the directional errors, from the standard deviations of the image coordinates.
     noise: f64,
 }
 
 impl Resection {
-    /// Poses that fit, the best first.
+    /// Returns poses that fit, best first.
     ///
     /// # Errors
-    /// Too few points, points on one line, or rays that no pose in front of the camera explains.
+    /// Too few points, collinear points, or rays without a pose in front of the camera.
     pub(super) fn starts(&self) -> Result<Vec<Pose>, ResectionError> {
         let known = [self.position.value, self.attitude.value].concat();
         let given = known.iter().all(|value| value.is_finite());
@@ -47,7 +47,7 @@ impl Resection {
         if starts.is_empty() { Err(ResectionError::NoPlacement) } else { Ok(starts) }
     }
 
-    /// Whether the points could determine a pose from nothing else: three of them, not on one line.
+    /// Checks that the points can determine a pose: at least three of them, not on one line.
     pub(super) fn enough_points(&self) -> Result<(), ResectionError> {
         if self.points.len() < 3 {
             Err(ResectionError::TooFewPoints(self.points.len()))
@@ -58,7 +58,7 @@ impl Resection {
         }
     }
 
-    /// The rays of the images and the cartesian positions of the points.
+    /// Returns the rays of the image observations and the cartesian positions of the points.
     pub(super) fn sight(&self) -> Sight {
         let c = self.principal_distance;
         let camera = Perspective { principal_distance: c };
@@ -72,14 +72,14 @@ impl Resection {
         }
     }
 
-    /// Position and attitude of a placement.
+    /// Returns position and attitude of a placement.
     fn pose(&self, placement: &Placement) -> Pose {
         let position = self.space.coordinates(placement.centre);
         let vertical = match self.space {
             ObjectSpace::Rectangular => Matrix3::identity(),
             ObjectSpace::Geographic(_) => local_vertical(position[0], position[1]),
         };
-        // G = M R or M^T R
+        // G = M R or M^T R.
         let turn = placement.to_photo * vertical.transpose();
         let attitude = match self.sense {
             RotationSense::GroundToPhoto => rotation_angles(&turn),
@@ -88,7 +88,7 @@ impl Resection {
         Pose { position, attitude: nearest_turns(attitude, self.attitude.value) }
     }
 
-    /// Fixed components as they are given.
+    /// Replaces fixed components by the given values.
     fn held(&self, pose: Pose) -> Pose {
         let hold = |found: [f64; 3], known: &Known| -> [f64; 3] {
             std::array::from_fn(|k| if known.sd[k] == 0.0 { known.value[k] } else { found[k] })
@@ -98,7 +98,7 @@ impl Resection {
 }
 
 impl Sight {
-    /// Placements that fit, the best first, no two alike.
+    /// Returns different placements that fit, best first.
     fn placements(&self) -> Vec<Placement> {
         let mut scored: Vec<(f64, Placement)> = Vec::new();
         for [i, j, k] in self.triples() {
@@ -118,7 +118,7 @@ impl Sight {
         chosen
     }
 
-    /// Mean square of the chords between seen and computed directions; it grows to 4 behind the camera.
+    /// Returns the mean square of the chords between observed and computed directions; up to 4 behind the camera.
     fn misfit(&self, place: &Placement) -> f64 {
         let chord = |(ray, point): (&Vector3, &Vector3)| {
             let seen = unit(&(place.to_photo * (point - place.centre)));
@@ -135,7 +135,7 @@ impl Sight {
         angle < APART && offset.norm_squared() < APART * APART * from.norm_squared()
     }
 
-    /// The triples that span most, in the image and in space.
+    /// Returns the triples with the largest spans, in the image and in space.
     fn triples(&self) -> Vec<[usize; 3]> {
         let spread = self.spread();
         let mut triples: Vec<(f64, [usize; 3])> = Vec::new();
@@ -150,13 +150,13 @@ impl Sight {
         triples.into_iter().take(TRIPLES).map(|(_, triple)| triple).collect()
     }
 
-    /// Area of the triangle in the image (in directions) times its area in space.
+    /// Returns the area of the triangle in the image (in directions) times its area in space.
     fn span(&self, [i, j, k]: [usize; 3]) -> f64 {
         let area = |p: &[Vector3]| (p[j] - p[i]).cross(&(p[k] - p[i])).norm();
         area(&self.rays) * area(&self.points)
     }
 
-    /// Points far from each other in the image: each next one is the farthest from those chosen.
+    /// Selects distant points in the image: each point is the farthest from those chosen before.
     fn spread(&self) -> Vec<usize> {
         let mean = self.rays.iter().sum::<Vector3>() / self.rays.len() as f64;
         let chord = |ray: &Vector3, other: &Vector3| (ray - other).norm_squared();

@@ -1,4 +1,4 @@
-//! The orientation of a model.
+//! Orientation of a model by least squares.
 
 use std::ops::ControlFlow;
 
@@ -13,18 +13,18 @@ use crate::Threads;
 use crate::adjustment::{self, AdjustError, Event, Problem, Status, Stop};
 use crate::normals::{Layout, Ordering, System};
 
-/// Finds the seven parameters by least squares, on a thread of its own: control is never much work.
+/// Determines the seven parameters by least squares, on one new thread: control networks are small.
 ///
 /// # Errors
-/// Those of [`orient_on`]; a thread that cannot be started.
+/// The errors of [`orient_on`], or a thread that cannot be started.
 pub fn orient(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {
     orient_on(stations, options, &Threads::new(1)?, &mut adjustment::go_on)
 }
 
-/// The same on threads of the caller. `watch` is called on the calling thread; when it breaks, the adjustment stops.
+/// Determines the parameters on the caller's threads. `watch` is called on the calling thread; `Break` stops the adjustment.
 ///
 /// # Errors
-/// Control that does not determine the parameters, a start that cannot be had, a mirror image, an interruption.
+/// Control that does not determine the parameters, unavailable initial values, a mirror image, an interruption.
 pub fn orient_on(
     stations: &[Station],
     options: &Options,
@@ -33,7 +33,7 @@ pub fn orient_on(
 ) -> Result<Solution, SimilarityError> {
     let held = options.scale.is_some();
     determinacy::check_counts(stations, held)?;
-    // The solvers of the library ask how many threads there are: elsewhere that would start those of the whole process.
+    // The library's solvers query the number of threads, which would start the global pool outside of `install`.
     let chosen = threads.install(|| {
         let chosen = start::choose(stations, options.start, options.scale)?;
         determinacy::check_geometry(stations, &chosen.similarity, held).map(|()| chosen)
@@ -47,7 +47,7 @@ pub fn orient_on(
     }
 }
 
-/// The seven parameters by least squares with equal weights, in closed form where all control is full.
+/// Determines the seven parameters by least squares with equal weights, in closed form for full control.
 ///
 /// # Errors
 /// Control that does not determine the parameters, or a mirror image.
@@ -99,7 +99,7 @@ fn adjust(
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }
 }
 
-/// The least-squares problem: the control coordinates are local blocks of three, the seven parameters one retained block.
+/// Builds the least-squares problem: control coordinates are local blocks of three, the seven parameters one retained block.
 fn problem(
     stations: &[Station],
     start: &Similarity,

@@ -1,4 +1,4 @@
-//! Whether the control determines the seven parameters, and if not, why.
+//! Determinacy of the seven parameters by the control, and causes of a deficiency.
 
 use nalgebra::DMatrix;
 
@@ -9,17 +9,17 @@ use super::moments::EIGEN_STEPS;
 use super::transform::Similarity;
 use crate::geometry::{Matrix3, Vector3};
 
-/// A combination of parameters is not determined when a change of it moves the stations, in the known components, by less than this
-/// fraction of what the best determined one does.
+/// Relative effect on the known components, compared with the best determined combination of parameters, below which a combination is
+/// undetermined.
 const UNDETERMINED: f64 = 1e-6;
-/// Stations are in line when they are off it by less than this fraction of its length.
+/// Ratio of width to length below which stations are collinear.
 const IN_LINE: f64 = 1e-5;
-/// And nearly so with this fraction.
+/// Ratio of width to length below which stations are nearly collinear.
 const NEARLY_IN_LINE: f64 = 1e-2;
 
-/// Counts known components: seven at least, of these four horizontal (both X and Y among them) and three elevations. That is two
-/// horizontal pairs where they come in pairs (TB 19, section 6), but each coordinate counts by itself. A scale that is held takes the
-/// place of one horizontal coordinate.
+/// Checks the number of known components: at least seven, of which four are horizontal (both X and Y among them) and three are elevations.
+/// These are two horizontal pairs (TB 19, section 6), but each coordinate counts separately. A fixed scale replaces one horizontal
+/// coordinate.
 pub fn check_counts(stations: &[Station], held: bool) -> Result<(), SimilarityError> {
     let known = std::array::from_fn(|k| stations.iter().filter(|station| station.known()[k]).count());
     let [x, y, z] = known;
@@ -29,7 +29,7 @@ pub fn check_counts(stations: &[Station], held: bool) -> Result<(), SimilarityEr
     Ok(())
 }
 
-/// Looks for combinations of parameters that leave all known components where they are.
+/// Checks for combinations of parameters that do not change the known components.
 pub fn check_geometry(
     stations: &[Station],
     similarity: &Similarity,
@@ -43,12 +43,12 @@ pub fn check_geometry(
     Err(SimilarityError::Undetermined { cause, stations })
 }
 
-/// What makes control weak that still determines the orientation, and the stations concerned.
+/// Returns the cause of a weak but sufficient control geometry, and the stations concerned.
 pub fn weakness(stations: &[Station], similarity: &Similarity) -> Option<(Cause, Vec<usize>)> {
     shape(stations, similarity, NEARLY_IN_LINE)
 }
 
-/// Whether stations coincide or are in line, off it by less than a fraction of its length.
+/// Returns the cause and the stations if stations coincide or are collinear: width at most `tolerance` times length.
 fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Option<(Cause, Vec<usize>)> {
     let chosen = |of: &dyn Fn(&Station) -> bool| -> Vec<usize> {
         (0..stations.len()).filter(|&i| of(&stations[i])).collect()
@@ -57,7 +57,7 @@ fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Optio
         let position = |&i: &usize| similarity.control_at(&stations[i].model);
         list.iter().map(position).map(|at| Vector3::new(at.x, at.y, 0.0)).collect()
     };
-    // Written so that coincident positions are in line.
+    // Coincident positions are collinear by this test.
     let in_line = |positions: &[Vector3]| {
         let [length, width, _] = extents(positions);
         width <= tolerance * length
@@ -77,8 +77,8 @@ fn shape(stations: &[Station], similarity: &Similarity, tolerance: f64) -> Optio
     }
 }
 
-/// The condition number of the linearized misclosures: rotations in radians, the scale relative, translations as fractions of the size
-/// of the model; infinite where they are singular.
+/// Returns the condition number of the linearized misclosures; infinite for a singular matrix. Rotations are in radians, the scale is
+/// relative, translations are fractions of the size of the model.
 pub fn condition(stations: &[Station], similarity: &Similarity, held: bool) -> f64 {
     let size = spread(stations);
     let unit = [1.0, 1.0, 1.0, if held { 0.0 } else { similarity.scale }, size, size, size];
@@ -101,19 +101,19 @@ pub fn condition(stations: &[Station], similarity: &Similarity, held: bool) -> f
     (most / least).sqrt()
 }
 
-/// Root mean square distance of the stations from their centre, in model units.
+/// Returns the root mean square distance of the stations from their centre, in model units.
 pub fn spread(stations: &[Station]) -> f64 {
     let positions: Vec<Vector3> = stations.iter().map(|station| station.model).collect();
     extents(&positions).iter().map(|extent| extent * extent).sum::<f64>().sqrt()
 }
 
-/// Mean of the values that a function gives; zero when it gives none.
+/// Returns the mean of the values of a function; zero without values.
 pub fn known_mean(stations: &[Station], value: impl Fn(&Station) -> Option<f64>) -> f64 {
     let values: Vec<f64> = stations.iter().filter_map(value).collect();
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Root mean square extents of some positions along their principal axes, the largest first.
+/// Returns the root mean square extents of positions along their principal axes, the largest first.
 fn extents(positions: &[Vector3]) -> [f64; 3] {
     let count = positions.len().max(1) as f64;
     let mean = positions.iter().sum::<Vector3>() / count;
@@ -122,9 +122,9 @@ fn extents(positions: &[Vector3]) -> [f64; 3] {
     std::array::from_fn(|k| values[2 - k].max(0.0).sqrt())
 }
 
-/// Eigenvalues of a symmetric matrix, ascending; NaN when it is not finite.
+/// Returns the eigenvalues of a symmetric matrix, ascending; NaN if it is not finite.
 fn eigenvalues<const N: usize>(matrix: &[[f64; N]; N]) -> [f64; N] {
-    // Steps are limited: squares of large numbers overflow, and nothing would come to rest.
+    // The number of steps is limited: squares of large numbers overflow, and the iteration would not converge.
     let matrix = DMatrix::from_row_slice(N, N, matrix.as_flattened());
     let Some(eigen) = matrix.try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS) else { return [f64::NAN; N] };
     let mut values: [f64; N] = std::array::from_fn(|i| eigen.eigenvalues[i]);

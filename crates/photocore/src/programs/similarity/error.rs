@@ -1,4 +1,4 @@
-//! Why there is no orientation.
+//! Errors of the absolute orientation.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::Stopped;
 use crate::normals::LayoutError;
 
-/// Why control does not determine the orientation.
+/// Reason why control does not determine the orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
     /// The horizontal stations coincide in plan.
@@ -21,7 +21,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// A name for it.
+    /// Returns the name of the cause.
     pub fn name(self) -> &'static str {
         match self {
             Self::Coincident => "coincident",
@@ -49,39 +49,39 @@ impl fmt::Display for Cause {
     }
 }
 
-/// Why there is no orientation. Stations are indices.
+/// Reason for a failed orientation. Stations are indices.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SimilarityError {
-    /// Fewer known components than the seven parameters need, or too few of a kind.
+    /// Fewer known components than the seven parameters need, or too few of one kind.
     #[error(
         "insufficient control: {} known coordinates ({} X, {} Y, {} elevations)",
         known.iter().sum::<usize>(), known[0], known[1], known[2]
     )]
     Insufficient {
-        /// How many X, Y and Z are known.
+        /// Numbers of known X, Y and Z.
         known: [usize; 3],
     },
-    /// The geometry of the control leaves a combination of parameters undetermined.
+    /// The geometry of the control does not determine a combination of parameters.
     #[error("the control does not determine the orientation: {cause}")]
     Undetermined {
-        /// Why.
+        /// Cause of the deficiency.
         cause: Cause,
-        /// The stations concerned.
+        /// Stations concerned.
         stations: Vec<usize>,
     },
-    /// The report's start needs horizontal control at the first two stations, at different places.
+    /// The report's initial values need horizontal control at the first two stations, at different positions.
     #[error("the first two stations {0}")]
     FirstStations(&'static str),
     /// The scale is not positive: the model is a mirror image of its control.
     #[error("the scale became {0}: not positive")]
     Scale(f64),
-    /// The initial values give nothing finite.
+    /// The initial values give values that are not finite.
     #[error("the initial values give model coordinates that are not finite")]
     NotFinite,
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was stopped by the caller, or lacks memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// More than can be numbered.
+    /// The number of unknowns exceeds the index range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }

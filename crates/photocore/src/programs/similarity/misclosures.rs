@@ -1,10 +1,10 @@
 //! Statistics of the misclosures u = s X - A^T (x - B) of the known components: cofactors of the parameters, redundancy numbers and
 //! test values.
 //!
-//! Before the adjustment the misclosures of a station have the cofactors Q_m = s^2 Q_X + A^T Q_x A. With J their partials, the
-//! parameters have the cofactors Q = (sum J^T Q_m^-1 J)^-1, and the misclosures Q_u = Q_m - J Q J^T after the adjustment.
+//! A-priori misclosures of a station have the cofactors Q_m = s^2 Q_X + A^T Q_x A. With their partials J, the parameters have the cofactors
+//! Q = (sum J^T Q_m^-1 J)^-1, and the adjusted misclosures Q_u = Q_m - J Q J^T.
 //!
-//! Standard deviations as the adjustment gets them: in a unit of its own, and none so small that a misclosure drowns in rounding.
+//! Standard deviations are rescaled for the adjustment, with a lower limit against rounding of the misclosures.
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
@@ -16,10 +16,10 @@ use super::{SimilarityError, Station, determinacy};
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Vector3};
 
-/// A redundancy number below this is what rounding leaves of zero: a test value would be noise.
+/// Redundancy number below which a test value is rounding noise.
 const CHECKED: f64 = 1e-9;
 
-/// Cofactors of the tangent parameters (see [`Similarity`]), zero for a scale that is held; None when they are not determined.
+/// Returns the cofactors of the tangent parameters (see [`Similarity`]), zero for a fixed scale; None if they are not determined.
 pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity, held: bool) -> Option<Matrix7> {
     let mut normal = [[0.0; 7]; 7];
     for station in stations {
@@ -44,8 +44,8 @@ pub fn tangent_cofactors(stations: &[Station], similarity: &Similarity, held: bo
     Some(std::array::from_fn(|i| std::array::from_fn(|j| scale[i] * inverse[(i, j)] * scale[j])))
 }
 
-/// Redundancy numbers, the diagonal of Q_u Q_m^-1, and standardized misclosures u / root of the diagonal of Q_u (Baarda's w) of a
-/// station; NaN where unknown, and where a misclosure is not checked by any other.
+/// Returns the redundancy numbers, the diagonal of Q_u Q_m^-1, and standardized misclosures u / root of the diagonal of Q_u (Baarda's w) of
+/// a station. NaN if unknown, and for misclosures without redundancy.
 pub fn test(station: &Station, similarity: &Similarity, cofactors: &Matrix7) -> ([f64; 3], [f64; 3]) {
     let known = station.known();
     let before = cofactors_before(station, similarity);
@@ -62,7 +62,7 @@ pub fn test(station: &Station, similarity: &Similarity, cofactors: &Matrix7) -> 
     (redundancy, standardized)
 }
 
-/// Q_m; unknown components stand aside with unit cofactors.
+/// Returns Q_m; unknown components have unit cofactors without correlation.
 fn cofactors_before(station: &Station, similarity: &Similarity) -> Matrix3 {
     let known = station.known();
     let own = station.control_sd.map(|sd| (similarity.scale * sd).powi(2));
@@ -74,14 +74,14 @@ fn cofactors_before(station: &Station, similarity: &Similarity) -> Matrix3 {
     })
 }
 
-/// Partials of the misclosures; zero for unknown components.
+/// Returns the partials of the misclosures; zero for unknown components.
 fn known_partials(station: &Station, similarity: &Similarity) -> [[f64; 7]; 3] {
     let partials = similarity.misclosure_partials(&station.control, &station.model);
     let known = station.known();
     std::array::from_fn(|j| if known[j] { partials[j] } else { [0.0; 7] })
 }
 
-/// Q_m^-1 J.
+/// Returns Q_m^-1 J.
 fn weighted(before: &Matrix3, partials: &[[f64; 7]; 3]) -> Option<[[f64; 7]; 3]> {
     let mut result = [[0.0; 7]; 3];
     for i in 0..7 {
@@ -91,28 +91,28 @@ fn weighted(before: &Matrix3, partials: &[[f64; 7]; 3]) -> Option<[[f64; 7]; 3]>
     Some(result)
 }
 
-/// Standard deviations, as a fraction of the size of the model, to which those of the model are scaled inside at the most, and all of
-/// them at the least: the criterion of convergence must mean something where the unit weight is arbitrary, and where the standard
-/// deviations are far below the rounding of the coordinates.
+/// Size of the internal standard deviations, as a fraction of the size of the model: an upper limit of the median for the model, and a
+/// lower limit for all. The convergence criterion remains valid for an arbitrary unit weight, and for standard deviations far below the
+/// rounding of the coordinates.
 const INNER_SD: f64 = 1e-7;
-/// Beside the smallest positive standard deviation of its control, a model point is as good as exact with this fraction of it: the
-/// cofactors of its misclosures differ by 1e-8 of themselves, and the normal equations keep half of their digits.
+/// Standard deviation of an exact model point, as a fraction of the smallest positive standard deviation of its control. The cofactors of
+/// the misclosures change by 1e-8, and the normal equations retain half of their digits.
 const EXACT: f64 = 1e-4;
 
-/// Stations with their standard deviations multiplied by `inner`.
+/// Stations with standard deviations multiplied by `inner`.
 #[derive(Debug)]
 pub struct Weighted {
-    /// The stations.
+    /// Stations.
     pub stations: Vec<Station>,
-    /// The factor of all standard deviations.
+    /// Factor of all standard deviations.
     pub inner: f64,
 }
 
 impl Weighted {
-    /// Scales the standard deviations of some stations; those of the model are raised where they are as good as exact.
+    /// Scales the standard deviations of the stations; very small standard deviations of the model are increased.
     ///
     /// # Errors
-    /// Standard deviations that make no unit of weight.
+    /// Standard deviations that do not define a unit weight.
     pub fn new(stations: &[Station], start: &Chosen) -> Result<Self, SimilarityError> {
         let scale = start.similarity.scale;
         let misclosures = median(stations.iter().flat_map(|s| misclosure_sd(s, scale)));
@@ -141,14 +141,14 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Standard deviations of the known components that are neither exact nor without part.
+/// Returns the standard deviations of the known components that are neither exact nor infinite.
 fn positive_control_sd(station: &Station) -> impl Iterator<Item = f64> {
     let known = station.known();
     let sd = station.control_sd;
     (0..3).filter(move |&k| known[k] && sd[k] > 0.0).map(move |k| sd[k])
 }
 
-/// About the standard deviations of the misclosures of the known components, whatever the rotation.
+/// Returns approximate standard deviations of the misclosures of the known components, for any rotation.
 fn misclosure_sd(station: &Station, scale: f64) -> impl Iterator<Item = f64> {
     let known = station.known();
     let [x, y, z] = station.model_sd;

@@ -1,9 +1,9 @@
 //! Absolute orientation: the similarity x = s A X + B between a model and its control (C&GS Technical Bulletin 19, "TB 19").
 //!
-//! Each station has model coordinates x and any part of its control coordinates X. The observations are the model coordinates,
-//! as in the bulletin; control coordinates are unknowns of their own, fixed where they are known exactly, weighted where they have
-//! standard deviations, free where they are missing. Eliminating the free ones leaves the misclosures
-//! u = s X - A^T (x - B) of the known components: the form that is right for any mix of full, horizontal and height control.
+//! Each station has model coordinates x and any subset of its control coordinates X. The observations are the model coordinates, as in the
+//! bulletin. Control coordinates are unknowns: fixed if exact, weighted if they have standard deviations, free if missing. Elimination of
+//! the free ones leaves the misclosures u = s X - A^T (x - B) of the known components. They are valid for any mix of full, horizontal and
+//! height control.
 //!
 //! ```
 //! use photocore::geometry::Vector3;
@@ -46,81 +46,80 @@ pub use solution::{AdjustedStation, Solution};
 pub use start::Started;
 pub use transform::{Matrix7, Parameters, Similarity};
 
-/// A station: a point of the model with some of its control coordinates.
+/// Station: a point of the model with some of its control coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct Station {
-    /// Control coordinates X in ground units; NaN where unknown.
+    /// Control coordinates X in ground units; NaN if unknown.
     pub control: Vector3,
-    /// Their standard deviations; zero for an exact one, infinite for one that takes no part.
+    /// Standard deviations of the control coordinates; zero for an exact one, infinite for an unused one.
     pub control_sd: [f64; 3],
     /// Model coordinates x in model units.
     pub model: Vector3,
-    /// Their standard deviations; zero where those of the control are positive.
+    /// Standard deviations of the model coordinates; zero if the control has positive ones.
     pub model_sd: [f64; 3],
 }
 
 impl Station {
-    /// Which control coordinates take part.
+    /// Returns which control coordinates are used.
     pub fn known(&self) -> [bool; 3] {
         std::array::from_fn(|k| self.control[k].is_finite() && self.control_sd[k].is_finite())
     }
 
-    /// Whether both horizontal coordinates take part.
+    /// Returns whether both horizontal coordinates are used.
     fn pair(&self) -> bool {
         let [x, y, _] = self.known();
         x && y
     }
 
-    /// Whether the elevation takes part.
+    /// Returns whether the elevation is used.
     fn elevation(&self) -> bool {
         self.known()[2]
     }
 }
 
-/// How the iteration is carried out.
+/// Method of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// Least squares by the engine, until no unknown changes by a fraction of its standard deviation.
+    /// Least squares by the engine, until every change is below a fraction of its standard deviation.
     Rigorous,
-    /// The cycle of TB 19 with the misclosures of the known components: Gauss-Crout, until all corrections of angles are 1e-5
-    /// radian at the most.
+    /// Cycle of TB 19 with the misclosures of the known components: Gauss-Crout, until all corrections of angles are at most 1e-5 radian.
     Report,
-    /// The cycle of TB 19 with its own equations, missing control coordinates filled in from the last cycle.
+    /// Cycle of TB 19 with its own equations; missing control coordinates are replaced by results of the last cycle.
     FillIn,
 }
 
-/// Where the iteration starts.
+/// Initial values of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Start {
-    /// The report's values, unless they lead to a worse place than the closed form.
+    /// Report's values, unless they lead to a worse minimum than the closed form.
     Auto,
-    /// From the first two stations (TB 19, section 3).
+    /// Values from the first two stations (TB 19, section 3).
     Report,
     /// Horn's quaternion for full control; otherwise the best of the minima over all rotations.
     ClosedForm,
-    /// From a former result.
+    /// Values of a former result.
     Given(Parameters),
 }
 
-/// How to orient.
+/// Options of an orientation.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// How the iteration is carried out.
+    /// Method of the iteration.
     pub method: Method,
-    /// Where it starts.
+    /// Initial values.
     pub start: Start,
-    /// Iterations at the most.
+    /// Maximum number of iterations.
     pub max_iterations: usize,
-    /// Fraction of its standard deviation by which no unknown changes any more (rigorous method).
+    /// Convergence limit: change of an unknown as a fraction of its standard deviation (rigorous method).
     pub tolerance: f64,
-    /// Whether the cycles of the bulletin keep what they computed on their way.
+    /// Whether the cycles of the bulletin record intermediate results.
     pub trace: bool,
-    /// The scale that is held; six unknowns are left then.
+    /// Fixed scale; six unknowns remain.
     pub scale: Option<f64>,
 }
 
 impl Default for Options {
-    /// The rigorous method from the start that suits the control, to a hundred-thousandth of the standard deviations.
+    /// Returns the rigorous method with automatic initial values, converged to 1e-5 standard deviations.
     fn default() -> Self {
         Self {
             method: Method::Rigorous,

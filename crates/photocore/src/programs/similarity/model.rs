@@ -1,4 +1,4 @@
-//! The observation equations: model coordinates of stations whose control coordinates are unknowns too.
+//! Observation equations: model coordinates of stations with unknown control coordinates.
 
 use super::Station;
 use super::transform::Similarity;
@@ -6,22 +6,22 @@ use crate::adjustment::{Evaluated, Model};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 use crate::normals::GroupRows;
 
-/// Unknowns of the retained block: three changes of the rotation (omega, phi, kappa of a rotation after that of the start), s, t.
+/// Number of unknowns of the retained block: three changes of the rotation (omega, phi, kappa applied after the initial rotation), s, t.
 pub const CHANGES: usize = 7;
-/// Which of them is s.
+/// Index of s.
 pub const SCALE: usize = 3;
 
 /// Model coordinates as functions of control coordinates and the seven parameters (TB 19, equation 2.1).
 #[derive(Debug)]
 pub struct AsControl {
     start: Similarity,
-    /// Model coordinates from their centre.
+    /// Model coordinates relative to their centre.
     observed: Vec<Vector3>,
-    /// Which components of the control are free.
+    /// Whether each control component is free.
     free: Vec<[bool; 3]>,
 }
 
-/// The unknowns, and the rotation with its partials.
+/// Unknowns, and the rotation with its partials.
 struct At<'a> {
     model: &'a AsControl,
     control: Vec<Vector3>,
@@ -31,7 +31,7 @@ struct At<'a> {
 }
 
 impl AsControl {
-    /// The model of some stations; the changes of the rotation are counted from a start.
+    /// Creates the model of stations; changes of the rotation are relative to an initial similarity.
     pub fn new(stations: &[Station], start: &Similarity) -> Self {
         let centre = start.model_centre;
         let centred = |station: &Station| station.model - centre;
@@ -42,7 +42,7 @@ impl AsControl {
         }
     }
 
-    /// The similarity at given values of the seven unknowns.
+    /// Returns the similarity at given values of the seven unknowns.
     pub fn similarity(&self, changes: &[f64]) -> Similarity {
         let change = rotation([changes[0], changes[1], changes[2]]);
         Similarity {
@@ -66,7 +66,7 @@ impl Model for AsControl {
         })
     }
 
-    /// Carries free control coordinates over from the model.
+    /// Recomputes free control coordinates from the model.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let (control, changes) = unknowns.split_at_mut(3 * self.observed.len());
         let Similarity { rotation, scale, shift, .. } = self.similarity(changes);

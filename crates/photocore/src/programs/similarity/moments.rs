@@ -1,13 +1,13 @@
-//! The best similarity at any attitude, from moments of the stations.
+//! Best similarity for any attitude, from moments of the stations.
 //!
-//! With the rotation given, scale and translation follow in closed form, and the sum of squared misclosures depends on the nine
-//! numbers of A alone: with a_j the columns of A, x and X_j counted from their means over the stations where component j is known,
+//! For a given rotation, scale and translation follow in closed form. The sum of squared misclosures is then a function of the nine
+//! elements of A. With the columns a_j of A, and x and X_j relative to their means over the stations with known component j:
 //!
 //! S(A) = sum_j a_j^T M_j a_j - (sum_j a_j . c_j)^2 / V,   M_j = sum x x^T,  c_j = sum x X_j,  V = sum_j sum X_j^2.
 //!
-//! With s held S(A) = sum_j a_j^T M_j a_j - 2 s sum_j a_j . c_j + s^2 V.
+//! For a fixed s: S(A) = sum_j a_j^T M_j a_j - 2 s sum_j a_j . c_j + s^2 V.
 //!
-//! Its minima over all rotations are found without the stations and without initial values.
+//! The minima over all rotations are computed from the moments, without initial values.
 
 use nalgebra::Matrix4;
 
@@ -17,18 +17,18 @@ use crate::geometry::angle_axis::quaternion_rotation;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Vector3, rotation};
 
-/// Steps of one descent at the most, and the rotation (rad) below which it has arrived.
+/// Maximum number of steps of one descent, and the rotation step (rad) that ends it.
 const STEPS: usize = 100;
 const ARRIVED: f64 = 1e-13;
-/// Rotations whose elements differ by less are one minimum.
+/// Largest difference of the elements of two rotations of the same minimum.
 const SAME: f64 = 1e-6;
-/// A descent that comes so near to a minimum ends there.
+/// Distance to a known minimum that ends a descent.
 const NEAR: f64 = 1e-3;
-/// Values of S are good to this fraction of its largest terms.
+/// Rounding of S as a fraction of its largest terms.
 const ROUNDING: f64 = 1e-14;
-/// Steps of the eigenvalue iteration at the most.
+/// Maximum number of steps of the eigenvalue iteration.
 pub const EIGEN_STEPS: usize = 1000;
-/// Descents start every sixty degrees.
+/// Spacing of the initial angles of the descents.
 const SIXTH: f64 = std::f64::consts::TAU / 6.0;
 
 /// Moments of the known components.
@@ -46,7 +46,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// The moments of some stations, counted from given centres; the scale may be held.
+    /// Computes the moments of stations relative to given centres; the scale may be fixed.
     pub fn new(
         stations: &[Station],
         control_centre: Vector3,
@@ -87,8 +87,8 @@ impl Moments {
         (self.model_mean[j], self.control_mean[j]) = (mean, control_mean);
     }
 
-    /// The similarities that fit best: by Horn's quaternion when all control is full, otherwise every minimum found from rotations
-    /// sixty degrees apart. Mirror images (scale not positive) are left out.
+    /// Returns the best similarities: one by Horn's quaternion for full control, otherwise every minimum found from rotations sixty degrees
+    /// apart. Mirror images (scale not positive) are excluded.
     ///
     /// # Errors
     /// Moments that are not finite.
@@ -108,7 +108,7 @@ impl Moments {
         Ok(minima)
     }
 
-    /// The minimum that a descent from a rotation leads to; None when the model would be a mirror image there, or when it comes near
+    /// Returns the minimum reached by a descent from a rotation. None if the model is a mirror image there, or if the descent approaches
     /// one of the `known` minima.
     ///
     /// Gauss-Newton with damping (Levenberg-Marquardt) on three small rotations; the scale is eliminated.
@@ -137,7 +137,7 @@ impl Moments {
         self.similarity(&at)
     }
 
-    /// Normal matrix and gradient of three small rotations about the model axes: dr_j = a_j x x, the partials of the misclosures.
+    /// Returns normal matrix and gradient of three small rotations about the model axes: dr_j = a_j x x, the partials of the misclosures.
     fn linearize(&self, a: &Matrix3) -> (Matrix3, Vector3) {
         let scale = self.scale(a);
         let (mut normal, mut gradient, mut by_scale) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
@@ -162,7 +162,7 @@ impl Moments {
         self.held.unwrap_or_else(|| self.product(a) / self.v)
     }
 
-    /// S(A).
+    /// Returns S(A).
     fn value(&self, a: &Matrix3) -> f64 {
         let model: f64 = a.column_iter().zip(&self.m).map(|(column, m)| column.dot(&(m * column))).sum();
         let scale = self.scale(a);
@@ -173,7 +173,7 @@ impl Moments {
         self.m.iter().map(Matrix3::trace).sum()
     }
 
-    /// The similarity with a given rotation; None when its scale is not positive.
+    /// Returns the similarity with a given rotation; None if its scale is not positive.
     fn similarity(&self, a: &Matrix3) -> Option<Similarity> {
         let scale = self.scale(a);
         // The mean of each misclosure vanishes: (A^T t)_j = a_j . x - s X_j in the means.
@@ -188,8 +188,8 @@ impl Moments {
         })
     }
 
-    /// The rotation that fits full control best: the eigenvector of the largest eigenvalue of a 4 x 4 matrix is its quaternion
-    /// (B. K. P. Horn, J. Opt. Soc. Am. A 4, 1987).
+    /// Returns the best rotation for full control: its quaternion is the eigenvector of the largest eigenvalue of a 4 x 4 matrix (B. K. P.
+    /// Horn, J. Opt. Soc. Am. A 4, 1987).
     fn horn(&self) -> Result<Matrix3, SimilarityError> {
         let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = self.c.map(<[f64; 3]>::from);
         #[rustfmt::skip]

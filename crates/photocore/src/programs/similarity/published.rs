@@ -1,9 +1,9 @@
-//! The cycle of TB 19: linearize, accumulate normal equations, solve by Gauss-Crout, correct the angles; sections 2 to 4.
+//! Cycle of TB 19, sections 2 to 4: linearize, accumulate normal equations, solve by Gauss-Crout, correct the angles.
 //!
-//! Corrected where the bulletin's program is at fault: angles are kept and not their sines, missing coordinates are known to be
-//! missing, and there is a limit of cycles.
+//! Three faults of the bulletin's program are corrected: angles are stored instead of their sines, missing coordinates are marked, and the
+//! number of cycles is limited.
 //!
-//! The Gauss-Crout scheme of TB 19, section 4.
+//! The Gauss-Crout scheme follows TB 19, section 4.
 
 use super::error::{Cause, SimilarityError};
 use super::model::SCALE;
@@ -11,24 +11,24 @@ use super::transform::{Parameters, Similarity};
 use super::{Method, Options, Station};
 use crate::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
 
-/// The cycles end when all three corrections of angles are at most this, in radians.
+/// Largest correction of an angle, in radians, that ends the cycles.
 const ANGLE: f64 = 1e-5;
 
-/// Where the cycles ended.
+/// Result of the cycles.
 #[derive(Debug)]
 pub struct Cycles {
     pub similarity: Similarity,
     /// Largest correction of an angle in each cycle, radians.
     pub corrections: Vec<f64>,
-    /// What each cycle computed on its way, where it was asked for.
+    /// Intermediate results of each cycle, if requested.
     pub traces: Vec<Trace>,
     pub converged: bool,
 }
 
-/// What one cycle computed on its way: what the text before the suggested program has printed under sense switches.
+/// Intermediate results of one cycle: the values that the suggested program of the text prints under sense switches.
 #[derive(Debug, Clone)]
 pub struct Trace {
-    /// A as the cycle began (after statement 8).
+    /// A at the start of the cycle (after statement 8).
     pub rotation: Matrix3,
     /// Station, component and the eight P-values of every equation (after 27): omega, phi, kappa, s, three translations, constant.
     pub equations: Vec<(usize, usize, [f64; 8])>,
@@ -42,7 +42,7 @@ pub struct Trace {
     pub parameters: [f64; 7],
 }
 
-/// Carries out the cycles from given initial values.
+/// Iterates the cycles from given initial values.
 pub fn iterate(
     stations: &[Station],
     options: &Options,
@@ -105,7 +105,7 @@ pub fn iterate(
     Ok(Cycles { similarity, corrections, traces, converged: false })
 }
 
-/// Rows of the misclosures u = s X - A^T (x - B), constant -u (specification, section 3).
+/// Returns the rows of the misclosures u = s X - A^T (x - B), constant -u (specification, section 3).
 fn misclosure_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &Station) -> [[f64; 8]; 3] {
     let reduced = similarity.reduced(&station.model);
     let u = similarity.misclosure(&station.control, &station.model);
@@ -117,7 +117,7 @@ fn misclosure_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &S
     })
 }
 
-/// Rows of the bulletin, v = s A X + B - x, constant -v (equations 2.10), with missing X as the last cycle gives it.
+/// Returns the rows of the bulletin, v = s A X + B - x, constant -v (equations 2.10); missing X are results of the last cycle.
 fn bulletin_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &Station) -> [[f64; 8]; 3] {
     let known = station.known();
     let carried = similarity.control_at(&station.model);
@@ -146,13 +146,13 @@ fn bulletin_rows(similarity: &Similarity, partials: &[Matrix3; 3], station: &Sta
 /// Seven normal equations with their right-hand side as the eighth column.
 pub type Normal = [[f64; 8]; 7];
 
-/// A pivot below this fraction of its diagonal element before reduction is rounding error.
+/// Pivot, as a fraction of the unreduced diagonal element, below which the matrix is singular.
 const SINGULAR: f64 = 1e-13;
 
-/// Solves seven normal equations C (column 8: right-hand side) by the auxiliary matrix D (equation 4.4: columns from left to
-/// right, unscaled on and below the diagonal, divided by the diagonal above) and the back solution E (equation 4.5).
+/// Solves seven normal equations C (column 8: right-hand side). The auxiliary matrix D (equation 4.4) has columns from left to right,
+/// unscaled on and below the diagonal, divided by the diagonal above. The back solution is E (equation 4.5).
 ///
-/// Returns D and E; None when a pivot vanishes, which the bulletin does not look at.
+/// Returns D and E; None if a pivot vanishes, which the bulletin does not check.
 pub fn gauss_crout(c: &Normal) -> Option<(Normal, [f64; 7])> {
     let mut d = [[0.0; 8]; 7];
     for j in 0..8 {

@@ -1,4 +1,4 @@
-//! The oriented model.
+//! Result of an absolute orientation.
 
 use super::error::{Cause, SimilarityError};
 use super::misclosures::Weighted;
@@ -10,16 +10,16 @@ use super::{Station, determinacy, misclosures};
 use crate::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
 use crate::geometry::{Matrix3, Vector3};
 
-/// A station after the orientation. What is unknown is NaN.
+/// Station after the orientation. Unknown values are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedStation {
     /// u = s X - A^T (x - B) of the known components, in control axes and model units.
     pub misclosure: Vector3,
     /// v = s A X + B - x with the adjusted X (TB 19, equation 5.1), in model axes and units.
     pub model_residual: Vector3,
-    /// Adjusted control coordinates, in ground units; where unknown, what the model gives.
+    /// Adjusted control coordinates, in ground units; unknown ones are computed from the model.
     pub control: Vector3,
-    /// Their cofactors (a priori unit weight).
+    /// Cofactors of the control coordinates (a priori unit weight).
     pub cofactors: Matrix3,
     /// Redundancy numbers of the known components: they sum to the degrees of freedom.
     pub redundancy: [f64; 3],
@@ -27,39 +27,39 @@ pub struct AdjustedStation {
     pub standardized: [f64; 3],
 }
 
-/// An oriented model.
+/// Oriented model.
 #[derive(Debug)]
 pub struct Solution {
-    /// The similarity.
+    /// Similarity.
     pub similarity: Similarity,
-    /// Where the iteration started.
+    /// Initial similarity of the iteration.
     pub initial: Similarity,
-    /// Which initial values these were.
+    /// Source of the initial values.
     pub started: Started,
-    /// Other orientations that fit as well.
+    /// Alternative orientations with a similar fit.
     pub alternatives: Vec<Similarity>,
-    /// How the iteration ended.
+    /// Status at the end of the iteration.
     pub status: Status,
-    /// Every iteration of the engine; none with the cycles of the bulletin.
+    /// Iterations of the engine; empty for the cycles of the bulletin.
     pub iterations: Vec<Iteration>,
     /// Largest correction of an angle in each cycle of the bulletin, radians.
     pub cycles: Option<Vec<f64>>,
-    /// What each of these cycles computed on its way, where it was asked for.
+    /// Intermediate results of these cycles, if requested.
     pub traces: Vec<Trace>,
     /// Cofactors of the tangent parameters (see [`Similarity`]), a priori unit weight.
     pub tangent_cofactors: Matrix7,
     /// Condition number of the linearized misclosures.
     pub condition: f64,
-    /// What makes the control weak, and the stations concerned.
+    /// Cause of weak control, and the stations concerned.
     pub weakness: Option<(Cause, Vec<usize>)>,
     /// Weighted sum of squares.
     pub sum_of_squares: f64,
-    /// The stations.
+    /// Stations.
     pub stations: Vec<AdjustedStation>,
 }
 
 impl Solution {
-    /// Reads the solution out of an adjustment, whose standard deviations are multiplied by `inner`.
+    /// Creates the solution from an adjustment with standard deviations multiplied by `inner`.
     pub(super) fn new(
         Weighted { stations, inner }: &Weighted,
         problem: &Problem<AsControl>,

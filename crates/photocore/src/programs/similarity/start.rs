@@ -1,4 +1,4 @@
-//! Initial values.
+//! Initial values of the absolute orientation.
 
 use super::determinacy::{known_mean, spread};
 use super::moments::Moments;
@@ -7,36 +7,36 @@ use super::{SimilarityError, Start, Station};
 use crate::geometry::{Vector3, rotation};
 use crate::sorting::sort_by;
 
-/// Another minimum fits as well when its sum of squares is at most this multiple of the least.
+/// Largest ratio of sums of squares of another minimum and the best one, for an equal fit.
 const AS_WELL: f64 = 4.0;
-/// Initial values with direction cosines as near as this to those of the goal lead there.
+/// Largest difference of direction cosines from which initial values lead to the goal.
 const CLOSE: f64 = 0.5;
-/// Rotations whose direction cosines are as near as this are one minimum.
+/// Largest difference of the direction cosines of two rotations of the same minimum.
 const SAME: f64 = 1e-4;
-/// Misclosures below this fraction of the size of the model are rounding.
+/// Misclosures, as a fraction of the size of the model, that are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Which initial values were taken.
+/// Source of the initial values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Started {
-    /// Those of a former result.
+    /// Former result.
     Restart,
-    /// Those of the report.
+    /// Values of the report.
     Report,
-    /// Those of the closed form.
+    /// Closed form.
     ClosedForm,
 }
 
-/// Initial values, and what else might have been taken.
+/// Initial values, and alternatives.
 #[derive(Debug)]
 pub struct Chosen {
     pub similarity: Similarity,
     pub started: Started,
-    /// Other orientations that fit as well.
+    /// Alternative orientations with a similar fit.
     pub alternatives: Vec<Similarity>,
 }
 
-/// Chooses initial values as asked; the scale may be held.
+/// Chooses initial values by the requested method; the scale may be fixed.
 pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<Chosen, SimilarityError> {
     let (control_centre, model_centre) = centres(stations);
     let only = |similarity, started| Chosen { similarity, started, alternatives: vec![] };
@@ -55,7 +55,7 @@ pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<C
             let sum = |similarity: &Similarity| sum_of_squares(stations, similarity);
             sort_by(&mut minima, &|a, b| sum(a).total_cmp(&sum(b)));
             let Some(best) = minima.first().copied() else {
-                // Only mirror images fit: let the report's values show it.
+                // All minima are mirror images: the report's values will expose it.
                 return report.map(|r| only(r, Started::Report)).ok_or(SimilarityError::Scale(f64::NAN));
             };
             let rounding = (ROUNDING * spread(stations)).powi(2);
@@ -72,7 +72,7 @@ pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<C
     }
 }
 
-/// Means of the known control coordinates and of the model.
+/// Returns the means of the known control coordinates and of the model.
 fn centres(stations: &[Station]) -> (Vector3, Vector3) {
     let control = |k: usize, _| known_mean(stations, |s| s.known()[k].then(|| s.control[k]));
     let model = |k: usize, _| known_mean(stations, |s| Some(s.model[k]));
@@ -87,13 +87,13 @@ fn sum_of_squares(stations: &[Station], similarity: &Similarity) -> f64 {
     stations.iter().map(squares).sum()
 }
 
-/// Largest difference of the direction cosines of two rotations.
+/// Returns the largest difference of the direction cosines of two rotations.
 fn apart(a: &Similarity, b: &Similarity) -> f64 {
     (a.rotation - b.rotation).amax()
 }
 
-/// Initial values from the first two stations (TB 19, section 3, with kappa = theta_X - theta_x in its right quadrant):
-/// omega = phi = 0, s from the distance, translations as means.
+/// Returns initial values from the first two stations (TB 19, section 3, with kappa = theta_X - theta_x in the right quadrant): omega = phi
+/// = 0, s from the distance, translations as means.
 fn report(
     stations: &[Station],
     control_centre: Vector3,
@@ -124,7 +124,7 @@ fn report(
         control_centre,
         model_centre,
     };
-    // With omega = phi = 0 neither sum needs a coordinate that is missing.
+    // With omega = phi = 0 neither sum needs a missing coordinate.
     let shift = |station: &Station, j: usize| {
         let known = station.known();
         let centred = similarity.centred(&station.control);

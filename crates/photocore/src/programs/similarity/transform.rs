@@ -1,8 +1,8 @@
-//! The similarity x = s A X + B of a model and its control, its inverse, and the partials of both.
+//! Similarity x = s A X + B of a model and its control, its inverse, and the partials of both.
 
 use crate::geometry::{Matrix3, Vector3, rotation_angles};
 
-/// The seven parameters of x = s A X + B.
+/// Seven parameters of x = s A X + B.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
     /// Rotation matrix A = K Phi Omega (TB 19, equation 2.3).
@@ -13,11 +13,10 @@ pub struct Parameters {
     pub translation: Vector3,
 }
 
-/// A similarity counted from a centre in each system, so that large coordinates cost no digits:
-/// x - c_x = s A (X - c_X) + t.
+/// Similarity relative to a centre in each system, which preserves the digits of large coordinates: x - c_x = s A (X - c_X) + t.
 ///
-/// Its partials and cofactors are those of seven *tangent parameters*: three small rotations r about the model axes,
-/// `A <- (I - [r]x) A`, then s, then t. They are regular at every attitude; omega and kappa are not.
+/// Partials and cofactors refer to seven *tangent parameters*: three small rotations r about the model axes, `A <- (I - [r]x) A`, then s,
+/// then t. They are regular at every attitude; omega and kappa are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
     /// Rotation matrix A.
@@ -32,52 +31,51 @@ pub struct Similarity {
     pub model_centre: Vector3,
 }
 
-/// Covariances and partials of seven parameters in the order of their unknowns.
+/// Matrix of the seven parameters in the order of their unknowns, for covariances and partials.
 pub type Matrix7 = [[f64; 7]; 7];
 
 impl Similarity {
-    /// Counts given parameters from given centres.
+    /// Converts parameters to a similarity relative to given centres.
     pub fn from_parameters(parameters: &Parameters, control_centre: Vector3, model_centre: Vector3) -> Self {
         let Parameters { rotation, scale, translation } = *parameters;
         let shift = translation + scale * (rotation * control_centre) - model_centre;
         Self { rotation, scale, shift, control_centre, model_centre }
     }
 
-    /// The parameters of x = s A X + B: B = t + c_x - s A c_X.
+    /// Returns the parameters of x = s A X + B: B = t + c_x - s A c_X.
     pub fn parameters(&self) -> Parameters {
         let moved = self.rotation * self.control_centre;
         let translation = self.shift + self.model_centre - self.scale * moved;
         Parameters { rotation: self.rotation, scale: self.scale, translation }
     }
 
-    /// Omega, phi, kappa in radians.
+    /// Returns omega, phi, kappa in radians.
     pub fn angles(&self) -> [f64; 3] {
         rotation_angles(&self.rotation)
     }
 
-    /// x - c_x - t, in model units: what the rotation and the scale alone carry into control.
+    /// Returns x - c_x - t in model units, the argument of the inverse rotation and scale.
     pub(super) fn reduced(&self, model: &Vector3) -> Vector3 {
         model - self.model_centre - self.shift
     }
 
-    /// X - c_X.
+    /// Returns X - c_X.
     pub(super) fn centred(&self, control: &Vector3) -> Vector3 {
         control - self.control_centre
     }
 
-    /// X of a model point (TB 19, equation 2.2).
+    /// Returns X of a model point (TB 19, equation 2.2).
     pub fn control_at(&self, model: &Vector3) -> Vector3 {
         self.control_centre + self.rotation.tr_mul(&self.reduced(model)) / self.scale
     }
 
-    /// u = s X - A^T (x - B): what is missing between a control point and its model point, in control axes and model units.
-    /// NaN where X is.
+    /// Returns the misclosure u = s X - A^T (x - B) of a control point and its model point, in control axes and model units. NaN if X is
+    /// NaN.
     pub(super) fn misclosure(&self, control: &Vector3, model: &Vector3) -> Vector3 {
         self.scale * self.centred(control) - self.rotation.tr_mul(&self.reduced(model))
     }
 
-    /// Partials of the misclosures with respect to the tangent parameters . The column of the
-    /// scale is NaN where X is.
+    /// Returns the partials of the misclosures with respect to the tangent parameters. The column of the scale is NaN if X is NaN.
     pub(super) fn misclosure_partials(&self, control: &Vector3, model: &Vector3) -> [[f64; 7]; 3] {
         let reduced = self.reduced(model);
         let centred = self.centred(control);
@@ -88,16 +86,16 @@ impl Similarity {
         })
     }
 
-    /// X of a model point and its partials with respect to the tangent parameters.
+    /// Returns X of a model point and its partials with respect to the tangent parameters.
     fn control_with_partials_at(&self, model: &Vector3) -> (Vector3, [[f64; 7]; 3]) {
         let control = self.control_at(model);
-        // u = 0 holds at X; dX = -du / s.
+        // u = 0 at X; dX = -du / s.
         let partials = self.misclosure_partials(&control, model).map(|row| row.map(|p| -p / self.scale));
         (control, partials)
     }
 
-    /// X of a model point and its covariance from those of the tangent parameters and the standard deviations of the point itself:
-    /// J Q J^T + A^T Q_x A / s^2.
+    /// Returns X of a model point and its covariance J Q J^T + A^T Q_x A / s^2. Q are the cofactors of the tangent parameters, Q_x the
+    /// variances of the point.
     pub fn transform(
         &self,
         model: &Vector3,
@@ -110,14 +108,14 @@ impl Similarity {
         (control, Matrix3::from_fn(|i, j| result[i][j]) + own)
     }
 
-    /// A^T Q_x A of independent model coordinates.
+    /// Returns A^T Q_x A of independent model coordinates.
     pub(super) fn rotated_variances(&self, model_sd: &[f64; 3]) -> Matrix3 {
         let variances = Matrix3::from_diagonal(&model_sd.map(|sd| sd * sd).into());
         self.rotation.tr_mul(&(variances * self.rotation))
     }
 
-    /// Partials of omega, phi, kappa, s, b1, b2, b3 with respect to the tangent parameters; those of omega and kappa grow without
-    /// bound where phi comes near 90 degrees, where the two turn about one axis.
+    /// Returns the partials of omega, phi, kappa, s, b1, b2, b3 with respect to the tangent parameters. The partials of omega and kappa
+    /// diverge as phi approaches 90 degrees: both rotations then have the same axis.
     pub fn parameter_partials(&self) -> Matrix7 {
         let mut partials = identity();
         let rates = inverse_rates(self.angles());
@@ -125,7 +123,7 @@ impl Similarity {
         let lever = -(self.scale * moved).cross_matrix();
         for i in 0..3 {
             (0..3).for_each(|k| partials[i][k] = rates[(i, k)]);
-            // dB = dt + s r x (A c_X) - A c_X ds
+            // dB = dt + s r x (A c_X) - A c_X ds.
             partials[4 + i][3] = -moved[i];
             (0..3).for_each(|k| partials[4 + i][k] = lever[(i, k)]);
         }
@@ -133,7 +131,7 @@ impl Similarity {
     }
 }
 
-/// J Q J^T.
+/// Returns J Q J^T.
 pub(super) fn propagate<const N: usize, const M: usize>(
     partials: &[[f64; M]; N],
     cofactors: &[[f64; M]; M],
@@ -155,8 +153,8 @@ fn identity() -> Matrix7 {
     std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
 }
 
-/// Partials of omega, phi, kappa with respect to three small rotations r: the inverse of r = (K Phi e1) domega + (K e2) dphi
-/// + e3 dkappa.
+/// Returns the partials of omega, phi, kappa with respect to three small rotations r: the inverse of r = (K Phi e1) domega + (K e2) dphi +
+/// e3 dkappa.
 fn inverse_rates([_, phi, kappa]: [f64; 3]) -> Matrix3 {
     let ((sp, cp), (sk, ck)) = (phi.sin_cos(), kappa.sin_cos());
     Matrix3::new(ck / cp, -sk / cp, 0.0, sk, ck, 0.0, -ck * sp / cp, sk * sp / cp, 1.0)

@@ -1,4 +1,4 @@
-//! The adjustment of a calibration.
+//! Adjustment of a stellar calibration.
 
 use std::ops::ControlFlow;
 
@@ -9,20 +9,20 @@ use crate::adjustment::{self, AdjustError, Event, Linearized, Phase, Problem};
 use crate::normals::{Layout, LayoutError, Ordering, System};
 
 impl Calibration {
-    /// Adjusts by least squares with exact partials, on threads of its own.
+    /// Adjusts by least squares with exact partials, on a new thread pool.
     ///
     /// # Errors
-    /// Those of [`Calibration::adjust_on`]; threads that cannot be started.
+    /// The errors of [`Calibration::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Solution, StellarError> {
         self.adjust_on(options, &Threads::new(options.adjustment.threads)?, &mut adjustment::go_on)
     }
 
-    /// The same on threads of the caller.
+    /// Adjusts on the caller's threads.
     ///
-    /// `watch` is called on the calling thread; when it breaks, the adjustment stops.
+    /// `watch` is called on the calling thread and stops the adjustment by returning `Break`.
     ///
     /// # Errors
-    /// A calibration that contradicts itself or leaves unknowns undetermined; an interruption.
+    /// An inconsistent calibration, undetermined unknowns, or an interruption.
     pub fn adjust_on(
         &self,
         options: &Options,
@@ -43,18 +43,18 @@ impl Calibration {
         Solution::new(self, options, &problem, adjusted, whole)
     }
 
-    /// The parameters that no image, no weight and not the axis touches at the initial values, fixed ones excepted: the centre of a
-    /// distortion that is zero.
+    /// Returns the parameters without effect on observations, weights and axis at the initial values, except fixed ones. An example is the
+    /// centre of a zero distortion.
     ///
     /// # Errors
-    /// A calibration that contradicts itself; stars without images at the initial values.
+    /// An inconsistent calibration, or stars without images at the initial values.
     pub fn without_effect(&self, threads: &Threads) -> Result<Vec<usize>, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Exact))?;
         let normal = self.formed(&problem, vec![], threads)?;
         Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
     }
 
-    /// The normal equations at the initial values, some unknowns held.
+    /// Forms the normal equations at the initial values, with some unknowns fixed.
     pub(super) fn formed(
         &self,
         problem: &Problem<StarImages<'_>>,
@@ -67,7 +67,7 @@ impl Calibration {
         if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
 
-    /// Says of which stars and parameters an error of the engine tells.
+    /// Translates an error of the engine to the stars and parameters concerned.
     pub(super) fn named(
         &self,
         problem: &Problem<StarImages<'_>>,
@@ -80,7 +80,7 @@ impl Calibration {
                 stars.dedup();
                 StellarError::UndeterminedStars(stars)
             }
-            // The initial values are those that leave parameters undetermined.
+            // The reported parameters are undetermined at the initial values.
             AdjustError::Undetermined(_) => {
                 let initial = problem.initial.clone();
                 let normal = Linearized::form(problem, None, initial, vec![], threads, &mut go_on);
@@ -99,7 +99,7 @@ impl Calibration {
         }
     }
 
-    /// The stars that have no image in the equations of all images.
+    /// Returns the stars without an image, given the equations of all images.
     pub(super) fn unseen(&self, rows: &[Rows]) -> Vec<usize> {
         let images = self.images.iter().zip(rows);
         let lost = images.filter(|(_, rows)| rows.constant.iter().any(|value| !value.is_finite()));
@@ -109,7 +109,7 @@ impl Calibration {
         stars
     }
 
-    /// Number of parameters: attitudes and common ones.
+    /// Returns the number of parameters: attitudes and shared ones.
     pub fn parameters(&self) -> usize {
         3 * self.pointings.len() + COMMON
     }
@@ -138,8 +138,8 @@ impl Calibration {
         Ok(())
     }
 
-    /// The least-squares problem: a local block for each star that is not held, and for each image of one that is; the catalogue
-    /// places are weights of decorrelated coordinates of the stars.
+    /// Builds the least-squares problem: one local block per free star and per image of a fixed star. The catalogue places are weights of
+    /// decorrelated coordinates of the stars.
     pub(super) fn problem(
         &self,
         unit: f64,
@@ -181,8 +181,8 @@ impl Calibration {
     }
 }
 
-/// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two parameters;
-/// None where some are not determined.
+/// Returns the natural logarithm of the determinant of the normal equations reduced to the parameters, and the full cofactor matrix of the
+/// parameters. None if some parameters are undetermined.
 pub(super) fn of_parameters(
     normal: &Linearized,
     problem: &Problem<StarImages<'_>>,
@@ -190,7 +190,7 @@ pub(super) fn of_parameters(
     normal.log_determinant().map(|log_determinant| (log_determinant, normal.reduced_cofactors(problem)))
 }
 
-/// The parameters among unknowns.
+/// Returns the parameters among unknowns.
 pub(super) fn parameters_of(problem: &Problem<StarImages<'_>>, unknowns: Vec<usize>) -> Vec<usize> {
     let first = problem.layout().all_locals().end;
     unknowns.into_iter().map(|unknown| unknown - first).collect()

@@ -1,4 +1,4 @@
-//! The camera: from standard coordinates to the plate, with partials (NOAA TR NOS 55, equations 38 to 41), or to the image of any other
+//! Stellar camera: from standard coordinates to the plate, with partials (NOAA TR NOS 55, equations 38 to 41), or to the image of any other
 //! lens.
 
 use crate::geometry::plate_lens;
@@ -8,11 +8,11 @@ use crate::geometry::{
 
 pub use crate::geometry::plate_lens::{Decentering, Form, INTERIOR};
 
-/// The kind of a camera: what is not estimated.
+/// Type of a camera: the model without its values.
 #[derive(Debug, Clone)]
 pub struct Kind {
-    /// Another model than that of plates: the interior parameters are its own, then as many zeros as are left; x counts right, y down.
-    /// Its values do not matter.
+    /// Lens model other than the plate model. The interior parameters are its own, padded with zeros; x increases to the right, y
+    /// downwards. Its values are ignored.
     pub lens: Option<Lens>,
     /// Order of scale and distortion.
     pub form: Form,
@@ -23,22 +23,22 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// Where the principal distances of x and y stand among the interior parameters; every lens that has two begins with them.
+    /// Returns the indices of the principal distances of x and y; the parameters of lenses with two distances begin with them.
     pub fn scales(&self) -> [usize; 2] {
         if self.lens.is_some() { [0, 1] } else { [3, 4] }
     }
 }
 
-/// A camera at given values of its interior parameters.
+/// Camera at given values of its interior parameters.
 #[derive(Debug, Clone)]
 pub struct Camera {
     kind: Kind,
-    /// With epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; or the parameters of the lens.
+    /// Plate lens with epsilon, xp, yp, cx, cy, dx, dy, K1, K2, K3, and K4, K5, phi_T or P1, P2, P3; or the parameters of the lens.
     plate: PlateLens,
     lens: Option<Lens>,
 }
 
-/// An image and its partials; the first index is x or y.
+/// Image and its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
 pub struct PlateImage {
     /// x, y on the plate.
@@ -51,7 +51,7 @@ pub struct PlateImage {
     pub interior: [[f64; INTERIOR]; 2],
 }
 
-/// An attitude with its partials.
+/// Attitude with its partials.
 #[derive(Debug, Clone, Copy)]
 pub struct Attitude {
     /// Rows (A1, B1, C1), (A2, B2, C2), (D, E, F).
@@ -60,20 +60,20 @@ pub struct Attitude {
 }
 
 impl Attitude {
-    /// The attitude alpha, omega, kappa.
+    /// Creates the attitude alpha, omega, kappa.
     pub fn new(angles: [f64; 3]) -> Self {
         let (matrix, partials) = pointing_with_partials(angles);
         Self { matrix, partials }
     }
 
-    /// m, n, q of standard coordinates.
+    /// Returns m, n, q of standard coordinates.
     pub fn turned(matrix: &Matrix3, [xi, eta]: [f64; 2]) -> [f64; 3] {
         (matrix * Vector3::new(xi, eta, 1.0)).into()
     }
 }
 
 impl Camera {
-    /// A camera with the given interior parameters.
+    /// Returns a camera with the given interior parameters.
     pub fn new(kind: &Kind, mut interior: [f64; INTERIOR]) -> Self {
         if kind.common_scale {
             let [x, y] = kind.scales();
@@ -86,19 +86,19 @@ impl Camera {
         Self { kind: kind.clone(), plate: PlateLens::new(of_plate, interior), lens }
     }
 
-    /// epsilon, xp, yp, cx, cy, dx, dy, and the rest.
+    /// Returns epsilon, xp, yp, cx, cy, dx, dy, and the distortion parameters.
     pub fn interior(&self) -> &[f64; INTERIOR] {
         self.plate.interior()
     }
 
-    /// Its distortion.
+    /// Returns the distortion.
     pub fn distortion(&self) -> &Distortion {
         self.plate.distortion()
     }
 
-    /// The image of standard coordinates through another lens, with all partials.
+    /// Returns the image of standard coordinates through another lens, with all partials.
     fn through(&self, lens: &Lens, attitude: &Attitude, standard: [f64; 2]) -> PlateImage {
-        // A direction has y down and looks along z; that of a photo y up and looks along -z.
+        // Directions have y down and look along z; photo axes have y up and look along -z.
         let turned = |matrix: &Matrix3| {
             let [m, n, q] = Attitude::turned(matrix, standard);
             Vector3::new(m, -n, -q)
@@ -126,13 +126,13 @@ impl Camera {
         }
     }
 
-    /// The image of standard coordinates, with all partials.
+    /// Returns the image of standard coordinates, with all partials.
     pub fn linearize(&self, attitude: &Attitude, standard: [f64; 2]) -> PlateImage {
         if let Some(lens) = &self.lens {
             return self.through(lens, attitude, standard);
         }
         let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
-        // A direction behind the camera has no image.
+        // A direction behind the camera has NaN as image.
         let q = if q > 0.0 { q } else { f64::NAN };
         let w = [m / q, n / q];
         let Plated { xy, tangents, interior } = self.plate.place(w);
@@ -156,10 +156,10 @@ impl Camera {
         }
     }
 
-    /// Frees a measured image from distortion (report's section on the inverse): the undistorted image, the changes of the last
-    /// pass, and whether they fell below `tolerance`.
+    /// Corrects a measured image for distortion (report's section on the inverse). Returns the undistorted image, the changes of the last
+    /// iteration and the convergence flag for `tolerance`.
     ///
-    /// The image of another lens stays as it is: [`Camera::standard`] asks the lens.
+    /// The image of another lens is unchanged: [`Camera::standard`] inverts the lens.
     pub fn undistorted(&self, xy: [f64; 2], tolerance: f64, passes: usize) -> ([f64; 2], [f64; 2], bool) {
         if self.lens.is_some() {
             return (xy, [0.0; 2], true);
@@ -167,7 +167,7 @@ impl Camera {
         self.plate.undistorted(xy, tolerance, passes)
     }
 
-    /// Standard coordinates of an undistorted image (equation 44); not finite where a lens has no ray.
+    /// Returns the standard coordinates of an undistorted image (equation 44); not finite outside of the lens model's range.
     pub fn standard(&self, matrix: &Matrix3, undistorted: [f64; 2]) -> [f64; 2] {
         let [_, xp, yp, cx, cy, ..] = *self.interior();
         let ray = match &self.lens {

@@ -1,5 +1,5 @@
-//! Corrections of the stars, residuals and their tests where the parameters are final and their cofactors given: the v-cycle of the
-//! report's program (equations 64 to 71 of the report; section 5.6 of its specification).
+//! Corrections of the stars, residuals and their tests for final parameters and given cofactors: the v-cycle of the report's program
+//! (equations 64 to 71 of the report; section 5.6 of its specification).
 
 use faer::{Mat, MatRef};
 
@@ -21,28 +21,28 @@ fn column([a, b]: [f64; 2]) -> Mat<f64> {
     Mat::from_fn(2, 1, |i, _| [a, b][i])
 }
 
-/// Inverse of a symmetric matrix; None where its determinant is less than a number can hold.
+/// Returns the inverse of a symmetric matrix; None if the determinant underflows or overflows.
 fn inverse([[a, b], [_, d]]: Matrix2) -> Option<Matrix2> {
     let determinant = a * d - b * b;
     let regular = determinant.abs() > f64::MIN_POSITIVE && determinant.is_finite();
     regular.then(|| [[d, -b], [-b, a]].map(|row| row.map(|value| value / determinant)))
 }
 
-/// Residuals v of an observation with the weights P, and the cofactors of the computed values: redundancy numbers, and v over the root
-/// of their cofactors.
+/// Returns redundancy numbers and standardized residuals of an observation from its weights P, residuals v and the cofactors of the
+/// computed values.
 fn tested(weight: Matrix2, computed: &Mat<f64>, v: [f64; 2]) -> Tested {
     let taken = computed * matrix(&weight);
     let redundancy = [0, 1].map(|i| 1.0 - taken[(i, i)]);
     let own = inverse(weight).unwrap_or([[f64::NAN; 2]; 2]);
     let standardized = [0, 1].map(|i| {
         let left = (own[i][i] - computed[(i, i)]).max(0.0);
-        // What rounding leaves of a redundancy of zero would make a test value of noise.
+        // For zero redundancy a test value would be rounding noise.
         if redundancy[i] > 1e-10 { v[i] / left.sqrt() } else { f64::NAN }
     });
     Tested { redundancy, standardized }
 }
 
-/// A star where the parameters are known: inverse of its normal matrix, H = N_ss^-1 N_sp, and correction.
+/// Elimination of a star for known parameters: inverse of its normal matrix, H = N_ss^-1 N_sp, and correction.
 struct Eliminated {
     inverse: Matrix2,
     tied: Mat<f64>,
@@ -50,13 +50,12 @@ struct Eliminated {
 }
 
 impl Calibration {
-    /// Corrects the stars with the equations as the report's program formed them at the initial values, and computes residuals and
-    /// their tests.
+    /// Corrects the stars with the equations of the report's program at the initial values, and computes residuals and their tests.
     ///
-    /// * `cofactors`: of every two parameters, row by row, for the unit weight of the plate coordinates.
+    /// * `cofactors`: full cofactor matrix of the parameters, row by row, for the unit weight of the plate coordinates.
     ///
     /// # Errors
-    /// Stars without images, or whose images weigh nothing; cofactors of another number.
+    /// Stars without images or with zero weights; a wrong number of cofactors.
     pub fn residual_cycle(
         &self,
         tolerances: &Tolerances,
@@ -133,7 +132,7 @@ impl Calibration {
             .collect())
     }
 
-    /// Partials of an image by all parameters.
+    /// Returns the partials of an image with respect to all parameters.
     fn by_parameters(&self, rows: &Rows, pointing: usize) -> Mat<f64> {
         let mut all = Mat::zeros(2, self.parameters());
         for i in 0..2 {
@@ -143,7 +142,7 @@ impl Calibration {
         all
     }
 
-    /// The inverses of the stars' own normal matrices, the report's (1)^-1; zero for stars that are held.
+    /// Returns the inverses of the stars' own normal matrices, the report's (1)^-1; zero for fixed stars.
     pub(super) fn star_inverses(
         &self,
         model: &StarImages<'_>,

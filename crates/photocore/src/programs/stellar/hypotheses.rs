@@ -1,4 +1,4 @@
-//! How measured images of stars may lie on predicted ones: pairs of candidates make similarities, all bright images vote for them.
+//! Identification of stars: pairs of candidates give similarities from measured to predicted images, and all bright images vote for them.
 
 use std::cmp::Reverse;
 
@@ -6,23 +6,23 @@ use nalgebra::Complex;
 
 type Complex64 = Complex<f64>;
 
-/// Cells of the raster a side at most, and hypotheses for which all images vote at most.
+/// Maximum number of raster cells per side, and of hypotheses with a full vote.
 const RASTER: f64 = 2000.0;
 const VOTED: usize = 4096;
-/// Width of a cell over the distance within which an image has a star.
+/// Width of a cell, as a fraction of the distance limit between image and star.
 const CELL: f64 = 0.5;
 
-/// A similarity of the plane: z goes to factor z + shift.
+/// Similarity of the plane: z -> factor z + shift.
 #[derive(Debug, Clone, Copy)]
 pub struct Similarity {
-    /// Scale and turn.
+    /// Scale and rotation.
     pub factor: Complex64,
-    /// Where zero goes.
+    /// Image of zero.
     pub shift: Complex64,
 }
 
 impl Similarity {
-    /// The one that brings two images to two stars; of equal images it is not finite.
+    /// Returns the similarity that maps two images to two stars; not finite for coincident images.
     fn of_pair(images: [Complex64; 2], stars: [Complex64; 2]) -> Self {
         let factor = (stars[1] - stars[0]) / (images[1] - images[0]);
         Self { factor, shift: stars[0] - factor * images[0] }
@@ -33,26 +33,26 @@ impl Similarity {
     }
 }
 
-/// Which pairs of candidates make a hypothesis.
+/// Conditions for a pair of candidates to form a hypothesis.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
-    /// By how much two separations may differ.
+    /// Largest difference of the two separations.
     pub tolerance: f64,
-    /// The share of the separation of the images that is added.
+    /// Additional tolerance as a fraction of the separation of the images.
     pub stretch: f64,
-    /// Separation that images have more than.
+    /// Lower limit of the separation of images.
     pub least: f64,
-    /// The point about which the camera may be turned, and how far it may move; None where any turn counts that is possible.
+    /// Rotation centre of the camera, and its largest displacement; None for any possible rotation.
     pub axis: Option<(Complex64, f64)>,
 }
 
-/// The similarities of all pairs of candidates whose separations agree, in the order of the pairs.
+/// Returns the similarities of all pairs of candidates with agreeing separations, in the order of the pairs.
 ///
-/// A candidate is an image and a star that it may show, by their numbers. An image is not paired with itself, nor a star.
+/// A candidate is an image and a possible star, by index. Both images and both stars of a pair differ.
 ///
 /// # Panics
 ///
-/// Where a candidate has a number that no image or star has.
+/// If a candidate has an invalid index.
 pub fn hypotheses(
     images: &[Complex64],
     stars: &[Complex64],
@@ -61,7 +61,7 @@ pub fn hypotheses(
 ) -> Vec<Similarity> {
     let at: Vec<Complex64> = candidates.iter().map(|&(_, star)| stars[star]).collect();
     let (x, y): (Vec<f64>, Vec<f64>) = at.iter().map(|star| (star.re, star.im)).unzip();
-    // For each image the squares between which the separation of the star of a candidate from its own has to be.
+    // Bounds of the squared star separations that agree with each image separation.
     let bounds: Vec<(Vec<f64>, Vec<f64>)> = images
         .iter()
         .map(|first| {
@@ -75,7 +75,7 @@ pub fn hypotheses(
         let ((low, high), rest) = (&bounds[image], a + 1..candidates.len());
         let squares = x[rest.clone()].iter().zip(&y[rest.clone()]);
         let limits = low[rest.clone()].iter().zip(&high[rest.clone()]);
-        // All of them, without a branch: few agree.
+        // All pairs are tested without branches, because few agree.
         for (agree, ((x, y), (low, high))) in agree[rest.clone()].iter_mut().zip(squares.zip(limits)) {
             let square = (x - at[a].re) * (x - at[a].re) + (y - at[a].im) * (y - at[a].im);
             *agree = (square > *low) & (square < *high);
@@ -92,7 +92,7 @@ pub fn hypotheses(
 }
 
 impl Agreement {
-    /// Between which squares the separation of two stars lies if that of their images is so large; none is where it is too small.
+    /// Returns the bounds of the squared star separation for an image separation; an empty range if this is too small.
     fn squares(&self, images: f64) -> (f64, f64) {
         let off = self.tolerance + self.stretch * images;
         if images <= self.least {
@@ -101,13 +101,13 @@ impl Agreement {
         (if off > images { -1.0 } else { (images - off).powi(2) }, (images + off).powi(2))
     }
 
-    /// Whether the axis stays where it may be.
+    /// Returns whether the displacement of the rotation centre is within its limit.
     fn holds(&self, pair: &Similarity) -> bool {
         self.axis.is_none_or(|(axis, radius)| (pair.at(axis) - axis).norm() <= radius)
     }
 }
 
-/// The cells of a plane that are near a star.
+/// Raster of the cells near a star.
 struct Raster {
     near: Vec<bool>,
     columns: usize,
@@ -147,13 +147,13 @@ impl Raster {
         raster
     }
 
-    /// The cell, or the one of the rim that is nearest to where it would be.
+    /// Returns the index of a cell, clamped to the rim.
     fn index(&self, column: i64, row: i64) -> usize {
         let clamped = |k: i64, count: usize| k.clamp(0, count as i64 - 1) as usize;
         clamped(column, self.columns) * self.rows + clamped(row, self.rows)
     }
 
-    /// The rim is far from every star: what falls outside goes there.
+    /// Clears the rim, which collects all positions outside.
     fn clear_rim(&mut self) {
         let (columns, rows) = (self.columns, self.rows);
         self.near[..rows].fill(false);
@@ -164,7 +164,7 @@ impl Raster {
         }
     }
 
-    /// How many images a similarity brings near a star.
+    /// Counts the images that a similarity maps near a star.
     fn count(&self, similarity: &Similarity, images: &[Complex64]) -> usize {
         let in_cells = Similarity {
             factor: similarity.factor / self.size,
@@ -178,9 +178,9 @@ impl Raster {
     }
 }
 
-/// The similarities under which the most images fall within a limit of a star, counted in a raster, the best first.
+/// Returns the similarities with the most images within a limit of a star, counted in a raster, best first.
 ///
-/// Of very many the first images, `makers` of them, choose those for which all are counted.
+/// For many similarities, the first `makers` images preselect the similarities with a full vote.
 pub fn best_voted(
     all: &[Similarity],
     images: &[Complex64],
@@ -222,7 +222,7 @@ mod tests {
         truth: Similarity,
     }
 
-    /// Twenty images of which fourteen are stars that are turned by 0.3, and all candidates.
+    /// Twenty images, of which fourteen are stars rotated by 0.3 rad, with all candidates.
     fn turned() -> Scene {
         let stars = scattered(40);
         let truth =

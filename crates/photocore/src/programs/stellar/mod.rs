@@ -1,13 +1,12 @@
-//! Calibration of a camera by stars (NOAA TR NOS 55): directions of stars, attitudes of the camera and its interior parameters
-//! adjusted together.
+//! Stellar camera calibration (NOAA TR NOS 55): joint adjustment of star directions, camera attitudes and interior parameters.
 //!
-//! Stars are the local unknowns, two each; attitudes are a retained block each, and the interior parameters and coefficients of refraction
-//! one that all images share. A direction of the axis and weights of parameters are ties. A star that is held ties no attitudes to each other: each
-//! of its images has a local block of its own.
+//! Stars are local blocks of two unknowns. Each attitude is a retained block; interior parameters and refraction coefficients are one
+//! shared block. A direction of the axis and weights of parameters are constraints. A fixed star does not couple attitudes: each of its
+//! images has a separate local block.
 //!
-//! Unit weight is that of the plate coordinates' weights: its mean error has their unit over the root of theirs.
+//! Unit weight refers to the plate coordinates: its mean error has the unit of a coordinate times the root of a weight.
 //!
-//! A camera of 300 mm whose principal distance and attitude are known to some millimetres and minutes of arc, and nine stars:
+//! Example: a camera of 300 mm with principal distance and attitude known to some millimetres and minutes of arc, and nine stars:
 //!
 //! ```
 //! use photocore::adjustment;
@@ -79,40 +78,40 @@ pub use solution::{Observations, ParameterCofactors, Solution, Tested};
 
 /// Number of coefficients of refraction.
 pub const TAU: usize = 4;
-/// Number of unknowns that all images share.
+/// Number of shared unknowns.
 pub const COMMON: usize = INTERIOR + TAU;
 
-/// A star as it is known beforehand.
+/// A-priori star.
 #[derive(Debug, Clone, Copy)]
 pub struct Star {
     /// Initial right ascension and declination in radians.
     pub place: [f64; 2],
-    /// Those of the catalogue.
+    /// Catalogue right ascension and declination in radians.
     pub catalogue: [f64; 2],
-    /// Weights of right ascension and declination; None for a direction that is not known.
+    /// Weights of right ascension and declination; None for an unknown direction.
     pub weight: Option<[[f64; 2]; 2]>,
-    /// Whether the initial place is held as it is.
+    /// Whether the initial direction is fixed.
     pub fixed: bool,
 }
 
-/// An image of a star.
+/// Image of a star.
 #[derive(Debug, Clone, Copy)]
 pub struct Image {
-    /// Index of its star.
+    /// Index of the star.
     pub star: usize,
-    /// Index of its attitude.
+    /// Index of the attitude.
     pub pointing: usize,
     /// Measured plate coordinates.
     pub xy: [f64; 2],
-    /// Their weights.
+    /// Weights of the plate coordinates.
     pub weight: [[f64; 2]; 2],
     /// Local apparent sidereal time in radians.
     pub sidereal_time: f64,
-    /// The star's apparent place at the time of this image minus the place adjusted, in radians.
+    /// Apparent direction of the star at the time of this image minus the adjusted direction, in radians.
     pub shift: [f64; 2],
 }
 
-/// A direction of the camera's axis that is known from outside (equation 72).
+/// Direction of the camera axis known from other sources (equation 72).
 #[derive(Debug, Clone, Copy)]
 pub struct Axis {
     /// Index of the attitude.
@@ -121,80 +120,80 @@ pub struct Axis {
     pub standard: [f64; 2],
     /// Undistorted plate coordinates of its image.
     pub xy: [f64; 2],
-    /// Their weights.
+    /// Weights of the plate coordinates.
     pub weight: [[f64; 2]; 2],
 }
 
 /// Weighted parameters: given values and their weight matrix.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    /// Which parameters: attitudes three each, then the common ones.
+    /// Indices of the parameters: attitudes three each, then the shared ones.
     pub parameters: Vec<usize>,
-    /// Their given values.
+    /// Given values.
     pub values: Vec<f64>,
-    /// Upper triangular root R of their weight matrix P = R^T R, row by row.
+    /// Upper triangular root R of the weight matrix P = R^T R, row by row.
     pub root: Vec<f64>,
 }
 
-/// A calibration as it is known beforehand.
+/// Input of a calibration.
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// Where it is done.
+    /// Observing station.
     pub station: Station,
-    /// What is estimated of the camera.
+    /// Camera model.
     pub kind: Kind,
     /// Initial alpha, omega, kappa of every attitude in radians.
     pub pointings: Vec<[f64; 3]>,
     /// Initial interior parameters, then coefficients of refraction in seconds of arc.
     pub common: [f64; COMMON],
-    /// Which parameters are held: attitudes three each, then the common ones.
+    /// Whether each parameter is fixed: attitudes three each, then the shared ones.
     pub fixed: Vec<bool>,
     /// Weights of parameters.
     pub weights: Weights,
-    /// The stars.
+    /// Stars.
     pub stars: Vec<Star>,
-    /// Their images.
+    /// Images.
     pub images: Vec<Image>,
-    /// The axis.
+    /// Known axis direction.
     pub axis: Option<Axis>,
 }
 
-/// How to adjust.
+/// Options of the adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// When to stop, and what to compute.
+    /// Options of the engine: convergence and requested results.
     pub adjustment: adjustment::Options,
-    /// Mean error of unit weight that is expected.
+    /// Expected mean error of unit weight.
     pub unit: f64,
-    /// Whether to compute the cofactors of every two parameters, where there are cofactors: so many further right-hand sides.
+    /// Whether to compute the full cofactor matrix of the parameters, if cofactors are requested: one right-hand side per parameter.
     pub whole: bool,
 }
 
-/// Why a calibration cannot be adjusted.
+/// Reason why a calibration cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum StellarError {
-    /// An image names a star or an attitude that is not there, or weights a parameter that is not.
+    /// Invalid index of a star, an attitude or a weighted parameter.
     #[error("{0} names a star, an attitude or a parameter that is not there")]
     Index(String),
-    /// A lens with more parameters than there is room for.
+    /// The lens has more parameters than the interior parameters can store.
     #[error("the lens has more than {INTERIOR} parameters")]
     Lens,
-    /// A weight matrix that is not positive definite.
+    /// A weight matrix is not positive definite.
     #[error("the weight matrix of {0} is not positive definite")]
     Weight(String),
-    /// Stars without images enough.
+    /// Stars with too few images.
     #[error("{} stars are not determined by their images", .0.len())]
     UndeterminedStars(Vec<usize>),
-    /// Combinations that the stars do not determine: for each the parameters that take part in it.
+    /// Undetermined combinations of unknowns: the parameters of each combination.
     #[error("{} combinations of parameters are not determined by the stars", .0.len())]
     Undetermined(Vec<Vec<usize>>),
-    /// Stars that the initial values put where they have no image.
+    /// Stars without an image at the initial values.
     #[error("the initial values put a star below the horizon or behind the camera")]
     NotFinite(Vec<usize>),
-    /// The work was stopped: by whoever watched it, or for want of memory or threads.
+    /// The computation was stopped by the caller, or lacks memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// More than can be numbered.
+    /// The number of unknowns exceeds the index range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }

@@ -1,4 +1,4 @@
-//! The observation equations of stars, with exact partials.
+//! Observation equations of stars, with exact partials.
 
 use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, Image, PlateImage, StellarError, TAU, Weights};
 use crate::adjustment::{Evaluated, Model};
@@ -6,54 +6,54 @@ use crate::geometry::Standard;
 use crate::normals::{GroupRows, Tie, TieRows};
 use crate::parallel;
 
-/// Root R, upper triangular, of a weight matrix P = R^T R.
+/// Upper triangular root R of a weight matrix P = R^T R.
 pub type Root = [[f64; 2]; 2];
 
-/// What a tie observes.
+/// Observation of a constraint.
 #[derive(Debug, Clone, Copy)]
 pub enum Tied {
-    /// The direction of the axis, with the root of its weights.
+    /// Direction of the axis, with the root of its weights.
     Axis(Root),
-    /// A row of the root of the parameters' weight matrix.
+    /// Row of the root of the parameters' weight matrix.
     Parameters(usize),
 }
 
 /// Tolerances of the inner iterations of the report's program.
 #[derive(Debug, Clone, Copy)]
 pub struct Tolerances {
-    /// Of refraction, in radians.
+    /// Tolerance of refraction, in radians.
     pub refraction: f64,
-    /// Of distortion, in the unit of the plate coordinates.
+    /// Tolerance of distortion, in the unit of the plate coordinates.
     pub distortion: f64,
-    /// Passes of the distortion at the most.
+    /// Maximum number of iterations of the distortion.
     pub passes: usize,
 }
 
-/// Which discrepancies and partials images have.
+/// Linearization of the images.
 #[derive(Debug, Clone, Copy)]
 pub enum Partials {
-    /// The exact ones.
+    /// Exact discrepancies and partials.
     Exact,
-    /// Those of the report's program.
+    /// Discrepancies and partials of the report's program.
     Published(Tolerances),
 }
 
-/// Images of stars, local block by local block, and what is known beforehand, each as rows of unit weight.
+/// Model of star images, local block by local block, and of a-priori observations, each as rows of unit weight.
 #[derive(Debug)]
 pub struct StarImages<'a> {
     calibration: &'a Calibration,
     partials: Partials,
-    /// The star of each local block.
+    /// Star of each local block.
     pub stars: Vec<usize>,
-    /// The images of all local blocks, a group each.
+    /// Images of all local blocks, one observation each.
     pub images: Vec<usize>,
-    /// Those of local block i are `images[start[i]..start[i + 1]]`.
+    /// Offsets: the images of local block i are `images[start[i]..start[i + 1]]`.
     pub start: Vec<usize>,
-    /// Root of the weights of each of them.
+    /// Root of the weights of each image.
     pub roots: Vec<Root>,
-    /// Root of the weights of each star's catalogue place; None where it has none or is held.
+    /// Root of the weights of each star's catalogue place; None if it is unknown or fixed.
     pub catalogue: Vec<Option<Root>>,
-    /// What concerns no star.
+    /// Constraints without stars.
     pub ties: Vec<(Tied, Tie)>,
 }
 
@@ -65,11 +65,11 @@ pub struct Sight {
     pub tau: [f64; TAU],
     pub places: Vec<[f64; 2]>,
     pub parameters: Vec<f64>,
-    /// Standard coordinates of all images' stars, where they are asked for more than once.
+    /// Standard coordinates of the stars of all images, cached for repeated use.
     seen: Vec<Standard>,
 }
 
-/// The two equations of a group before weighting; the first index is the row.
+/// Two equations of an observation before weighting; the first index is the row.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows {
     /// Observed minus computed.
@@ -78,12 +78,12 @@ pub struct Rows {
     pub star: [[f64; 2]; 2],
     /// Partials with respect to the attitude.
     pub pointing: [[f64; 3]; 2],
-    /// Partials with respect to the common parameters.
+    /// Partials with respect to the shared parameters.
     pub common: [[f64; COMMON]; 2],
 }
 
 impl Sight {
-    /// Everything at the given places of the stars and values of the parameters.
+    /// Evaluates the model at given directions of the stars and values of the parameters.
     pub fn new(calibration: &Calibration, places: Vec<[f64; 2]>, parameters: &[f64]) -> Self {
         let (pointings, common) = parameters.split_at(3 * calibration.pointings.len());
         let interior = std::array::from_fn::<_, INTERIOR, _>(|k| common[k]);
@@ -97,14 +97,14 @@ impl Sight {
         }
     }
 
-    /// Standard coordinates of the star of an image.
+    /// Returns the standard coordinates of the star of an image.
     fn standard(&self, calibration: &Calibration, image: &Image) -> Standard {
         let place = self.places[image.star];
         let place = [place[0] + image.shift[0], place[1] + image.shift[1]];
         calibration.station.standard(place, image.sidereal_time, &self.tau)
     }
 
-    /// An image at a place: measured minus computed, with exact partials.
+    /// Returns measured minus computed of an image, with exact partials.
     pub fn image(&self, calibration: &Calibration, image: usize) -> Rows {
         let seen = self.seen.get(image).copied();
         let image = &calibration.images[image];
@@ -125,8 +125,8 @@ impl Sight {
         }
     }
 
-    /// The direction of the axis, whose plate coordinates are free from distortion: the columns of attitude, epsilon, principal
-    /// point and principal distances only.
+    /// Returns the equations of the axis direction. Its plate coordinates are undistorted: only attitude, epsilon, principal point and
+    /// principal distances have columns.
     pub fn axis(&self, calibration: &Calibration) -> Option<Rows> {
         let axis = calibration.axis?;
         let interior = std::array::from_fn(|k| if k < 5 { self.camera.interior()[k] } else { 0.0 });
@@ -143,7 +143,7 @@ impl Sight {
 }
 
 impl<'a> StarImages<'a> {
-    /// Sorts the images by stars and finds the roots of all weights.
+    /// Sorts the images by stars and computes the roots of all weights.
     pub fn new(calibration: &'a Calibration, partials: Partials) -> Result<Self, StellarError> {
         let mut of_star = vec![Vec::new(); calibration.stars.len()];
         for (index, image) in calibration.images.iter().enumerate() {
@@ -161,7 +161,7 @@ impl<'a> StarImages<'a> {
         };
         for (index, images) in of_star.into_iter().enumerate() {
             let star = &calibration.stars[index];
-            // A star that is held ties nothing together.
+            // The images of a fixed star are uncoupled.
             let most = if star.fixed { 1 } else { images.len().max(1) };
             let free = (images.is_empty() && !star.fixed).then_some(&images[..]);
             for images in images.chunks(most).chain(free) {
@@ -178,23 +178,23 @@ impl<'a> StarImages<'a> {
         Ok(model)
     }
 
-    /// Coordinates of a star whose catalogue values are not correlated, from its place.
+    /// Returns the coordinates of a star that decorrelate its catalogue values.
     pub fn decorrelated(&self, star: usize, [ra, dec]: [f64; 2]) -> [f64; 2] {
         [ra + self.shear(star) * dec, dec]
     }
 
-    /// With the root R of the weights, what the first row has of the declination for one of the right ascension.
+    /// Returns the ratio of the declination and right-ascension elements in the first row of the weight root R.
     pub fn shear(&self, star: usize) -> f64 {
         self.catalogue[star].map_or(0.0, |root| root[0][1] / root[0][0])
     }
 
-    /// Catalogue place of a star minus its place.
+    /// Returns catalogue minus current direction of a star.
     pub fn off_catalogue(&self, star: usize, place: [f64; 2]) -> [f64; 2] {
         let catalogue = self.calibration.stars[star].catalogue;
         [catalogue[0] - place[0], catalogue[1] - place[1]]
     }
 
-    /// Camera, attitudes and stars at given values of the unknowns.
+    /// Evaluates camera, attitudes and stars at given values of the unknowns.
     pub fn sight(&self, unknowns: &[f64]) -> Sight {
         let (locals, parameters) = unknowns.split_at(2 * self.stars.len());
         let mut places: Vec<[f64; 2]> = self.calibration.stars.iter().map(|star| star.place).collect();
@@ -204,7 +204,7 @@ impl<'a> StarImages<'a> {
         Sight::new(self.calibration, places, parameters)
     }
 
-    /// Discrepancies and partials of an image.
+    /// Returns discrepancies and partials of an image.
     pub fn image(&self, sight: &Sight, image: usize) -> Rows {
         match self.partials {
             Partials::Exact => sight.image(self.calibration, image),
@@ -215,7 +215,7 @@ impl<'a> StarImages<'a> {
     }
 }
 
-/// The root of a weight matrix.
+/// Returns the root of a weight matrix.
 fn root(weight: [[f64; 2]; 2], name: impl Fn() -> String) -> Result<Root, StellarError> {
     let [[xx, xy], [_, yy]] = weight;
     let rest = yy - xy * xy / xx;
@@ -227,7 +227,7 @@ fn root(weight: [[f64; 2]; 2], name: impl Fn() -> String) -> Result<Root, Stella
 }
 
 impl Calibration {
-    /// The axis, and the weights of parameters, each with what it touches.
+    /// Returns the constraints of the axis and of the parameter weights, with their blocks.
     fn ties(&self) -> Result<Vec<(Tied, Tie)>, StellarError> {
         let (mut ties, common) = (Vec::new(), self.pointings.len() as u32);
         if let Some(axis) = self.axis {
@@ -236,7 +236,7 @@ impl Calibration {
             ties.push((Tied::Axis(root), tie));
         }
         for row in 0..self.weights.parameters.len() {
-            // With the common parameters in any case: their cofactors with every attitude are asked for.
+            // The shared block is always included: its cofactors with every attitude are needed.
             let mut retained: Vec<u32> = self
                 .weighted(row)
                 .map(|(parameter, ..)| common.min(parameter as u32 / 3))
@@ -249,7 +249,7 @@ impl Calibration {
         Ok(ties)
     }
 
-    /// The parameters that a row of the root of their weights touches: parameter, given value, element of the root.
+    /// Returns parameter, given value and root element for each nonzero element in a row of the weight root.
     pub(super) fn weighted(&self, row: usize) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
         let Weights { parameters, values, root } = &self.weights;
         let count = parameters.len();
@@ -259,16 +259,16 @@ impl Calibration {
             .filter(|&(.., element)| element != 0.0)
     }
 
-    /// A row of the root times given minus present values of the weighted parameters.
+    /// Returns a row of the root times given minus current values of the weighted parameters.
     pub(super) fn off_given(&self, sight: &Sight, row: usize) -> f64 {
         self.weighted(row).map(|(parameter, given, r)| r * (given - sight.parameters[parameter])).sum()
     }
 }
 
-/// Images that a thread takes at least.
+/// Minimum number of images per thread.
 const AT_LEAST: usize = 256;
 
-/// The star images at given values of the unknowns.
+/// Star images at given values of the unknowns.
 struct At<'a> {
     model: &'a StarImages<'a>,
     sight: Sight,
@@ -278,7 +278,7 @@ impl Model for StarImages<'_> {
     fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         let mut sight = self.sight(unknowns);
         if let Partials::Exact = self.partials {
-            // Normal equations are formed and solved with the same ones.
+            // The standard coordinates serve both the formation and the solution of the normal equations.
             let images = &self.calibration.images;
             let standard = |image: usize| sight.standard(self.calibration, &images[image]);
             sight.seen = parallel::map(images.len(), AT_LEAST, standard);
@@ -286,7 +286,7 @@ impl Model for StarImages<'_> {
         Box::new(At { model: self, sight })
     }
 
-    /// Computes directions that are not known afresh from their first images.
+    /// Recomputes unknown directions from their first images.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
         let sight = self.sight(unknowns);
         for (local, &star) in self.stars.iter().enumerate() {
@@ -338,7 +338,7 @@ impl Evaluated for At<'_> {
             Tied::Parameters(row) => {
                 rows.constant[0] = calibration.off_given(sight, *row);
                 for (parameter, _, element) in calibration.weighted(*row) {
-                    // Every block but the last has three unknowns.
+                    // Every block except the last has three unknowns.
                     let attitude = (parameter / 3).min(calibration.pointings.len());
                     let before = retained.iter().take_while(|&&block| (block as usize) < attitude).count();
                     rows.coefficients[3 * before + parameter - 3 * attitude] = element;
@@ -348,12 +348,12 @@ impl Evaluated for At<'_> {
     }
 }
 
-/// Change of the undistorted image below which a direction is final, relative to the principal distance.
+/// Convergence limit of the undistorted image, relative to the principal distance.
 const DIRECTION: f64 = 1e-14;
 const PASSES: usize = 100;
 
 impl Calibration {
-    /// The direction of an image at given values of the unknowns.
+    /// Returns the direction of an image at given values of the unknowns.
     pub(super) fn direction(&self, sight: &Sight, image: usize) -> [f64; 2] {
         let Calibration { images, station, .. } = self;
         let image = &images[image];
@@ -363,27 +363,27 @@ impl Calibration {
         [place[0] - image.shift[0], place[1] - image.shift[1]]
     }
 
-    /// The directions of all images at the initial values.
+    /// Returns the directions of all images at the initial values.
     pub fn directions(&self) -> Result<Vec<[f64; 2]>, StellarError> {
         self.check()?;
         let sight = self.initial();
         Ok((0..self.images.len()).map(|image| self.direction(&sight, image)).collect())
     }
 
-    /// The equations of all images at the initial values, not weighted, with exact partials.
+    /// Returns the unweighted equations of all images at the initial values, with exact partials.
     pub fn equations(&self) -> Result<Vec<Rows>, StellarError> {
         self.check()?;
         let sight = self.initial();
         Ok((0..self.images.len()).map(|image| sight.image(self, image)).collect())
     }
 
-    /// The equations of the axis at the initial values, where it is known.
+    /// Returns the equations of the axis at the initial values; None without a known axis.
     pub fn axis_equations(&self) -> Result<Option<Rows>, StellarError> {
         self.check()?;
         Ok(self.initial().axis(self))
     }
 
-    /// Everything at the initial values.
+    /// Evaluates the model at the initial values.
     pub(super) fn initial(&self) -> Sight {
         let parameters: Vec<f64> = self.pointings.iter().flatten().chain(&self.common).copied().collect();
         Sight::new(self, self.stars.iter().map(|star| star.place).collect(), &parameters)

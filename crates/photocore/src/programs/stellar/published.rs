@@ -1,7 +1,7 @@
-//! The observation equations as the report's program formed them (its equations 48 to 62 and 73 to 74).
+//! Observation equations of the report's program (its equations 48 to 62 and 73 to 74).
 //!
-//! Distortion is that of the image undistorted from the measurement, so that discrepancies live on the undistorted plate; the
-//! change of refraction with direction is neglected in the partials.
+//! Distortion is evaluated at the undistorted measured image, so that discrepancies refer to the undistorted plate. The partials neglect
+//! the change of refraction with direction.
 
 use super::adjust::{of_parameters, parameters_of};
 use super::model::{Partials, Rows, Sight, Tolerances};
@@ -10,37 +10,37 @@ use crate::Threads;
 use crate::adjustment::AdjustError;
 use crate::geometry::Displacement;
 
-/// The equations of an image as published.
+/// Published equations of an image.
 #[derive(Debug, Clone, Copy)]
 pub struct PublishedRows {
     /// Discrepancies and partials.
     pub rows: Rows,
     /// Refracted standard coordinates of the star.
     pub standard: [f64; 2],
-    /// The measured image without distortion.
+    /// Measured image without distortion.
     pub undistorted: [f64; 2],
-    /// Changes of radial and decentering distortion in the last pass, where they did not fall below the tolerance.
+    /// Changes of radial and decentering distortion in the last iteration, if it did not converge.
     pub unsettled: Option<[f64; 2]>,
 }
 
 /// One correction of all parameters.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Corrections of the parameters: attitudes three each, then the common ones.
+    /// Corrections of the parameters: attitudes three each, then the shared ones.
     pub parameters: Vec<f64>,
-    /// Cofactors of every two parameters, row by row; zero for those that are fixed or have no effect.
+    /// Full cofactor matrix of the parameters, row by row; zero for fixed parameters and those without effect.
     pub cofactors: Vec<f64>,
     /// Natural logarithm of the determinant of the reduced normal equations.
     pub log_determinant: f64,
-    /// Parameters that no image and no weight touches yet: they are not corrected.
+    /// Parameters without effect on observations and weights: they are not corrected.
     pub without_effect: Vec<usize>,
 }
 
 impl Calibration {
-    /// Corrects the parameters with the equations as the report's program formed them at the initial values.
+    /// Corrects the parameters with the equations of the report's program at the initial values.
     ///
     /// # Errors
-    /// Stars or parameters that are not determined, stars without images.
+    /// Undetermined stars or parameters, or stars without images.
     pub fn correction(&self, tolerances: &Tolerances, threads: &Threads) -> Result<Correction, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
         let (first, layout) = (self.formed(&problem, vec![], threads)?, problem.layout());
@@ -62,7 +62,7 @@ impl Calibration {
         })
     }
 
-    /// The equations of all images at the initial values as the report's program formed them.
+    /// Returns the equations of all images at the initial values, as formed by the report's program.
     pub fn published(&self, tolerances: &Tolerances) -> Result<Vec<PublishedRows>, StellarError> {
         self.check()?;
         let sight = self.initial();
@@ -84,7 +84,7 @@ impl Calibration {
         let zenith_distance = sin.atan2(direction[2]);
         let angle = self.station.air.published(zenith_distance, &sight.tau, tolerances.refraction);
         let (across, height) = (zenith_distance - angle).sin_cos();
-        // Below the horizon the tangent would come back as that of a direction above it.
+        // Below the horizon the tangent would equal the tangent of a direction above it.
         let tangent = if height > 0.0 { across / height } else { f64::NAN };
         let along = if sin > 0.0 { tangent / sin } else { 1.0 };
         let apparent = [direction[0] * along, direction[1] * along, 1.0];
@@ -110,7 +110,7 @@ impl Calibration {
     }
 }
 
-/// The rows of an image; those of the star still with respect to standard coordinates.
+/// Returns the rows of an image; the columns of the star still refer to standard coordinates.
 fn approximate(
     camera: &Camera,
     attitude: &Attitude,
@@ -123,7 +123,7 @@ fn approximate(
     let offset = [undistorted[0] - xp - dx, undistorted[1] - yp - dy];
     let lens = camera.distortion().linearize(offset);
     let [m, n, q] = Attitude::turned(&attitude.matrix, standard);
-    // A direction behind the camera has no image.
+    // A direction behind the camera has NaN as image.
     let q = if q > 0.0 { q } else { f64::NAN };
     let computed = [cx * m / q + xp + lens.shift[0] - epsilon * measured[1], cy * n / q + yp + lens.shift[1]];
     let [[a1, a2, d], [b1, b2, e], _] = attitude.matrix.data.0;
@@ -147,7 +147,7 @@ fn approximate(
     }
 }
 
-/// Columns of principal point and distortion.
+/// Returns the columns of principal point and distortion.
 fn camera_columns(camera: &Camera, lens: &Displacement) -> [[f64; COMMON]; 2] {
     let phi = camera.interior()[12];
     let (sin, cos) = phi.sin_cos();

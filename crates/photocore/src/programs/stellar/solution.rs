@@ -1,17 +1,16 @@
-//! The adjusted calibration.
+//! Result of a stellar calibration.
 
 use super::model::{Root, Sight, StarImages, Tied};
 use super::{Calibration, Options, StellarError};
 use crate::adjustment::{Adjustment, Problem, standardized};
 use crate::normals::Cofactors;
 
-/// What an observation of two components of unit weight shows after the adjustment.
+/// Test of an observation of two components with unit weight.
 #[derive(Debug, Clone, Copy)]
 pub struct Tested {
-    /// Redundancy numbers of its two components; NaN when not asked for.
+    /// Redundancy numbers of the two components; NaN if not requested.
     pub redundancy: [f64; 2],
-    /// Weighted residual over the root of the redundancy number, for the expected mean error of unit weight; NaN without
-    /// redundancy.
+    /// Weighted residual over the root of the redundancy number, for the expected mean error of unit weight; NaN without redundancy.
     pub standardized: [f64; 2],
 }
 
@@ -19,16 +18,16 @@ impl Tested {
     pub(super) const NONE: Self = Self { redundancy: [f64::NAN; 2], standardized: [f64::NAN; 2] };
 }
 
-/// Stars, images and axis after an adjustment; cofactors are for the unit weight of the plate coordinates.
+/// Adjusted stars, images and axis; cofactors are for the unit weight of the plate coordinates.
 #[derive(Debug)]
 pub struct Observations {
     /// Right ascension and declination of every star.
     pub places: Vec<[f64; 2]>,
-    /// Their cofactors; NaN when not asked for.
+    /// Cofactors of the directions; NaN if not requested.
     pub place_cofactors: Vec<[[f64; 2]; 2]>,
-    /// What of these would be left if all parameters were known; zero for stars that are held.
+    /// Cofactors of the directions for error-free parameters; zero for fixed stars.
     pub place_inverses: Vec<[[f64; 2]; 2]>,
-    /// Tests of their catalogue places.
+    /// Tests of the catalogue places.
     pub place_tests: Vec<Tested>,
     /// Measured minus computed plate coordinates.
     pub residuals: Vec<[f64; 2]>,
@@ -43,34 +42,34 @@ pub struct Observations {
 /// Cofactors of the parameters for the unit weight of the plate coordinates, row by row.
 #[derive(Debug, Clone, Default)]
 pub struct ParameterCofactors {
-    /// Of each attitude (3 x 3).
+    /// Cofactors of each attitude (3 x 3).
     pub own: Vec<f64>,
-    /// Of each attitude with the common parameters (3 x common).
+    /// Cofactors of each attitude with the shared parameters (3 x shared).
     pub cross: Vec<f64>,
-    /// Of the common parameters.
+    /// Cofactors of the shared parameters.
     pub common: Vec<f64>,
 }
 
-/// An adjusted calibration.
+/// Adjusted calibration.
 #[derive(Debug)]
 pub struct Solution {
-    /// Attitudes three each, then the common parameters.
+    /// Attitudes three each, then the shared parameters.
     pub parameters: Vec<f64>,
     /// Stars and images.
     pub observations: Observations,
     /// Test of the axis.
     pub axis_test: Tested,
-    /// Cofactors, where they were asked for.
+    /// Cofactors, if requested.
     pub cofactors: Option<ParameterCofactors>,
-    /// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the cofactors of every two
-    /// parameters, both for the unit weight of the plate coordinates; where they were asked for.
+    /// Natural logarithm of the determinant of the normal equations reduced to the parameters, and the full cofactor matrix of the
+    /// parameters. Both are for the unit weight of the plate coordinates, if requested.
     pub whole: Option<(f64, Vec<f64>)>,
     /// Status, iterations, times.
     pub adjustment: Adjustment,
 }
 
 impl Solution {
-    /// Puts the pieces of an adjustment back into the order of the calibration.
+    /// Restores the order of the calibration for the results of an adjustment.
     pub(super) fn new(
         calibration: &Calibration,
         options: &Options,
@@ -93,7 +92,7 @@ impl Solution {
             axis_test: Tested::NONE,
             cofactors: cofactors.map(|found| ParameterCofactors {
                 own: scaled(found.retained[..9 * attitudes].to_vec()),
-                // An attitude that nothing touches is fixed.
+                // An attitude without observations is fixed.
                 cross: scaled(
                     found.pairs.iter().map(|&value| if value.is_nan() { 0.0 } else { value }).collect(),
                 ),
@@ -107,7 +106,7 @@ impl Solution {
         Ok(solution)
     }
 
-    /// Hands redundancy numbers and test values to images, stars and axis.
+    /// Distributes redundancy numbers and test values to images, stars and axis.
     fn test(&mut self, problem: &Problem<StarImages<'_>>, unit: f64) {
         let residuals = std::mem::take(&mut self.adjustment.residuals);
         let (model, redundancy) = (&problem.model, self.adjustment.redundancy.take());
@@ -137,7 +136,7 @@ fn tested(weighted: [f64; 2], unit: f64, redundancy: [f64; 2]) -> Tested {
     Tested { redundancy, standardized }
 }
 
-/// R v.
+/// Returns R v.
 pub(super) fn root_times(root: &Root, v: [f64; 2]) -> [f64; 2] {
     root.map(|row| row[0] * v[0] + row[1] * v[1])
 }
@@ -146,7 +145,7 @@ fn square(v: [f64; 2]) -> f64 {
     v[0] * v[0] + v[1] * v[1]
 }
 
-/// Cofactors of places from those of the decorrelated coordinates (u, declination), right ascension being u - s declination.
+/// Returns the cofactors of directions from the decorrelated coordinates (u, declination); right ascension is u - s declination.
 fn place_cofactors(
     calibration: &Calibration,
     model: &StarImages<'_>,
@@ -168,7 +167,7 @@ fn place_cofactors(
 }
 
 impl Calibration {
-    /// Stars and images, not yet tested.
+    /// Returns stars and images before the tests.
     pub(super) fn observations(
         &self,
         sight: &Sight,
@@ -190,7 +189,7 @@ impl Calibration {
         })
     }
 
-    /// Weighted sums of squares: images, stars, parameters, axis.
+    /// Returns the weighted sums of squares: images, stars, parameters, axis.
     fn sums_of_squares(
         &self,
         sight: &Sight,
