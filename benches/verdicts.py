@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from photogram import Block, Camera, PhotogramError, Result, adjust
-from photogram.network.observations import Distance, Position
+from photogram import Block, Camera, Distance, PhotogramError, Position, Result, adjust
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases

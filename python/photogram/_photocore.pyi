@@ -1405,9 +1405,9 @@ class NetworkTrial:
         For each hypothesis a dictionary: `code`, `group` (type as in `suspects`, None for sets), `index`,
         `component`, `parameters`, `observations`, `plausible` (sizes), `rank`, `statistic` T, `probability`,
         `estimate`, its `cofactors`, `redundancy` r, `noncentrality`, `mdb`, `error`, `bias_to_noise`, and
-        `effect`: points beyond the limit, the same without points of the group, the largest change in standard
-        deviations, its point and coordinate, the largest change, and the changes of `checks`. Then the (s, s)
-        correlations of the scores of sets.
+        `effect`: points beyond the limit, the same without points of the group, the largest change in
+        standard deviations, its point and coordinate, the largest change, and the changes of `checks`. Then
+        the (s, s) correlations of the scores of sets.
         """
 
     def predictions(

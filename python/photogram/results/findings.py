@@ -173,7 +173,7 @@ def _patterns(result: Result) -> list[Systematic]:
 def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
     """Return which errors of the datum no independent observation checks."""
     summary = result.reliability_summary
-    names = [] if summary is None else [each.name for each in summary.hypotheses.assumptions]
+    names = [] if summary is None else summary.hypotheses.assumptions
     return [Phrase("line.datum-assumed", {"errors": names})] if names else []
 
 

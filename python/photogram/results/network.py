@@ -279,9 +279,12 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Everything else stands; a network that rounding makes singular here has said so before.
             return None
-        return reliability_summary(found, hypotheses(self, found), heights=self.geographic)
+        estimated = None if self.KNOWN else self.sum_and_freedom
+        axes, facts = self._terms().point_axes, self._hypothesis_facts()
+        own = hypotheses(found, facts, self.given, axes, estimated)
+        return reliability_summary(found, own, heights=self.geographic)
 
-    def hypothesis_facts(self) -> dict[str, Any]:
+    def _hypothesis_facts(self) -> dict[str, Any]:
         """Return what hypotheses need to know beside the network; nothing if they are not about it."""
         return {}
 

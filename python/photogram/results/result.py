@@ -236,11 +236,13 @@ class Result(OnFilm, AdjustedNetwork):
         core = self._core_network().trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
-    def hypothesis_facts(self) -> dict[str, Any]:
-        """Return velocities of photos, sets of positions and control, and sizes of images."""
+    def _hypothesis_facts(self) -> dict[str, Any]:
         from photogram.results.hypotheses import block_facts
 
-        return block_facts(self)
+        checks = self.check_points
+        sd = None if checks.agreement is None else np.hypot(checks.sd, checks.given_sd)
+        facts = block_facts(self.block, self.photo_positions)
+        return {**facts, "checks": checks.rows.tolist(), "check_sd": sd}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the block as it was given, but with what is free where the adjustment has ended.

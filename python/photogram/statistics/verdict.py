@@ -486,6 +486,7 @@ RULES = (
         0,
         ("check-undetected",),
         warning=True,
+        also=True,
     ),
     Rule("accepted", _accepted, 0, ()),
     Rule("not-tested", _not_tested, 0, ("compare",)),

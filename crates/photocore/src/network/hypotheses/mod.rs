@@ -29,7 +29,8 @@ use self::judged::Criteria;
 use super::trial::Trial;
 use super::{NetworkError, Subject};
 use crate::Threads;
-use crate::adjustment::{Linearized, canonical_correlation};
+use crate::adjustment::{Leverages, Linearized, canonical_correlation};
+use crate::geometry::{ObjectSpace, PoseNumbers};
 
 /// What hypotheses need to know beside the network; nothing at all is possible for each.
 #[derive(Debug, Clone, Default)]
@@ -100,6 +101,24 @@ pub struct Hypotheses {
     pub correlations: Vec<f64>,
 }
 
+/// The errors of sets that are possible for a network.
+fn catalogue<'a>(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Catalogue<'a> {
+    let mut catalogue = Catalogue::new(trial, found, facts);
+    let (bundle, points) = (catalogue.bundle, catalogue.control_points(trial));
+    control::add(&mut catalogue, &points);
+    cameras::add(&mut catalogue, trial);
+    // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
+    if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
+        attitudes::add(&mut catalogue);
+        if bundle.space == ObjectSpace::Rectangular {
+            positions::add(&mut catalogue);
+            form::add(&mut catalogue, &points);
+            shutter::add(&mut catalogue, trial);
+        }
+    }
+    catalogue
+}
+
 impl Trial {
     /// Tests all hypotheses of the catalogue at the adjusted values, and computes what an undetected error would change.
     ///
@@ -117,7 +136,7 @@ impl Trial {
         let criteria = Criteria::new(facts);
         let sample = Sample::new(self, found, &linearized, &facts.checks);
 
-        let catalogue = Catalogue::new(self, found, facts);
+        let catalogue = catalogue(self, found, facts);
         let sums = linearized.additional(problem, &catalogue, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
