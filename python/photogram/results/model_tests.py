@@ -74,45 +74,24 @@ class TermsTest:
 
 @dataclass(frozen=True)
 class Model:
-    """One of several models of the same observations.
+    """One of several models of the same observations."""
 
-    Attributes
-    ----------
-    name
-        What the caller calls it.
-    squares, freedom, parameters
-        Weighted sum of squares, degrees of freedom, estimated parameters of cameras.
-    bic
-        The criterion; the least is the best.
-    checks
-        Root mean square of check points, in the linear unit, where there are ten; NaN otherwise.
-    """
-
-    name: str
-    squares: float
+    name: str  # Name of the caller for it
+    squares: float  # Weighted sum of squares
     freedom: int
-    parameters: int
-    bic: float
-    checks: float
+    parameters: int  # Estimated parameters of cameras
+    bic: float  # The criterion; the least is the best
+    checks: float  # Root mean square of ten check points or more, linear unit; NaN otherwise
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Documented, Brief):
-    """Models of the same observations side by side.
+    """Models of the same observations side by side."""
 
-    Attributes
-    ----------
-    models
-        The best first.
-    known
-        Whether the unit weight is taken for known.
-    nested
-        Tests of every model against the next larger one that has all its parameters and more: names of both,
-        T, its dimension, and the probability where the smaller one is right.
-    """
-
-    models: tuple[Model, ...]
-    known: bool
+    models: tuple[Model, ...]  # The best first
+    known: bool  # Whether the unit weight is known
+    # Tests of every model against the next larger one that has all its parameters and more: names of both, T,
+    # its dimension, and the probability if the smaller one is right
     nested: tuple[tuple[str, str, float, int, float], ...]
 
     @property

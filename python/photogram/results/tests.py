@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -66,52 +67,39 @@ class Tests:
         def station(row: int) -> Phrase:
             return phrase("named.photo", photo=str(photos[row]))
 
-        def of_network(what: str, sd: str) -> tuple[Floats, Floats, Floats, Floats]:
-            names = (f"{what}residuals", sd, f"{what}redundancy", f"{what}standardized")
-            residuals, sd_given, shares, w = (getattr(result, name) for name in names)
-            return residuals, sd_given, shares, w
-
-        return [
-            _component_tests(
-                phrase("test.image_coordinates"),
-                "image",
-                terms.image_axes,
-                image,
-                of_network("", "image_given_sd"),
-                {"images": every},
-                of_photos,
-                of_points,
-            ),
-            _component_tests(
-                phrase("test.components_of_control"),
+        stations = {"positions": slice(3), "attitudes": slice(3, None)}
+        types: tuple[tuple[Any, ...], ...] = (
+            ("image", "test.image_coordinates", "", terms.image_axes, image, {"images": every}),
+            (
                 "control",
+                "test.components_of_control",
+                "point_",
                 terms.point_axes,
                 control,
-                of_network("point_", "point_given_sd"),
                 {"control": every},
-                points=np.arange(len(points)),
             ),
-            _component_tests(
-                phrase("test.components_of_stations"),
-                "station",
-                terms.photo_axes,
-                station,
-                of_network("photo_", "photo_given_sd"),
-                {"positions": slice(3), "attitudes": slice(3, None)},
-                photos=np.arange(len(photos)),
-            ),
-            *(
-                _component_tests(
-                    phrase("test.components", kind=kind_words(each.kind)),
-                    each.kind,
-                    tuple(map(component_axis, each.components, each.units)),
-                    partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each),
-                    (each.residuals, each.sd, each.redundancy, each.standardized),
-                    {"observations": every},
-                )
-                for each in terms.kinds
-            ),
-        ]
+            ("station", "test.components_of_stations", "photo_", terms.photo_axes, station, stations),
+        )
+        owners = {
+            "image": {"photos": of_photos, "points": of_points},
+            "control": {"points": np.arange(len(points))},
+            "station": {"photos": np.arange(len(photos))},
+        }
+        found = []
+        for kind, code, what, axes, name, groups in types:
+            sd = getattr(result, f"{what or 'image_'}given_sd")
+            residuals, shares, w = (
+                getattr(result, f"{what}{each}") for each in ("residuals", "redundancy", "standardized")
+            )
+            values = residuals, sd, shares, w
+            found.append(_component_tests(phrase(code), kind, axes, name, values, groups, **owners[kind]))
+        for each in terms.kinds:
+            title = phrase("test.components", kind=kind_words(each.kind))
+            name = partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each)
+            axes = tuple(map(component_axis, each.components, each.units))
+            values = each.residuals, each.sd, each.redundancy, each.standardized
+            found.append(_component_tests(title, each.kind, axes, name, values, {"observations": every}))
+        return found
 
     @cached_property
     def components(self) -> list[ComponentTests]:

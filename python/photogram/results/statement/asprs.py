@@ -65,15 +65,9 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
     the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
     """
-    rest = (found - survey) * (found + survey)
-    return Accuracy(
-        count,
-        found,
-        survey,
-        math.hypot(found, survey),
-        math.hypot(rmse_interval(found, freedom)[1], survey),
-        math.sqrt(rest) if rest >= 0 else None,
-    )
+    rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
+    product = math.sqrt(rest) if rest >= 0 else None
+    return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey), product)
 
 
 def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:

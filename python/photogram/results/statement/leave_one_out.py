@@ -99,14 +99,5 @@ def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats
     difference[held] = np.where(blind, np.nan, -(factor @ pseudo @ residual))
     sd[held] = np.where(blind, np.nan, np.sqrt(np.diag(own)))
     covariance[np.ix_(held, held)] = own
-    return LeftOut(
-        name,
-        difference,
-        sd,
-        covariance,
-        statistic,
-        rank,
-        _photocore.chi_square(statistic, rank, upper=True) if rank else float("nan"),
-        np.diag(redundancy),
-        values,
-    )
+    p = _photocore.chi_square(statistic, rank, upper=True) if rank else float("nan")
+    return LeftOut(name, difference, sd, covariance, statistic, rank, p, np.diag(redundancy), values)

@@ -147,27 +147,7 @@ class Standards:
         return members(self.nssda, "ratio", "accuracy_r_equal", **more)
 
 
-def standards(
-    result: Result,
-    asked: Asked,
-    found: Compared,
-    of_all: Figures | None,
-    of_vegetated: Figures | None,
-    left_out: Sequence[LeftOut],
-) -> Standards:
-    """Return what the standards say that are asked for; refuse lengths between points that are not there."""
-    lengths = _lengths(result, asked) if asked.lengths else None
-    return Standards(
-        asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
-        if "asprs-2023" in asked.standards
-        else None,
-        nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
-        lengths=lengths,
-        iso_19157=_iso(result, asked, of_all, lengths) if "iso-19157" in asked.standards else [],
-    )
-
-
-def _asprs(
+def asprs_figures(
     result: Result,
     asked: Asked,
     found: Compared,
@@ -175,6 +155,7 @@ def _asprs(
     of_vegetated: Figures | None,
     left_out: Sequence[LeftOut],
 ) -> Asprs:
+    """Return the figures of the ASPRS, and the verdicts on the classes that were asked for."""
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
@@ -257,7 +238,8 @@ def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
 
 
-def _lengths(result: Result, asked: Asked) -> Lengths:
+def tested_lengths(result: Result, asked: Asked) -> Lengths:
+    """Return calibrated lengths with their test; refuse lengths between points that are not there."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
     places = {name: row for row, name in enumerate(block.point_ids)}
@@ -297,9 +279,10 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
 
 
-def _iso(
+def iso_measures(
     result: Result, asked: Asked, of_all: Figures | None, lengths: Lengths | None
 ) -> list[dict[str, Any]]:
+    """Return the figures as measures of ISO 19157."""
     more = {"unit": result.block.linear_unit, "date": asked.date}
     found: list[dict[str, Any]] = []
     if of_all is not None:
