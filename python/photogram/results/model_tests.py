@@ -267,7 +267,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
             freedom = [_all_freedom(results[each]) for each in (small, large)]
             k, statistic = freedom[0] - freedom[1], omega[0] - omega[1]
             scale = 1.0 if taken else omega[1] / freedom[1]
-            p = _probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
+            p = tail_probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
             nested.append((small, large, statistic, k, p))
     return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
 
@@ -362,11 +362,11 @@ def _tested(
     camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float, effect: float
 ) -> TermsTest:
     k = len(names)
-    probability = _probability(statistic / scale, k, freedom)
+    probability = tail_probability(statistic / scale, k, freedom)
     return TermsTest(camera, tuple(names), statistic, k, freedom, probability, effect)
 
 
-def _probability(value: float, k: int, freedom: float) -> float:
+def tail_probability(value: float, k: int, freedom: float) -> float:
     if math.isinf(freedom):
         return _photocore.chi_square(value, k)
     return _photocore.fisher(value / k, k, freedom) if freedom > 0 else math.nan

@@ -68,7 +68,6 @@ class NetworkTrial:
         return int(self.suspects.row_starts[-1]) <= WHOLE
 
     def adjust(self, out: Out) -> Standing:
-        """Adjust without what is out, from where the last adjustment has ended."""
         tolerance = self.exact if self.whole else self.rough
         standing = self._asked(
             self.core.adjust,
@@ -131,7 +130,6 @@ class NetworkTrial:
         )
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups against the rest."""
         found = self.core.predictions(list(groups))
         return [
             None
@@ -432,7 +430,6 @@ class BlockSuspects(NamedSuspects):
         return Phrase("named.unknown", {"unknown": self.block.unknowns[subject].name})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
-        """Return the name and unit of a component; parameters and common unknowns have numbers."""
         if kind != OBSERVATION:
             return str(component), ""
         observation = self.observations[subject]

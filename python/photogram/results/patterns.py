@@ -252,13 +252,8 @@ class DrawnPattern:
     draws: int
 
 
-@dataclass(frozen=True)
-class _Pattern:
-    name: str
-    statistic: str
-    value: Callable[[Floats], float]
-    """Of (m, 2) residuals ~v."""
-    least: bool = False  # Whether small values are the pattern
+_Pattern = tuple[str, str, Callable[[Floats], float]]
+"""What is looked for, its statistic, and the value of this of (m, 2) residuals ~v."""
 
 
 def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[DrawnPattern]:
@@ -295,7 +290,7 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
         with np.errstate(invalid="ignore", divide="ignore"):
             w = np.where(redundancy > 0, residuals / np.sqrt(redundancy), math.nan)
         clipped = _clipped(w, redundancy, float(np.nanmedian(np.abs(w))) / MEDIAN)
-        return np.array([pattern.value(clipped) for pattern in tests])
+        return np.array([value(clipped) for *_, value in tests])
 
     found = values(result.residuals / block.image_sd)
     random, core = np.random.default_rng(seed), factored(result)
@@ -305,13 +300,13 @@ def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[D
         errors = np.where(used[:, np.newaxis], random.normal(size=(count, *block.image_xy.shape)), 0.0)
         drawn += [values(each) for each in core.project_images(errors, threads=0, progress=None)]
     tested = []
-    for pattern, value, by_chance in zip(tests, found.tolist(), np.array(drawn).T, strict=True):
+    for (name, statistic, _), value, by_chance in zip(tests, found.tolist(), np.array(drawn).T, strict=True):
         if math.isfinite(value):
-            strong = int((by_chance <= value if pattern.least else by_chance >= value).sum())
+            strong = int((by_chance <= value if statistic == "d" else by_chance >= value).sum())
             sd = float(by_chance.std(ddof=1)) if draws > 1 else math.nan
             p = (1 + strong) / (1 + draws)
             mean = float(by_chance.mean())
-            tested.append(DrawnPattern(pattern.name, pattern.statistic, value, mean, sd, p, draws))
+            tested.append(DrawnPattern(name, statistic, value, mean, sd, p, draws))
     return tested
 
 
@@ -322,7 +317,7 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
     if block.photo_cameras is not None:
         cameras = [(each.name, block.photo_cameras == row) for row, each in enumerate(result.cameras)]
     tested = (redundancy > 0).any(axis=1)
-    found = []
+    found: list[_Pattern] = []
     for name, own_photos in cameras:
         own = np.flatnonzero(own_photos[block.image_photos] & tested)
         xy, on, r = focal_images(block)[own], block.image_photos[own], redundancy[own]
@@ -335,11 +330,11 @@ def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
             return moran(xy, on, v[own])
 
         found += [
-            _Pattern(f"pattern over the frame of {name}", "B", bins),
-            _Pattern(f"neighbours in the frame of {name}", "I", alike),
+            (f"pattern over the frame of {name}", "B", bins),
+            (f"neighbours in the frame of {name}", "I", alike),
         ]
 
     def along(v: Floats) -> float:
         return durbin_watson(block.image_photos, len(photos), v, redundancy)
 
-    return [*found, _Pattern("one photo and the next", "d", along, least=True)]
+    return [*found, ("one photo and the next", "d", along)]

@@ -98,7 +98,6 @@ def verdict(figure: Accuracy | None, limit: float) -> str:
 
 
 def wording(count: int) -> str:
-    """Return which of the standard's three sentences holds (7.16): `tested`, `produced`, or `none`."""
     if count >= ENOUGH:
         return "tested"
     return "produced" if count else "none"

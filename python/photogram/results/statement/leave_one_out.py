@@ -28,8 +28,6 @@ PREDICTABLE = 0.01  # Least eigenvalue of R_g of a predictable direction
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A control point, predicted by the rest."""
-
     point: str  # Its name
     # (3,) predicted minus survey, east, north, up; linear unit; NaN if free or hardly predictable
     difference: Floats

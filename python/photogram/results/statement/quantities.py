@@ -31,8 +31,6 @@ TOGETHER = 256  # Points of one block of distances
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """A quantity f(x)."""
-
     name: str  # As it was asked for: `point C08 z`
     subject: Phrase  # The same as a message
     items: tuple[Item, ...]  # What it is a function of: see :class:`photogram.results.Covariances`
@@ -74,7 +72,6 @@ def wanted(result: Result, asked: Any) -> Wanted:
 
 
 def component_of(name: str, axis: Phrase) -> Phrase:
-    """Return the name of a component of a point, photo, camera or unknown."""
     return Phrase("named.component", {"name": name, "axis": axis})
 
 

@@ -116,7 +116,6 @@ class Nssda:
 
     @property
     def wording(self) -> str:
-        """Which sentence holds: `tested` with check points, `compiled` (to meet) without."""
         return "tested" if self.count else "compiled"
 
 
@@ -207,7 +206,6 @@ def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[st
 
 
 def _control_rmse(result: Result) -> tuple[float, float]:
-    """Return root mean squares of the standard deviations of control: radial in plan, and in height."""
     block, found = result.block, []
     turns = turned_to_east(block, block.point_positions)
     for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():

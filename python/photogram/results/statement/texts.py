@@ -72,7 +72,6 @@ class Texts(Words):
         return super().__call__(code, **fields)
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
-        """Return a key with its sentence."""
         return key, self(key, **values)
 
     def _number(self, value: float, form: str) -> str:
