@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -67,32 +66,24 @@ class Tests:
         def station(row: int) -> Phrase:
             return phrase("named.photo", photo=str(photos[row]))
 
-        stations = {"positions": slice(3), "attitudes": slice(3, None)}
-        types: tuple[tuple[Any, ...], ...] = (
-            ("image", "test.image_coordinates", "", terms.image_axes, image, {"images": every}),
-            (
-                "control",
-                "test.components_of_control",
-                "point_",
-                terms.point_axes,
-                control,
-                {"control": every},
-            ),
-            ("station", "test.components_of_stations", "photo_", terms.photo_axes, station, stations),
-        )
-        owners = {
-            "image": {"photos": of_photos, "points": of_points},
-            "control": {"points": np.arange(len(points))},
-            "station": {"photos": np.arange(len(photos))},
-        }
-        found = []
-        for kind, code, what, axes, name, groups in types:
-            sd = getattr(result, f"{what or 'image_'}given_sd")
-            residuals, shares, w = (
-                getattr(result, f"{what}{each}") for each in ("residuals", "redundancy", "standardized")
-            )
-            values = residuals, sd, shares, w
-            found.append(_component_tests(phrase(code), kind, axes, name, values, groups, **owners[kind]))
+        def of_network(
+            title: Phrase, kind: str, what: str, name: Callable[[int], Phrase], groups: Mapping[str, slice]
+        ) -> ComponentTests:
+            axes = {"image": terms.image_axes, "control": terms.point_axes, "station": terms.photo_axes}[kind]
+            names = (f"{what or 'image_'}given_sd", f"{what}redundancy", f"{what}standardized")
+            values = getattr(result, f"{what}residuals"), *(getattr(result, each) for each in names)
+            return _component_tests(title, kind, axes, name, values, groups)
+
+        images = of_network(phrase("test.image_coordinates"), "image", "", image, {"images": every})
+        of_control = phrase("test.components_of_control")
+        controls = of_network(of_control, "control", "point_", control, {"control": every})
+        parts = {"positions": slice(3), "attitudes": slice(3, None)}
+        stations = of_network(phrase("test.components_of_stations"), "station", "photo_", station, parts)
+        found = [
+            replace(images, photos=of_photos, points=of_points),
+            replace(controls, points=np.arange(len(points))),
+            replace(stations, photos=np.arange(len(photos))),
+        ]
         for each in terms.kinds:
             title = phrase("test.components", kind=kind_words(each.kind))
             name = partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each)
@@ -224,8 +215,6 @@ def _component_tests(
     name: Callable[[int], Phrase],
     values: tuple[Floats, Floats, Floats, Floats],
     groups: Mapping[str, slice],
-    photos: Indices | None = None,
-    points: Indices | None = None,
 ) -> ComponentTests:
     """Return the tests of one type by its residuals, standard deviations, redundancy numbers and w."""
     residuals, sd, shares, w = values
@@ -239,8 +228,6 @@ def _component_tests(
         sd=sd,
         redundancy=shares,
         groups={Phrase(f"test.{code}", title.fields): components for code, components in groups.items()},
-        photos=photos,
-        points=points,
     )
 
 

@@ -19,16 +19,8 @@ if TYPE_CHECKING:
 # Types with components of `position` for values, and types whose values are the first of `position`.
 _PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
 _PLACED |= {"rotation coefficient", "gyro bias", "readout", "bend", "knot"}
-_NUMBERS = {
-    "film placement",
-    "film size",
-    "film bend",
-    "roll",
-    "fiducial",
-    "pattern",
-    "scanner",
-    "scanner curve",
-}
+_NUMBERS = {"film placement", "film size", "film bend", "roll"}
+_NUMBERS |= {"fiducial", "pattern", "scanner", "scanner curve"}
 _ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_former", "redundancy")
 
 
