@@ -37,6 +37,7 @@ SUPPORT = 3  # Smallest number of images of a photo with a free pose
 HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
 ROBUST_ITERATIONS = 20
 
+_TESTS = ("active", "rank", "statistic", "least", "shared", "residual", "error", "error_sd")
 
 T = TypeVar("T")
 
@@ -117,17 +118,8 @@ class NetworkTrial:
     def tests(self) -> Tests:
         found = self._tests = self.core.tests()
         inside = ~np.isnan(found["residual"])
-        return Tests(
-            active=found["active"],
-            rank=found["rank"],
-            statistic=found["statistic"],
-            least=found["least"],
-            shared=found["shared"],
-            residual=found["residual"],
-            redundancy=np.where(inside, found["cofactors"][self._diagonal], math.nan),
-            error=found["error"],
-            error_sd=found["error_sd"],
-        )
+        redundancy = np.where(inside, found["cofactors"][self._diagonal], math.nan)
+        return Tests(**{name: found[name] for name in _TESTS}, redundancy=redundancy)
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
         found = self.core.predictions(list(groups))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -130,17 +130,18 @@ def _of_camera(
     x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
     place = {"x": float(found.at[0]), "y": float(found.at[1])}
     fields = {"camera": camera.name, "rms": float(found.rms), "dx": float(x), "dy": float(y), "unit": unit}
-    return Systematic(
-        kind=Phrase("test.frame", {"camera": camera.name}),
-        sentence=Phrase("pattern.frame", {**fields, **place}),
-        statistic="B",
-        distribution="chi2",
-        dof=(found.dof,),
-        value=found.statistic,
-        probability=found.probability,
-        level=LEVEL_OF_PATTERNS,
-        large=found.rms > NOTABLE,
-    )
+    sentence, dof = Phrase("pattern.frame", {**fields, **place}), (found.dof,)
+    kind = Phrase("test.frame", {"camera": camera.name})
+    return _systematic(found, kind, sentence, ("B", "chi2", dof), large=found.rms > NOTABLE)
+
+
+def _systematic(
+    found: Any, kind: Phrase, sentence: Phrase, law: tuple[str, str, tuple[float, ...]], **more: Any
+) -> Systematic:
+    """Return a test by its result and its statistic, distribution and degrees of freedom."""
+    own = {"value": found.statistic, "probability": found.probability, "level": LEVEL_OF_PATTERNS}
+    names = dict(zip(("statistic", "distribution", "dof"), law, strict=True))
+    return Systematic(kind=kind, sentence=sentence, **{**own, **names, **more})
 
 
 def _of_photos(
@@ -178,18 +179,10 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
     two, three = (100 * float(share) for share in found.beyond)
     tails = "heavier" if found.excess > 0 else "lighter"
     fields = {"excess": float(found.excess), "two": two, "three": three}
-    return Systematic(
-        kind=Phrase("test.normality"),
-        sentence=Phrase(f"pattern.{tails}-tails", fields),
-        statistic="A^2",
-        distribution="Anderson-Darling",
-        dof=(),
-        value=found.statistic,
-        probability=found.probability
-        if found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
-        else max(found.probability, LEVEL_OF_PATTERNS),
-        level=LEVEL_OF_PATTERNS,
-    )
+    sentence, law = Phrase(f"pattern.{tails}-tails", fields), ("A^2", "Anderson-Darling", ())
+    notable = found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
+    p = found.probability if notable else max(found.probability, LEVEL_OF_PATTERNS)
+    return _systematic(found, Phrase("test.normality"), sentence, law, probability=p)
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
@@ -211,16 +204,8 @@ def _of_heights(result: AdjustedNetwork) -> Systematic | None:
 def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | None:
     if found is None:
         return None
-    return Systematic(
-        kind=Phrase(f"test.{code}", fields),
-        sentence=Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)}),
-        statistic="F",
-        distribution="F",
-        dof=found.dof,
-        value=found.statistic,
-        probability=found.probability,
-        level=LEVEL_OF_PATTERNS,
-    )
+    sentence = Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)})
+    return _systematic(found, Phrase(f"test.{code}", fields), sentence, ("F", "F", found.dof))
 
 
 @dataclass(frozen=True)
