@@ -20,6 +20,7 @@ from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import by_name
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
@@ -119,10 +120,8 @@ class GroupSums(Documented, Brief):
 
     def __getitem__(self, name: str) -> GroupSum:
         """Return the group of a name."""
-        for each in self.groups:
-            if each.name == name:
-                return each
-        raise KeyError(name)
+        found: GroupSum = by_name(self.groups, name, "group")
+        return found
 
     def groups_table(self) -> Table:
         """Return the declared table: sums, factors of standard deviations, probabilities of sums."""

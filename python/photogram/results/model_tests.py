@@ -26,7 +26,7 @@ from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import unknown_name
+from photogram.messages import by_name, unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
@@ -101,10 +101,7 @@ class Comparison(Documented, Brief):
 
     def difference(self, name: str) -> float:
         """Return by how much the criterion of a model is larger than the least."""
-        for each in self.models:
-            if each.name == name:
-                return each.bic - self.best.bic
-        raise KeyError(name)
+        return float(by_name(self.models, name, "model").bic - self.best.bic)
 
     def statement(self) -> str:
         """Return what the criterion says, in words."""

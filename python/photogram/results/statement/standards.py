@@ -17,7 +17,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import counted
+from photogram.messages import counted, unknown_name
 from photogram.network.observations import Control
 from photogram.results.statement import asprs
 from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
@@ -32,7 +32,6 @@ from photogram.results.statement.lengths import (
     length_test,
     measured_lengths,
 )
-from photogram.results.statement.quantities import unknown
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
@@ -243,7 +242,7 @@ def tested_lengths(result: Result, asked: Asked) -> Lengths:
     places = {name: row for row, name in enumerate(block.point_ids)}
     for name in names:
         if name not in places:
-            raise InputError(unknown("point", name, block.point_ids))
+            raise InputError(unknown_name("point", name, block.point_ids))
         if not result.used_points[places[name]]:
             raise InputError(phrase("adjusted.unused-point", point=name))
     rows = np.array([places[name] for name in names], dtype=np.int64)
