@@ -35,8 +35,6 @@ APART = 1 / (1 + LIMIT)
 
 @dataclass(frozen=True, eq=False)
 class ReliabilitySummary:
-    """The reliability of a network in a few lines."""
-
     level: float  # of the tests
     power: float
     known: bool

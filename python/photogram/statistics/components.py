@@ -61,8 +61,6 @@ class Weighted(Protocol):
 
 @dataclass(frozen=True)
 class GroupsOf:
-    """Groups of observations, by name."""
-
     names: tuple[str, ...]  # (G,) of the groups
     # (G,) the larger group that each is merged into, with all others of the same name, where its own
     # component cannot be estimated; empty for none
@@ -74,8 +72,6 @@ class GroupsOf:
 
 @dataclass(frozen=True)
 class Component:
-    """The variance component of a group."""
-
     name: str  # The group; where several were merged, the larger one
     members: tuple[str, ...]
     count: int  # observations; q and r with the last weights
@@ -107,8 +103,6 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Variance components of groups."""
-
     components: tuple[Component, ...]  # Estimated and held ones
     factors: Floats  # (G,) theta of every group that was given
     matrix: Floats  # (k, k) Helmert matrix of the components at the end
@@ -408,7 +402,6 @@ class _Run:
         return math.log(factors[members[0]])
 
     def finished(self, level: float, equality: tuple[float, int, float] | None) -> Estimate:
-        """Return what was found."""
         free = self.free
         deviations = np.full(len(self.units), np.nan)
         if free:

@@ -210,7 +210,6 @@ def upper_order(count: int, probability: float, confidence: float = 0.95) -> int
 
 
 def _deviations(sd: ArrayLike) -> Floats:
-    """Return (n,) standard deviations."""
     found = numbers("sd", sd, missing=True)
     if found.ndim != 1:
         raise argument_error("sd", "shape", shape="(n,)", actual=found.shape)

@@ -31,8 +31,6 @@ CELLS = 10  # Cells of the frame in each direction; images in one cell are neigh
 
 @dataclass(frozen=True)
 class Normality:
-    """How residuals are distributed."""
-
     values: int  # How many
     excess: float  # Excess kurtosis; 0 of the normal distribution
     # Shares of values beyond 2 and 3 standard deviations: normal are 0.0455 and 0.0027

@@ -10,8 +10,6 @@ from photogram.words import Phrase, phrase
 
 @dataclass(frozen=True)
 class Rival:
-    """What may hold the error instead."""
-
     name: str
     statistic: float  # T when the other was chosen
     dimension: int
@@ -81,8 +79,6 @@ NEAR = 3.0  # Odds of rivals that the log names
 
 @dataclass(frozen=True)
 class Round:
-    """One round."""
-
     number: int  # From 1; 0 for the robust start
     status: str  # of the adjustment at the start of the round
     weighted_sum_of_squares: float  # Omega and f at the start

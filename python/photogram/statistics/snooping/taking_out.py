@@ -28,8 +28,6 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Settings:
-    """How to snoop."""
-
     level: float = LEVEL  # Family level of all tests together, or the false discovery rate
     fdr: bool = False  # Whether it is the latter
     known: bool = True  # Whether the unit weight is known: chi-square decides, else F
