@@ -10,8 +10,8 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
+from photogram.show.sketch.letters import NOWHERE
 from photogram.show.sketch.marks import (
-    NOWHERE,
     Arrows,
     Ellipses,
     Line,

@@ -189,6 +189,10 @@ class Document:
         """Return the tables of all sections and details, with those in layers on request."""
         return [part for part in self.parts(layers=layers) if isinstance(part, quantity.Table)]
 
+    def drawings(self) -> list[Drawing]:
+        """Return the plots of all sections and details."""
+        return [part for part in self.parts(layers=True) if isinstance(part, Drawing)]
+
     def parts(self, *, layers: bool = False) -> list[Part]:
         """Return the parts of all sections and details; parts of layers instead of layers on request."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
