@@ -92,10 +92,10 @@ class Documents:
         if out is None:
             raise misuse("--plots", "requires", options="--out DIR")
         from photogram.plots.accessor import PLOTS
-        from photogram.show.style import need_matplotlib
+        from photogram.show.style import MATPLOTLIB, need
 
         if self.plot_format != "svg":
-            need_matplotlib()
+            need(*MATPLOTLIB)
         job.writes(*(out / f"{name}.{self.plot_format}" for name in PLOTS))
 
     def plots_of(self, result: AdjustedNetwork, out: Path | None) -> dict[Path, bytes]:
