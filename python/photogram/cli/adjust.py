@@ -132,10 +132,9 @@ def _finish(
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
     report = f"{text(document)}\n{read}\n"
     with ThreadPoolExecutor(1) as pool:
-        tables = pool.submit(table_files, result)  # while the page is drawn
-        own = _project_files(project, result)
+        tables, adjusted = pool.submit(table_files, result), pool.submit(_project_files, project, result)
         page = documents.page(job, "adjust", target, lambda: document)
-        files = {"report.txt": report.encode(), **tables.result(), **own, **in_crs}
+        files = {"report.txt": report.encode(), **tables.result(), **adjusted.result(), **in_crs}
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
