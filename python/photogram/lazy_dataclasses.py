@@ -14,11 +14,7 @@ from typing import TYPE_CHECKING, Any
 __all__ = ["asdict", "dataclass", "field", "fields", "replace"]
 
 MAKING = RLock()
-APART = {
-    "__repr__",
-    "__eq__",
-    "__hash__",
-}  # Methods that are made later than the others: few classes need them
+APART = {"__repr__", "__eq__", "__hash__"}  # Methods that few classes need: they are made by themselves
 
 
 class _Later:
