@@ -28,8 +28,8 @@ class _Later:
             waiting = {name for name, own in vars(self.of).items() if isinstance(own, _Later)}
             if self.name in waiting & APART:
                 named = [(each.name, each.type, each) for each in dataclasses.fields(self.of)]
-                compared = {"eq": self.options["eq"], "unsafe_hash": self.options["frozen"]}
-                other = dataclasses.make_dataclass(self.of.__name__, named, init=False, **compared)
+                eq, frozen = self.options["eq"], self.options["frozen"]
+                other = dataclasses.make_dataclass("Other", named, init=False, eq=eq, unsafe_hash=frozen)
                 for name in waiting & APART:
                     setattr(self.of, name, vars(other)[name])
             elif self.name in waiting:
