@@ -121,24 +121,17 @@ def _finish(
     strict: bool,
 ) -> None:
     """Write the results, print a summary, and end by the verdict."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    from photogram.formats.adjusted import excel_file, table_files
+    from photogram.formats.adjusted import excel_file
     from photogram.show.forms import text
 
     told = removed or result
     in_crs, more = _in_system(result, documents.crs, project.control_crs)
     document = told.document().with_sections(*more)
-    read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
-    report = f"{text(document)}\n{read}\n"
-    with ThreadPoolExecutor(1) as pool:
-        tables = pool.submit(table_files, result)  # while the page is drawn
-        own = _project_files(project, result)
-        page = documents.page(job, "adjust", target, lambda: document)
-        files = {"report.txt": report.encode(), **tables.result(), **own, **in_crs}
+    files = _files(project, result, text(document), sections) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
+    page = documents.page(job, "adjust", target, lambda: document)
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
     sizes = project.sizes if project.block.image_unit == "px" else ()
     code = result.verdict.exit_code(strict=strict)
@@ -328,17 +321,19 @@ def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
     return MinimumConstraints() if name == "minimum" else None
 
 
-def _project_files(project: Project, result: Result) -> dict[str, bytes]:
-    """Return the files of the adjusted project: tables, and the format of the project."""
+def _files(project: Project, result: Result, report: str, sections: list[TitledLines]) -> dict[str, bytes]:
+    """Return all files of the output folder."""
     from photogram.formats import FORMATS, to_files
-    from photogram.formats.adjusted import adjusted
+    from photogram.formats.adjusted import adjusted, table_files
     from photogram.network.film_reduction import is_scanned
 
+    read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
+    files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
     whole = own in (None, "plain") and not is_scanned(after.block)
     plain = to_files(after, "plain") if whole else _in_format(after, "plain")
-    files = {f"adjusted/{name}": content for name, content in plain.items()}
+    files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
         files |= {f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()}
         beside = FORMATS[str(own)].results
