@@ -17,7 +17,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.strips import strips_of
 from photogram.show.cells import unit_written
-from photogram.show.quantity import Axis, Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, records
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -263,6 +263,17 @@ class Hypotheses:
             note,
             shown=np.array(order[:10], dtype=np.int64),
         )
+
+    def document(self) -> list[dict[str, Any]]:
+        """Return the rows that both tables show as JSON objects."""
+        every, numbers = self.tests(), self.external_reliability()
+        shown = sorted({*self._shown(every), *self._shown(numbers)})
+        rows = [records(table.columns) for table in (every, numbers)]
+        return [{**rows[0][k], **rows[1][k]} for k in shown]
+
+    @staticmethod
+    def _shown(table: Table) -> list[int]:
+        return [] if table.shown is None else table.shown.tolist()
 
     def _names(self) -> list[Quantity]:
         return [

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
 use super::super::trial::Trial;
-use super::Facts;
+use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages};
 
 /// An error that a set of observations has in common.
