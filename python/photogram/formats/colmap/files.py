@@ -144,7 +144,7 @@ class _Bytes(_Record):
         return Place(self.path, self.record or None, f"byte {self.at}")
 
     def skip(self, size: int) -> int:
-        """Return the first of the next bytes, and go behind them."""
+        """Return the index of the next bytes and move past them."""
         if size > len(self.data) - self.at:
             raise self.place.error(phrase("colmap.bytes", n=size - (len(self.data) - self.at)))
         self.at += size
@@ -158,7 +158,7 @@ class _Bytes(_Record):
         return known[number] if 0 <= number < len(known) else str(number)
 
     def count(self, least: int) -> int:
-        """Return the number of records that follow, each of so many bytes at least."""
+        """Return the number of records that follow, each with a minimum size in bytes."""
         number: int = self.take("Q")[0]
         if number * least > len(self.data) - self.at:
             left = len(self.data) - self.at

@@ -1,4 +1,4 @@
-"""From a COLMAP model to a project."""
+"""Reader of COLMAP models."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def _rigid(pose: Pose, place: Place) -> tuple[Floats, Floats]:
 def _composed(
     model: Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
-    """Put the poses of frames and rigs into the poses of images; return frames of several images."""
+    """Compose the poses of frames and rigs to poses of images; return frames of several images."""
     if not model.frames:
         return []
     cameras = {camera.number: str(camera.number) for camera in model.cameras}

@@ -1,4 +1,4 @@
-"""From a project to a COLMAP model, and the covariances of a result beside it."""
+"""Writer of COLMAP models, and of the covariances of a result."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> bool:
-    """Return whether each camera is one sensor of one rig, or a rig of its own, as COLMAP wants it."""
+    """Return whether each camera belongs to one sensor or one rig, as COLMAP requires."""
     sensors: dict[int, tuple[int, int]] = {}
     for mount in mounts:
         own = cameras[mount.frame], id(mount.sensor)
@@ -151,7 +151,7 @@ def _rigs(
     cameras: Mapping[str, int],
     numbers: Mapping[str, int],
 ) -> tuple[list[content.Rig], list[content.Frame]]:
-    """Return rigs and frames: those of mounts, and of each other camera and photo one of its own."""
+    """Return rigs and frames: of mounts, and one for each other camera and photo."""
     sensors: dict[int, dict[int, content.Pose]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
     mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
@@ -228,7 +228,7 @@ def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
 
 
 def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> bytes:
-    """Return covariances, whose rows stand at their numbers, in the order of these."""
+    """Return covariances, stored by row, in the order of their numbers."""
     own = sorted(rows.items())
     lower = _lower(covariances[[row for _, row in own]])
     table = np.empty(len(own), [("id", number), ("c", "<f8", lower.shape[1])])

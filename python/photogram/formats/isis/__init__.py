@@ -10,7 +10,7 @@ from photogram.formats.format import Format, later
 from photogram.formats.isis.reading import TITLE, is_network
 from photogram.io.files import reading
 
-HEAD = 1 << 16  # Bytes that tell a network
+HEAD = 1 << 16  # Bytes that identify a network
 
 
 def _recognises(path: Path) -> bool:
