@@ -1,4 +1,4 @@
-"""Tables as comma-separated text: numbers read back to the last bit, names have quotation marks if needed."""
+"""Tables as CSV: numbers are exact after reading, names have quotation marks if needed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 
-_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By kinds of arrays
+_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By types of arrays
 
 
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:

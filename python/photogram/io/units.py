@@ -1,4 +1,4 @@
-"""Numbers in other units: conversions that give numbers back as they were typed."""
+"""Numbers in other units: conversions that preserve numbers as they were typed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-TYPED_DECIMALS = 12  # Decimals that people type at most
+TYPED_DECIMALS = 12  # Largest number of decimals in typed numbers
 
-MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))  # Of angles, degrees
+MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))  # Rounding of angles, degrees
 
 
 def scaled(values: Floats, factor: float) -> Floats:
