@@ -1,4 +1,4 @@
-"""Names of packages that are loaded when they are first asked for, and then check their arguments."""
+"""Lazy loading of package members, with argument checks."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ def attach_checked(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """Return `__getattr__`, `__dir__` and `__all__` of a package, as `lazy_loader.attach_stub` does.
 
-    Functions check their arguments, and so do the classes `given`, which users make. Functions make the
-    others.
+    Functions check their arguments. Classes in `given`, which users instantiate, check them too.
     """
     load, listed, public = lazy_loader.attach_stub(package, file)
 
