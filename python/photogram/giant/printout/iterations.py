@@ -24,7 +24,7 @@ def iteration_pages(
 ) -> list[Page]:
     """Return the pages of k iterations with their corrections (k, P, 6) of position and attitude (radians).
 
-    The notice stands below the last one; as published there is no line of the units.
+    The notice is below the last one; the published form has no line with the units.
     """
     if not iterations:
         return [[*headed(TITLE), notice]]
@@ -55,7 +55,7 @@ def _numbers(values: Values) -> str:
     return "".join(fixed(value, 16, 9) for value in values)
 
 
-ACROSS = 10  # Frames on a line
+ACROSS = 10  # Frames per line
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class PointResiduals:
     residuals: Floats
 
     def listed(self, limit: float) -> bool:
-        """Whether COMMON columns 41-50 (millimetres) ask for this point."""
+        """Whether COMMON columns 41-50 (millimetres) select this point."""
         return limit == 0 or (limit > 0 and bool((abs(self.residuals) > limit).any()))
 
 
@@ -76,7 +76,7 @@ def residual_pages(
 ) -> list[Page]:
     """Return the pages of the residuals in processing order, with `closing` (:func:`statistics`) below.
 
-    The limit is that of COMMON columns 41-50; as published there is no line that says what the residuals are.
+    The limit is in COMMON columns 41-50; the published form has no line that defines the residuals.
     """
     meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
     heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))
@@ -101,7 +101,7 @@ def _entries(point: PointResiduals) -> list[list[str]]:
 
 
 def statistics(sums: SumsOfSquares, degrees_of_freedom: float, variance: float | None) -> list[str]:
-    """Return the weighted sums of squares and the estimates for unit weight; `variance` None is undefined."""
+    """Return the weighted sums of squares and the estimates of unit weight; `variance` None is undefined."""
     parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
     lines = [
         f"{f'WEIGHTED SUM OF SQUARES ({name})':<40} ={fixed(size, 16, 3)}" for name, size in parts.items()
