@@ -147,7 +147,7 @@ def _not_loaded() -> None:
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version as version_of  # takes long to import
+        from importlib.metadata import version as version_of  # Import is slow
 
         output.print(f"photogram {version_of('photogram')}")
         raise typer.Exit

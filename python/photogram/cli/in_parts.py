@@ -24,7 +24,7 @@ TAKEN = frozenset(
         *(*DIVIDING, "--iterations", "--plan"),
     )
 )
-"""Options that a project on disk takes. Any other is refused: nothing is left out without a word."""
+"""Options for a project on disk; any other option is rejected."""
 
 
 @dataclass(frozen=True)

@@ -269,7 +269,7 @@ def adjustment_status(
 
 @contextmanager
 def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
-    """Show how many adjustments the estimation of variance components has taken."""
+    """Show the number of completed adjustments of a variance component estimation."""
     with job.status("variance components") as status:
 
         def show(number: int, _: object) -> None:
@@ -425,7 +425,7 @@ def _option(parameter: Parameter) -> str:
     """Return the name of an option on the command line."""
     for mark in get_args(parameter.annotation)[1:]:
         if isinstance(mark, OptionInfo):
-            # Where it is annotated, the first of its names stands in the place of a default.
+            # In an annotation, the default of the mark is the first option name.
             names = [each for each in (mark.default, *(mark.param_decls or ())) if isinstance(each, str)]
             if names:
                 return next((each for each in names if each.startswith("--")), names[0])

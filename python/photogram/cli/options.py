@@ -34,7 +34,7 @@ class Snooping:
 
     @property
     def options(self) -> dict[str, Any]:
-        """As :func:`photogram.snoop` takes them."""
+        """Arguments of :func:`photogram.snoop`."""
         return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight}
 
 

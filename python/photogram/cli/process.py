@@ -15,9 +15,9 @@ SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"  # Ends a status line: rich hides the cursor 
 
 
 def end_by_signals() -> None:
-    """Let SIGINT, SIGTERM and SIGHUP end the process with 128 and their number, unless they are ignored.
+    """End the process on SIGINT, SIGTERM and SIGHUP with exit code 128 + signal, unless ignored.
 
-    Not by an exception: one that is raised inside a destructor or a callback would be lost.
+    Exceptions are not used: one that is raised inside a destructor or a callback would be lost.
     """
     for name in _NAMES:
         number = getattr(signal, name, None)
@@ -26,7 +26,7 @@ def end_by_signals() -> None:
 
 
 def ignore_signals() -> None:
-    """Let signals no longer change the end of a run that is through: the interpreter would die of them."""
+    """Ignore signals after the end of a run: the interpreter would end with their exit code."""
     for name in _NAMES:
         number = getattr(signal, name, None)
         if number is not None:
@@ -82,7 +82,7 @@ def finish(code: int | str | None) -> int | str | None:
                 stream.flush()
         except OSError as error:
             code = code or stream_fault(error)
-            # The interpreter writes it out once more at its end: now to where it always can.
+            # The interpreter flushes the stream again at exit: redirect it to the null device.
             with suppress(OSError):
                 nowhere = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nowhere, descriptor)

@@ -208,7 +208,7 @@ _MANY = 10
 
 
 def _ray_counts(rays: Indices) -> list[tuple[int, int]]:
-    """Return how many points have one, two, ... rays."""
+    """Return pairs of a number of rays and the number of points with it."""
     import numpy as np
 
     counts = np.bincount(np.minimum(rays[rays > 0], _MANY), minlength=_MANY + 1)

@@ -1,4 +1,4 @@
-"""`photogram statement`: an accuracy statement that one may hand over."""
+"""`photogram statement`: an accuracy statement for a client."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
     settings = folder.resolve().with_name("project.toml")
     if not settings.is_file():
         return None
-    # Of its files only this one says something of the statement: the figures are those of the result.
+    # Only the settings concern the statement: all figures are from the result.
     job.reads(settings)
     project = read(settings.parent, "plain")
     own, block = result.block, project.block

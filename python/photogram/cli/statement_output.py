@@ -1,4 +1,4 @@
-"""Statements as commands make and write them."""
+"""Creation and output of accuracy statements."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class StatementOptions:
     date: str | None = None
 
     def check_alone(self) -> None:
-        """Refuse these options of a command that makes no statement."""
+        """Reject these options for a command without a statement."""
         given = [each.name for each in fields(self) if getattr(self, each.name) is not None]
         if given:
             raise misuse(f"--{given[0].replace('_', '-')}", "requires", options="--statement")
