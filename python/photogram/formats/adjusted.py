@@ -33,7 +33,7 @@ _TABLES = {
 
 
 def adjusted(project: Project, result: Result) -> Project:
-    """Return a project with adjusted values of free parameters; observations are unchanged."""
+    """Return a project with adjusted parameters; observations are unchanged."""
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
     return project.replace(block=result.restarted(), starts=starts, lacks=())
 
@@ -67,7 +67,7 @@ def feature_files(features: Features) -> Mapping[str, bytes]:
 
 
 def excel_file(result: Result) -> bytes:
-    """Return the tables of a result as a workbook: a sheet for each table, and `notes` with units."""
+    """Return the tables of a result as a workbook, with units in `notes`."""
     tables = {file: TABLES[kind](result) for file, kind in _TABLES.items()}
     sheets = {file: frame(table) for file, table in tables.items()}
     filled = {file: columns for file, columns in sheets.items() if len(next(iter(columns.values())))}

@@ -1,4 +1,4 @@
-"""AICON: photo coordinates, interior and exterior orientation, object coordinates and scale bars as text.
+"""AICON: photo and object coordinates, orientation and scale bars as text.
 
 Columns as in the open reader of such files (applied-geodesy/bundle-adjustment, JAiCov): words between
 blanks, one record per line, `#` before comments; millimetres and radians.
@@ -54,7 +54,7 @@ class _Found:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the photo coordinates and the other files of the folder; cameras are required."""
+    """Read photo coordinates and the other files; cameras are required."""
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
     if images is None:

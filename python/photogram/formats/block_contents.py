@@ -1,4 +1,4 @@
-"""Contents of a block for writers: posed photos, correlated control, trajectories, missing positions."""
+"""Contents of a block for writers: poses, control, trajectories."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def correlated_control(block: Block) -> dict[str, Control]:
 
 
 def check_images(block: Block, title: str) -> None:
-    """Reject a block with image coordinates of films or line scanners: a file has no format for them."""
+    """Reject image coordinates of films or line scanners."""
     scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
     if scanned:
         raise InputError(phrase("format.film", title=title, photo=scanned[0]))
@@ -43,7 +43,7 @@ def check_images(block: Block, title: str) -> None:
 
 
 def motions(project: Project) -> list[str]:
-    """Describe the trajectories of a project, one per line; empty without trajectories."""
+    """Describe the trajectories of a project, one per line."""
     block = project.block
     shared = shared_trajectories(block)
     if not block.timed and not shared:
@@ -94,7 +94,7 @@ def _told(trajectory: Trajectory, block: Block) -> str:
 
 
 def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
-    """Describe the corrections of a trajectory and whether their coefficients are fixed."""
+    """Describe the corrections of a trajectory."""
     if basis is None:
         return "as given"
     kind = "polynomial" if isinstance(basis, Polynomial) else "spline"

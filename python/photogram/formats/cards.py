@@ -53,7 +53,7 @@ def filled_lines(path: Path) -> Iterator[Place]:
 
 
 def cards(path: Path) -> Iterator[Card]:
-    """Yield the lines of a file that are not comments (`C ...`), including blank lines."""
+    """Yield the lines of a file except comments (`C ...`)."""
     for record, line in enumerate(read_lines(path), 1):
         words = line.split()
         if words and words[0] in ("C", "#"):
@@ -62,7 +62,7 @@ def cards(path: Path) -> Iterator[Card]:
 
 
 def names_beside(path: Path) -> dict[str, str]:
-    """Return the names by number from a table `number, name`; empty if the file does not exist."""
+    """Return names by number from a table `number, name`; empty without file."""
     if not path.is_file():
         return {}
     table = read_columns(path, known=("number", "name"))
@@ -77,7 +77,7 @@ def names_beside(path: Path) -> dict[str, str]:
 
 
 def has_suffix(suffix: str, path: Path) -> bool:
-    """Return whether a file has a suffix, in any case, or a folder contains such a file."""
+    """Return whether a file, or a file in a folder, has a suffix in any case."""
     return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
 
 
@@ -92,7 +92,7 @@ def one_file(path: Path, suffix: str) -> Path | None:
 
 
 def angle_unit(wished: str | None, default: str | None, path: Path) -> str:
-    """Return the unit of angles: requested, or of the format; an error without either."""
+    """Return the unit of angles: requested or of the format, else an error."""
     unit = wished or default
     if unit is None:
         raise InputError(phrase("format.angle-unit"), file=path)

@@ -81,7 +81,7 @@ def _write_bundler(project: Project) -> Mapping[str, bytes]:
 
 
 def _read_bal(path: Path, wishes: Wishes) -> Project:
-    """Read a problem, optionally packed by bzip2 or gzip; numbers are the names of photos and points."""
+    """Read a problem, optionally packed; photos and points have numbers."""
     from photogram.collection.formats import bal
 
     del wishes
@@ -90,7 +90,6 @@ def _read_bal(path: Path, wishes: Wishes) -> Project:
 
 
 def _write_bal(project: Project) -> Mapping[str, bytes]:
-    """Return the file of a problem."""
     from photogram.collection.formats import bal
 
     return {PROBLEM: bal.FORMAT.to_bytes(collection_of(project)[0])}
@@ -197,7 +196,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
 def _moved(
     project: Project, cameras: list[Camera], sizes: Sequence[Size | None], of_images: Indices
 ) -> Floats:
-    """Return (m, 2) image coordinates from the centre, y up, corrected for all but f, k1, k2."""
+    """Return (m, 2) image coordinates from the centre, reduced to f, k1, k2."""
     block = project.block
     found = block.image_xy.copy()
     directions = image_directions(block)

@@ -1,4 +1,4 @@
-"""Column headings of coordinates by language, and words for control and check points.
+"""Column headings of coordinates, and words for control and check points.
 
 All readers of points with coordinates use this table. Words are without accents and marks (`hohe` is Höhe). A
 heading is known if it is one of the words, or if all its words have one meaning (`X/Easting`, `Punkt-Nr.`).
@@ -167,14 +167,14 @@ _KNOWN, _KNOWN_ROLES = _looked_up(_COLUMNS), _looked_up(_ROLES)
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a heading or cell in small letters, without accents, marks and brackets."""
+    """Return the words of a heading in small letters, without accents."""
     bare = unicodedata.normalize("NFKD", _BRACKETS.sub(" ", text).casefold().replace("σ", " sigma "))
     plain = "".join(each for each in bare if not unicodedata.combining(each))
     return re.sub(r"[^0-9a-z]+", " ", plain).split()
 
 
 def _meaning(words: list[str]) -> str | None:
-    """Return the common meaning of words: of the phrase, or of all words except fillers."""
+    """Return the common meaning of words, ignoring fillers."""
     if (whole := _KNOWN.get(" ".join(words))) is not None:
         return whole
     found = {
@@ -226,7 +226,7 @@ def is_angular(heading: str) -> bool:
 
 
 def units_of(heading: str) -> list[str]:
-    """Return the words in brackets of a heading without k=2, otherwise its unit of length at the end."""
+    """Return the units in a heading: in brackets, otherwise at the end."""
     inside = [_COVERAGE.sub(" ", each) for each in _BRACKETS.findall(heading.casefold())]
     found = [" ".join(each.replace("_", " ").split()).strip(" ,;") for each in inside]
     words = re.sub(r"[^0-9a-zμ-]+", " ", heading.casefold()).split()
@@ -240,7 +240,7 @@ def coverage_of(heading: str) -> float | None:
 
 
 def bare_name(heading: str, known: Collection[str]) -> str | None:
-    """Return the known column that a heading names without unit and coverage factor; None for another."""
+    """Return the known column of a heading, ignoring unit and coverage factor."""
     if not all(any(word in units for units in KINDS_OF_UNITS.values()) for word in units_of(heading)):
         return None
     words = _COVERAGE.sub(" ", _BRACKETS.sub(" ", heading.casefold())).replace("_", " ").split()
@@ -251,5 +251,5 @@ def bare_name(heading: str, known: Collection[str]) -> str | None:
 
 
 def role_of(text: str) -> str | None:
-    """Return `control`, `check`, `off`, or `?` for an ambiguous word of the first two; None for others."""
+    """Return `control`, `check`, `off` or `?` (ambiguous); None for other words."""
     return _KNOWN_ROLES.get(" ".join(words_of(text)))

@@ -56,7 +56,7 @@ _DMS = re.compile(
 
 
 def degrees(text: str) -> float:
-    """Return degrees from `47.37`, `47 22 12.3`, `47°22.205'`, `8°32'24.5" W` or `S 8:32:24.5`."""
+    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`."""
     match = _DMS.fullmatch(text.strip())
     before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
     values = [float(part.replace(",", ".")) for part in parts if part]
@@ -82,7 +82,7 @@ class Columns:
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
-        """Return the internal names of all columns of a table from the headings of the file."""
+        """Return the internal names of all columns from the headings of a file."""
         names = [""] * len(own)
         for column, heading in self.headings.items():
             for place in _places(heading, own):
@@ -124,7 +124,7 @@ def is_photo(heading: str) -> bool:
 
 
 def _places(heading: str, own: Sequence[str]) -> list[int]:
-    """Return the index of the column of a user's heading, by spelling, then by words; at most one."""
+    """Return the index of the column of a user's heading; at most one."""
     plain = heading.strip().lower()
     for given in (plain, plain.removeprefix("-").strip(), plain.removeprefix("-").partition("[")[0].strip()):
         found = [k for k, each in enumerate(own) if each == given] or [
@@ -136,7 +136,7 @@ def _places(heading: str, own: Sequence[str]) -> list[int]:
 
 
 def columns_given(columns: str | None, roles: str | None) -> Columns:
-    """Return the columns in `point=Name,x=Rechtswert`, `point,x,y,z,-` or `PNEZD`, and roles `KP=check`."""
+    """Return columns of `point=Name,x=Rechtswert` or `PNEZD`, and roles."""
     headings, ignored, order = dict[str, str](), list[str](), list[str]()
     words = [each.strip() for each in (columns or "").split(",") if each.strip()]
     if len(words) == 1 and set(words[0].lower()) <= set(SHORT) and len(words[0]) > 2:
@@ -219,7 +219,7 @@ def in_units(
     messages: list[Message],
     headings: Mapping[str, str] = MappingProxyType({}),
 ) -> ColumnTable:
-    """Return a table in internal units, converted by the units and coverage factors of its headings."""
+    """Return a table in internal units, by units and factors of its headings."""
     ready, remarks = dict(table.ready), list[Phrase]()
     for column, own in table.headings:
         heading = headings.get(column, own)
@@ -258,7 +258,7 @@ def in_units(
 
 
 def _has_notes(column: str, own: str, word: str) -> bool:
-    """Return whether a word in brackets may be a note: X (UTM32), or degrees of longitudes."""
+    """Return whether a word in brackets may be a note, as in X (UTM32)."""
     angle = word in KINDS_OF_UNITS["angle"]
     units = any(word in known for known in KINDS_OF_UNITS.values())
     if column.startswith("sd") and "%" in word:
@@ -283,7 +283,7 @@ def _on_axis(other: str, text: str) -> float:
 
 
 def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
-    """Select the column with the most names of observed points, if several may contain names."""
+    """Select the column of names with the most observed points."""
     found = [
         column for column, own in table.headings if column in ("point", NAMELESS) or column_of(own) == "point"
     ]
@@ -301,7 +301,7 @@ def _with_points(table: ColumnTable, names: Collection[str], messages: list[Mess
 
 
 def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -> ColumnTable:
-    """Return a table whose column `use` contains control, check and off, from any column of roles."""
+    """Return a table with control, check and off in its column `use`."""
     headings = dict(table.headings)
     words = {
         column: [_role(cell, columns) for cell in table.texts(column)]
@@ -329,7 +329,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
 
 
 def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
-    """Return columns of roles by their headings, otherwise columns with words for check points."""
+    """Return columns of roles, by heading, otherwise by their words."""
     found = [
         column
         for column, own in table.headings
@@ -379,7 +379,7 @@ def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None])
 def check_unread(
     table: ColumnTable, columns: Columns, known: Collection[str], name: str, messages: list[Message]
 ) -> None:
-    """Reject unknown columns of numbers of strict tables; report other unknown columns."""
+    """Reject unknown numeric columns of strict tables; report other ones."""
     others = _unread(table, known)
     numbers = [
         own

@@ -1,4 +1,4 @@
-"""Control with image observations in OpenSfM files: `gcp_list.txt`, `ground_control_points.json`."""
+"""Control lists of OpenSfM: `gcp_list.txt`, `ground_control_points.json`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ControlList:
 
     control: ColumnTable  # A table `point, x, y, z`
     images: ColumnTable  # A table `photo, point, column, row`, pixels from the corner
-    crs: str  # Of the control
+    crs: str  # System of the control
     messages: list[Message]  # Remarks
 
 
@@ -45,7 +45,7 @@ def read_control_list(path: Path, project: Project) -> ControlList | None:
 
 
 def system_of(line: str, place: Place) -> str:
-    """Return the system in the first line of a list: `WGS84`, `WGS84 UTM 32N`, `EPSG:n`, `+proj=...`."""
+    """Return the system in the first line of a list, e.g. `WGS84 UTM 32N`."""
     if line.upper() == "WGS84":
         return WGS84
     if line.upper().startswith(("EPSG:", "+PROJ=")):

@@ -36,7 +36,7 @@ Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]
 def check_systems(
     project: Project, settings: Settings, table: ColumnTable, points: Indices, values: Floats, *, free: bool
 ) -> list[Message]:
-    """Reject control that fits the photos only after a correction, or is far from all photos.
+    """Reject control that fits only after a correction, or is far away.
 
     `points`: (k,) points of the project; `values`: (k, 3) their coordinates in the table;
     `free`: whether a similarity may transform the model of the project onto control.
@@ -58,7 +58,7 @@ def check_systems(
         return []
 
     def misfit(own: Settings, xyz: Floats) -> tuple[float, float]:
-        """Return the misfit and the extent of control; infinite if it cannot be transformed."""
+        """Return misfit and extent of control; infinite without transformation."""
         try:
             placed, _ = Transform(own, []).positions("control", xyz, None, table)
         except InputError:
@@ -115,14 +115,14 @@ def _swapped(xyz: Floats) -> Floats:
 
 
 def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
-    """Return whether the similarity from model to control moves stations below control."""
+    """Return whether control is above the transformed stations."""
     scale, turn, shift, misfit = similarity(model, placed)
     heights = (scale * stations @ turn.T + shift)[:, 2]
     return bool(np.isfinite(misfit) and (heights < placed[:, 2].min()).all())
 
 
 def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Exchange]:
-    """Yield corrections of control with their remedies; a similarity absorbs scales and signs."""
+    """Yield corrections of control with their remedies."""
     x, y, z = (heading_of(table, axis) for axis in "xyz")
     yield phrase("control-system.swapped"), _swap(table), _swapped
     feet = phrase("control-system.unit", name=z, unit="ft")

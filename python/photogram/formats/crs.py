@@ -1,4 +1,4 @@
-"""Coordinate reference systems: transformation from any system of PROJ to a cartesian frame, and back.
+"""Coordinate reference systems: from any system of PROJ to a frame, and back.
 
 x is longitude or easting, y latitude or northing, z height, in any axis order of the authority. The axes of a
 topocentric frame are east, north and up of the ellipsoid of WGS 84 at its origin.
@@ -44,7 +44,7 @@ def _system(crs: str) -> pyproj.CRS:
 
 @cache
 def _transformer(source: str, target: str) -> Any:
-    """Return a transformation that fails, instead of keeping heights, if a grid is missing."""
+    """Return a transformation that fails if a grid of heights is missing."""
     import pyproj
 
     first, second = _system(source), _system(target)
@@ -86,19 +86,19 @@ def geocentric(crs: str, xyz: Floats) -> Floats:
         return _geocentric_of(local) + xyz @ east_north_up(local)
     system = _system(crs)
     if len(system.axis_info) == 2:
-        # A two-dimensional system keeps heights; its three-dimensional counterpart has ellipsoidal ones.
+        # A two-dimensional system receives ellipsoidal heights of its three-dimensional counterpart.
         return _transformed(_with_heights(crs), GEOCENTRIC, xyz + _geoid(crs))
     return _transformed(crs, GEOCENTRIC, xyz + _geoid(crs))
 
 
 def _geoid(crs: str) -> Floats:
-    """Return the (3,) correction from heights above the geoid of a system to ellipsoidal heights."""
+    """Return the (3,) correction from heights above the geoid."""
     match = _GEOID.search(crs)
     return np.array([0.0, 0.0, 0.0 if match is None else float(match[1])])
 
 
 def has_geoid_heights(crs: str) -> bool:
-    """Return whether the heights of a system refer to the geoid (or sea level), not to the ellipsoid."""
+    """Return whether heights refer to the geoid instead of the ellipsoid."""
     if enu_origin(crs) is not None:
         return False
     return _GEOID.search(crs) is not None or bool(_system(crs).is_compound)
@@ -123,7 +123,7 @@ def enu_origin(crs: str) -> tuple[float, float, float] | None:
 
 
 def east_north_up(origin: tuple[float, float, float]) -> Floats:
-    """Return (3, 3) rows: the directions east, north and up at a position, in geocentric axes."""
+    """Return (3, 3) rows: east, north and up at a position, geocentric."""
     lat, lon = np.radians(origin[:2])
     return np.array(
         [
@@ -191,7 +191,7 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
 
 
 def turned_covariances(turns: Floats, covariances: Floats) -> Floats:
-    """Return (n, 3, 3) covariances along rotated axes; isotropic ones are unchanged to the last bit."""
+    """Return (n, 3, 3) covariances along rotated axes; isotropic ones exactly."""
     alike = covariances[:, :1, :1] * np.eye(3)
     return alike + turns @ (covariances - alike) @ turns.swapaxes(-1, -2)
 
@@ -204,7 +204,7 @@ def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tupl
     Raises
     ------
     InputError
-        If the frame has no position on the earth, or a position cannot be transformed.
+        If the position of the frame on the earth is unknown, or a position cannot be transformed.
     """
     found, turns = to_system(crs, xyz, frame)
     return found, turned_covariances(turns, covariances)
@@ -235,7 +235,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 
 def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
-    """Return whether a system has longitudes and latitudes on an ellipsoid with these semi-axes, metres."""
+    """Return whether a system is geographic on this ellipsoid (semi-axes, m)."""
     if enu_origin(crs) is not None or not _system(crs).is_geographic:
         return False
     own = _system(crs).ellipsoid
@@ -261,7 +261,7 @@ def _geographic(frame: Frame) -> str:
 
 
 def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
-    """Return geocentric positions, and (n, 3, 3) rows: the local axes of the frame in geocentric axes."""
+    """Return geocentric positions, and (n, 3, 3) local axes of the frame as rows."""
     if not has_place(frame):
         raise InputError(phrase("crs.place", frame=frame.phrase))
     if frame.kind == "topocentric" and frame.origin is not None:
@@ -277,7 +277,7 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 
 def is_projected(crs: str) -> bool:
-    """Return whether a system is projected: its coordinates are eastings and northings."""
+    """Return whether a system has eastings and northings of a projection."""
     if enu_origin(crs) is not None:
         return False
     system = _system(crs)
@@ -285,7 +285,7 @@ def is_projected(crs: str) -> bool:
 
 
 def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
-    """Return names and units of the three coordinates of a system; angles are in degrees."""
+    """Return names and units of the three coordinates; angles in degrees."""
     if enu_origin(crs) is not None:
         return ("east", "north", "up"), ("m", "m", "m")
     system = _system(crs)
@@ -297,7 +297,7 @@ def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
 
 
 def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
-    """Return (n, 3, 3) rows: the axis directions of a system at points, in geocentric axes.
+    """Return (n, 3, 3) rows: axes of a system at points, geocentric.
 
     The axes of a projected system are grid axes, so they include the convergence of meridians.
     """
@@ -337,7 +337,7 @@ def _remarks(crs: str) -> list[Phrase]:
 
 
 def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
-    """Return (n, 3, 3) rotations of attitudes from the local axes of a system into a frame."""
+    """Return (n, 3, 3) rotations of local attitudes of a system into a frame."""
     if frame.kind != "topocentric" or frame.origin is None:
         raise InputError(phrase("crs.attitudes", crs=crs, frame=frame.phrase))
     found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)

@@ -1,4 +1,4 @@
-"""Results in a coordinate reference system: positions, covariances (metres east, north, up), attitudes."""
+"""Results in a coordinate reference system: positions, covariances, attitudes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Placed:
     names, units
         Names and units of the three coordinates.
     rows
-        (k,) points that took part in the adjustment.
+        (k,) points used in the adjustment.
     photos, points
         (P, 3) and (k, 3) positions: longitude or easting, latitude or northing, height; angles in degrees.
     photo_covariances, point_covariances
@@ -72,7 +72,7 @@ class Placed:
     attitudes: Attitudes
 
     def angles(self) -> tuple[Floats, Floats]:
-        """Return (P, 3) omega, phi, kappa in the system and their standard deviations, radians.
+        """Return (P, 3) omega, phi, kappa and standard deviations, radians.
 
         The sense of the angles is the one of the block.
         """
@@ -86,7 +86,7 @@ class Placed:
         return _carried(self.result.block, self.crs, check_place(self.result.block, self.crs), xyz)[0]
 
     def moved(self, places: Floats, steps: Floats) -> Floats:
-        """Shift (n, 3) positions of the system by (n, 3) metres to the east, north and up."""
+        """Shift (n, 3) positions of the system by (n, 3) metres east, north, up."""
         if self.names[0] != "longitude":
             return places + steps
         known = np.column_stack([np.radians(places[:, :2]), places[:, 2]])
@@ -94,10 +94,10 @@ class Placed:
         return places + steps / lengths * [DEGREE, DEGREE, 1.0]
 
     def control_differences(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) differences adjusted minus given of control, metres.
+        """Return rows and (c, 3) differences adjusted minus given of control, metres.
 
-        Differences are along east, north and up. Differences of free components are 0 before the rotation.
-        Control observed with a covariance matrix follows the other control.
+        Rows are among all points. Differences are along east, north and up. Differences of free components
+        are 0 before the rotation. Control observed with a covariance matrix follows the other control.
         """
         control = self.result.control
         names, observed = _observed_differences(self.result)
@@ -109,7 +109,7 @@ class Placed:
         return rows, _turned(own, differences)
 
     def differences(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) adjusted minus given of check points, metres."""
+        """Return rows and (c, 3) adjusted minus given of check points, metres."""
         result = self.result
         own = result.point_kinds[self.rows] == "check"
         rows = self.rows[own]
@@ -117,7 +117,7 @@ class Placed:
 
 
 def check_place(block: Block, crs: str) -> Frame:
-    """Return the frame of a block for results in a system; an empty system requires none.
+    """Return the frame of a block for results in a system.
 
     If only the ellipsoid of longitudes and latitudes is known, the requested system defines their datum.
     """
@@ -150,8 +150,8 @@ def placed(result: Result, crs: str = "") -> Placed:
     Raises
     ------
     InputError
-        If the frame has no position on the earth, lengths are not metres, PROJ does not know the system, a
-        grid for heights is missing, or positions are outside the system.
+        If the position of the frame on the earth is unknown, or lengths are not metres. If PROJ does not know
+        the system, lacks a grid for heights, or cannot transform a position.
     """
     block = result.block
     rows = np.flatnonzero(result.used_points)
@@ -186,7 +186,7 @@ def placed(result: Result, crs: str = "") -> Placed:
 
 
 def placed_files(found: Placed) -> dict[str, bytes]:
-    """Return CSV tables of a result in a system: photos, points, control, check points."""
+    """Return CSV tables of a result in a system."""
     block = found.result.block
     ids = np.array(block.point_ids, dtype=object)
     angles, deviations = (np.degrees(each) for each in found.angles())
@@ -222,7 +222,7 @@ def placed_files(found: Placed) -> dict[str, bytes]:
 
 
 def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats, Floats]:
-    """Return positions of a block in a system, and rotations of vectors; without system unchanged."""
+    """Return positions in a system, and rotations of vectors."""
     if crs:
         return to_system(crs, xyz, frame)
     degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
@@ -251,13 +251,13 @@ def _own_attitudes(result: Result) -> Attitudes:
 
 
 def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
-    """Return differences of positions of points in the linear unit; 0 for missing values."""
+    """Return position differences in linear units; 0 for missing values."""
     lengths = lengths_of_units(result.point_positions[rows], result.block.spheroid)
     return np.where(np.isnan(differences), 0.0, differences * lengths)
 
 
 def _observed_differences(result: Result) -> tuple[list[str], Floats]:
-    """Return names and (c, 3) adjusted minus observed positions of control with a covariance matrix."""
+    """Return names and (c, 3) differences of control with covariances."""
     kind = result.kinds.get(Control.KIND)
     if kind is None:
         return [], np.zeros((0, 3))
@@ -271,7 +271,7 @@ def _turned(turns: Floats, vectors: Floats) -> Floats:
 
 
 def placed_section(found: Placed) -> Section:
-    """Return the report section with adjusted control and check points in a requested system.
+    """Return the section of adjusted control and check points in a system.
 
     Standard deviations and differences from given positions are in metres along east, north and up.
     """
@@ -308,6 +308,6 @@ def placed_section(found: Placed) -> Section:
 
 
 def _listed_differences(found: Placed) -> dict[int, list[float]]:
-    """Return adjusted minus given of control and check points, by their rows among all points."""
+    """Return differences of control and check points by row of points."""
     pairs = (found.differences(), found.control_differences())
     return {row: own for rows, d in pairs for row, own in zip(rows.tolist(), d.tolist(), strict=True)}

@@ -17,7 +17,7 @@ __all__ = ["Format", "GnssFile", "PhotoFiles", "Wishes", "later"]
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports its module at the first call, since most projects use one format."""
+    """Return a function that imports its module at the first call."""
 
     def call(*arguments: Any) -> Any:
         return getattr(import_module(module), name)(*arguments)
@@ -51,7 +51,7 @@ class GnssFile:
     Attributes
     ----------
     path
-        A table of photo, x, y, z, a geolocation file of Pix4D, a reference of Metashape, `geo.txt` of
+        A table of photo, x, y, z. Or a geolocation file of Pix4D, a reference of Metashape, `geo.txt` of
         OpenDroneMap, an .MRK file of DJI, or events of RTKLIB (`*_events.pos`).
     crs
         The system of positions if the file does not name it; None: the frame of the project.

@@ -1,4 +1,4 @@
-"""Conversion of projects to the coordinates of a format: pixels, topocentric frame."""
+"""Conversion of projects to coordinates of a format: pixels, topocentric."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ ROUND_ORIGIN = 1e-4  # Degrees to which the origin is rounded; its height is 0
 
 
 def in_pixels(project: Project) -> Project:
-    """Return a project with the same rays, given cameras, and image coordinates in pixels.
+    """Return a project with the same rays and image coordinates in pixels.
 
     Millimetres are divided by the size of a pixel, or a nominal one. Negative planes are rotated by 180
-    degrees into positive ones. Images of unknown size get one that contains all observations, if coordinates
-    do not count from corners. Rolling shutters are omitted, as their rows count in the old coordinates.
+    degrees into positive ones. Cameras without image size get one that contains all observations, if
+    coordinates do not count from corners. Rolling shutters are omitted, as their rows count in the old
+    coordinates.
     """
     block = project.block
     if (strips := np.flatnonzero(scanners(block))).size:
@@ -79,14 +80,14 @@ def nominal_pixels(project: Project) -> list[Phrase]:
 
 
 def _unsized(project: Project) -> bool:
-    """Return whether a camera has no image size and does not need one."""
+    """Return whether a camera without image size does not need one."""
     cameras, _ = known_cameras(project.block)
     sizes = project.sizes or (None,) * len(cameras)
     return any(size is None and _is_free(each) for each, size in zip(cameras, sizes, strict=True))
 
 
 def _is_free(camera: Camera) -> bool:
-    """Return whether coordinates do not depend on the image size: from the centre, or in mm."""
+    """Return whether coordinates do not depend on the image size."""
     return camera.image_y == "up" or camera.unit == "mm"
 
 
@@ -108,14 +109,14 @@ def _camera(camera: Camera, scale: float, negative: bool) -> Camera:
 
 
 def _size(camera: Camera, xy: Floats) -> Size:
-    """Return an image size that contains all observations, symmetric to the centre if y is up."""
+    """Return an image size that contains all observations."""
     reach = np.abs(xy).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
     width, height = (ROUND * math.ceil(each / ROUND) for each in reach.tolist())
     return width, height
 
 
 def in_topocentric(project: Project) -> Project:
-    """Return a geographic project in topocentric axes (east, north, up) at the median photo position.
+    """Return a geographic project in a topocentric frame at its median photo.
 
     The rays are the same. Standard deviations refer to local axes, which differ from the axes of the frame by
     the angle between the verticals. The unknown components of partly known points are intersected from their
@@ -180,7 +181,7 @@ def in_topocentric(project: Project) -> Project:
 
 
 def topocentric_remarks(project: Project) -> list[Phrase | str]:
-    """Return remarks on a geographic project that is written in rectangular coordinates."""
+    """Return remarks on a geographic project in rectangular coordinates."""
     block = project.block
     if block.spheroid is None:
         return []

@@ -1,4 +1,4 @@
-"""Conversion of image coordinates between files and cameras: from the corner, or as in the camera model.
+"""Conversion of image coordinates between files and cameras.
 
 A missing image size is an :class:`photogram.InputError` if the conversion needs it.
 """
@@ -34,7 +34,7 @@ def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Float
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
-    """Convert columns and rows from the upper-left corner to (m, 2) image coordinates of a camera, pixels.
+    """Convert columns and rows (m, 2) to image coordinates of a camera, pixels.
 
     Models with y up count from the image centre.
     """
@@ -46,7 +46,7 @@ def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
 
 
 def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Convert image coordinates in pixels to (m, 2) columns and rows from the upper-left corner."""
+    """Convert image coordinates in pixels to (m, 2) columns and rows."""
     if camera.image_y == "down":
         return xy
     width, height = known_size(camera, size)
@@ -54,7 +54,7 @@ def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
 
 
 def to_corner(project: Project) -> Floats:
-    """Return (m, 2) columns and rows from the upper-left corner, pixels; reject images in millimetres."""
+    """Return (m, 2) columns and rows from the upper-left corner, pixels."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
         raise InputError(phrase("format.pixels"))
@@ -77,7 +77,7 @@ def sizes_of(project: Project) -> Sequence[Size]:
 
 
 def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
-    """Return (m, 2) image coordinates in the unit of cameras; pixels count from the corner of the first.
+    """Return (m, 2) image coordinates in camera units, from the first corner.
 
     `pixels` is True for columns and rows, or samples and lines of scanners.
     """
@@ -86,7 +86,7 @@ def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
 
 
 def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Convert image coordinates of tables to the axes of a camera; both have the same unit."""
+    """Convert image coordinates of tables to the axes of a camera."""
     if settings.image == "px" and settings.image_y == "down":
         return from_corner(camera, size, xy)
     if settings.image == "px" and camera.image_y == "down":
@@ -96,7 +96,7 @@ def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Float
 
 
 def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Convert (m, 2) image coordinates of a camera to tables with this `[axes] image_y`."""
+    """Convert (m, 2) image coordinates of a camera to the axes of tables."""
     if camera.unit == "px" and image_y == "down":
         return in_corner(camera, size, xy)
     return xy if camera.image_y == image_y else xy * [1.0, -1.0]
@@ -132,7 +132,7 @@ _FAMILY = _MIDDLE | {
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera in pixels with a lens model of OpenCV, y down; p1 is the coefficient of r^2 + 2 y^2 in y."""
+    """A camera in pixels with an OpenCV lens, y down (p1 of r^2 + 2 y^2 in y)."""
 
     fx: float  # Principal distances
     fy: float
@@ -158,7 +158,7 @@ class Lens:
 
 
 def lens_of(camera: Camera, size: Size | None) -> Lens | None:
-    """Return a camera as an exactly equivalent one of the family; None if it is not of the family.
+    """Return an exactly equivalent camera of the family; None without.
 
     A camera that counts from the image centre needs its size.
     """

@@ -71,7 +71,7 @@ def adjusted_on_disk(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
-    """Adjust a project with images in Parquet, in parts; all files are written to a folder.
+    """Adjust a project with images in Parquet, in parts, in a folder.
 
     `unit_variance`: basis of the variance of unit weight; None: of the project. `loss`: returns the loss for
     the project, by default its own. `max_iterations`: largest number of iterations. None: the number of the
@@ -94,7 +94,7 @@ def planned_on_disk(
     loss: Callable[[Project], Loss | None] = _as_said,
     max_iterations: int | None = None,
 ) -> PartsPlan:
-    """Plan the same adjustment; its parts are written to the folder for a later adjustment."""
+    """Plan an adjustment and write its parts to the folder."""
     with _run(path, wishes, folder, division, (unit_variance, loss, max_iterations), None) as run:
         return run.plan()
 

@@ -52,7 +52,7 @@ def _held(project: Project) -> int:
 
 
 def losses(project: Project, *kinds: str) -> list[Phrase]:
-    """Return the types of parts (`lost.KIND` of the words) of a project, with their counts."""
+    """Return the types of parts of a project, with counts."""
     counts = {kind: int(_COUNTS[kind](project)) if kind in _COUNTS else 1 for kind in kinds}
     fields = {"frame": project.frame.phrase, "held": _held(project), "checks": len(project.checks)}
     return [phrase(f"lost.{kind}", n=count, **fields) for kind, count in counts.items() if count]

@@ -1,4 +1,4 @@
-"""Fiducial marks of MicMac: `MeasuresCamera.xml` (mm), `MeasuresIm-NAME.xml` (pixels), `id_fiducial.txt`."""
+"""Fiducial marks of MicMac: camera (mm), images (pixels), names."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class MicmacMarks:
     remarks: tuple[str, ...]  # Assumptions of the reader
 
     def tables(self, camera: str) -> dict[str, dict[str, Any]]:
-        """Return the tables `fiducials` and `fiducial_images` of a plain project with this camera."""
+        """Return the tables `fiducials` and `fiducial_images` of a camera."""
         rows = [(photo, mark, xy) for photo, own in self.readings.items() for mark, xy in own.items()]
         places, read = (
             np.array(list(each)).reshape(-1, 2) for each in (self.places.values(), [r[2] for r in rows])
@@ -85,8 +85,8 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     Raises
     ------
     InputError
-        If a file is missing, unreadable or of another type, a mark is repeated or missing in the camera, or
-        the names in `id_fiducial.txt` differ from the marks of the camera.
+        If a file is missing, unreadable or of another type. If a mark is repeated or missing in the camera,
+        or the names in `id_fiducial.txt` differ from the marks of the camera.
     """
     scans, files = _of_images(folder)
     if not files:
@@ -127,7 +127,7 @@ def _named(
     places: Mapping[str, Floats],
     readings: Mapping[str, Mapping[str, Floats]],
 ) -> list[str]:
-    """Compare the list of names with the marks of the camera; report marks without readings."""
+    """Compare names with marks of the camera; report marks without readings."""
     read = {mark for own in readings.values() for mark in own}
     missing = [mark for mark in places if mark not in read]
     remarks = [f"no scan has the {'marks' if missing[1:] else 'mark'} {listed(missing)}"] if missing else []
@@ -149,7 +149,7 @@ def _named(
 
 
 def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]) -> tuple[bool, str]:
-    """Return whether y of a camera counts down (as rows) in most photos, and a remark."""
+    """Return whether y counts down (as rows) in most photos, and a remark."""
     sides = [is_mirrored([places[mark] for mark in own], list(own.values())) for own in readings.values()]
     down, up = sides.count(False), sides.count(True)
     if not down and not up:
@@ -180,12 +180,12 @@ def _measures(path: Path) -> dict[str, dict[str, Floats]]:
 
 
 def write_marks(project: Project) -> dict[str, bytes]:
-    """Return the MicMac files of the marks of a project with scanned films: pixels, and mm with y down.
+    """Return MicMac files of the marks of scanned films: pixels, and mm (y down).
 
     Raises
     ------
     InputError
-        If there are no readings in pixels, or marks of several cameras.
+        If readings in pixels are missing, or marks belong to several cameras.
     """
     cameras, which = known_cameras(project.block)
     films = WrittenFilms(project, [cameras[row].name for row in which])

@@ -1,4 +1,4 @@
-"""Model of a project: intersection of its rays, and its transformation to another frame."""
+"""Model of a project: intersection of rays, transformation."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def intersected(project: Project, points: Indices) -> Floats:
 
 
 def complete_positions(project: Project) -> Floats:
-    """Return (n, 3) known or approximate positions of points, otherwise intersections, otherwise NaN."""
+    """Return (n, 3) known, approximate or intersected positions, else NaN."""
     found = project.positions()
     missing = np.flatnonzero(~np.isfinite(found).all(axis=1))
     found[missing] = intersected(project, missing)
@@ -62,7 +62,7 @@ def is_free(project: Project) -> bool:
 
 
 def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, message: Message) -> Project:
-    """Return a project transformed into a frame by scale, (3, 3) rotation and (3,) translation."""
+    """Return a project transformed by scale, (3, 3) rotation, (3,) translation."""
     block = project.block
     scale, turn, shift = by
     matrices = attitude_matrices(block)

@@ -1,4 +1,4 @@
-"""Point names for formats that number points (`names.csv`: `point` and `name`), and point colours."""
+"""Point names (`names.csv`) for formats with numbers, and colours."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LARGEST = 2**53
 
 
 def with_names(project: Project, path: Path) -> Project:
-    """Return a project with new point names from a table with the columns `point` and `name`."""
+    """Return a project with point names from a table `point`, `name`."""
     table = read_columns(path, known=("point", "name"))
     table.require("point", "name")
     places = {name: row for row, name in enumerate(project.block.point_ids)}
@@ -71,7 +71,7 @@ def renamed(project: Project, path: Path) -> Project:
 
 
 def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None) -> dict[str, int]:
-    """Return a number for each name: known, its own if all are numbers, otherwise 1, 2, ..."""
+    """Return a number for each name: known, its own, otherwise 1, 2, ..."""
     given = known or {}
     if all(name in given for name in names):
         return {name: int(given[name]) for name in names}

@@ -1,4 +1,4 @@
-"""OpenSfM and OpenDroneMap: `reconstruction.json` with `tracks.csv`, written with `gcp_list.txt`."""
+"""OpenSfM and OpenDroneMap: `reconstruction.json` with `tracks.csv`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(
 
 
 def place_of(path: Path) -> Path | None:
-    """Return the folder with the files: a path, `opensfm` in it, or the folder of a model file."""
+    """Return the folder of a path, of `opensfm` in it, or of a model file."""
     if path.is_file():
         return path.parent if path.name == MODEL else None
     return next((each for each in (path, path / "opensfm") if (each / MODEL).is_file()), None)
@@ -208,7 +208,7 @@ def _frame(model: Tree) -> Frame:
 def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
 ) -> tuple[Indices, Indices, Floats]:
-    """Return photo, point and (m, 2) normalised coordinates of the observations of the model."""
+    """Return photo, point and (m, 2) normalised coordinates of observations."""
     lines = read_lines(path)
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):

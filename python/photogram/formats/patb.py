@@ -46,7 +46,7 @@ DIGITS = 6  # Digits of principal distances in millimetres; files have three of 
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the image file, with orientation, control and names of the same folder, if present."""
+    """Read the image file, and orientation, control and names if present."""
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
@@ -114,7 +114,7 @@ def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wish
 
 
 def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return A, photo to object, orthonormalised: twelve digits are not orthonormal to the last bit."""
+    """Return A, photo to object, orthonormalised from twelve digits."""
     if len(elements) != 9:
         raise card.place.error(phrase("format.count", n=len(elements), required=9))
     matrix = np.array(elements).reshape(3, 3)

@@ -1,4 +1,4 @@
-"""Deformation of a block that is adjusted in a map projection as if it were cartesian."""
+"""Effect of a map projection on a block that is adjusted in it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Bend:
 
 
 def bend(xyz: Floats, crs: str = "") -> Bend:
-    """Return the effect of a map projection on a block with (n, 3) positions, metres; `crs` names it."""
+    """Return the effect of a map projection on (n, 3) positions, metres."""
     middle = (xyz.min(axis=0) + xyz.max(axis=0)) / 2
     extent = float(np.hypot(*(xyz - middle)[:, :2].T).max())
     scale = None
@@ -55,7 +55,7 @@ def bend(xyz: Floats, crs: str = "") -> Bend:
 
 
 def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> list[Message]:
-    """Return remarks on the effect if a block is, or seems to be, in a map projection.
+    """Return remarks on the effect if a block seems to be in a map projection.
 
     `starts`: (n, 3) approximate positions of its points; NaN if unknown.
     """

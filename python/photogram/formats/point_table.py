@@ -1,4 +1,4 @@
-"""Points of readers: initial positions, control and check points, in the form of blocks."""
+"""Points of readers: initial positions, control and check points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A project: a block with the additional contents of its files, and remarks of the reader."""
+"""A project: a block with additional contents of its files."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Repeated:
 
 @dataclass(frozen=True, eq=False)
 class Unused(Repeated):
-    """Omitted image observations of a board (`use` = `off`), which remain in the project."""
+    """Omitted image observations of a board (`use` = `off`)."""
 
     # (k, 2) standard deviations of image coordinates, in the unit of the block
     sd: Floats = field(default_factory=lambda: np.zeros((0, 2)))
@@ -87,7 +87,7 @@ class Project(Brief):
     Attributes
     ----------
     block
-        The block to adjust. Points that are neither control nor check points have no position in it.
+        The block to adjust. Points that are neither control nor check points do not have a position in it.
     path
         File or folder of the project.
     title
@@ -168,7 +168,7 @@ class Project(Brief):
         return [int(row) for row in np.flatnonzero(known)]
 
     def positions(self) -> Floats:
-        """Return (n, 3) positions of points: control or check points, otherwise from the file."""
+        """Return (n, 3) positions of control and check points, else from the file."""
         found: Floats = np.where(
             np.isnan(self.block.point_positions), self.starts, self.block.point_positions
         )
@@ -213,8 +213,8 @@ def assembled(
 ) -> Project:
     """Return the project of a file from its parts.
 
-    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if the
-    file has none. Errors of the block name the file.
+    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if
+    missing in the file. Errors of the block name the file.
     """
     place, found = Place(path), list(messages)
     if not photo_ids:
@@ -295,7 +295,7 @@ def assembled(
 
 @contextmanager
 def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
-    """Add the location in the file to an error on repeated names, which a block raises."""
+    """Add the location to the error of a block on repeated names."""
     try:
         yield
     except InputError:

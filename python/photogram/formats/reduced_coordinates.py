@@ -1,4 +1,4 @@
-"""Blocks of reduced photo coordinates: millimetres from the principal point, without distortion, y up."""
+"""Reduced photo coordinates: mm from the principal point, y up."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def project_of(
 
 
 def with_fitting_rotations(project: Project) -> Project:
-    """Return a project with transposed rotations if its rays then intersect much better."""
+    """Return a project with rotations transposed if rays then fit better."""
     block = project.block
     if not np.isfinite(block.photo_attitudes).all():
         return project
@@ -120,7 +120,7 @@ def with_fitting_rotations(project: Project) -> Project:
 
 
 def _misfit(project: Project) -> float:
-    """Return the median residual with intersected points; infinite if they are behind photos."""
+    """Return the median residual of intersections; infinite behind photos."""
     loose = project.replace(
         block=project.block.replace(point_positions=np.full_like(project.starts, np.nan), point_sd=np.inf),
         starts=np.full_like(project.starts, np.nan),
@@ -134,7 +134,7 @@ class ReducedImages:
     """Contents of such files: cameras, image observations and poses."""
 
     distances: Floats  # Principal distance of each camera, millimetres
-    names: list[str]  # Of the cameras
+    names: list[str]  # Names of the cameras
     cameras: Indices  # (P,) camera of each photo
     rows: Indices  # Observations that a perspective camera can have
     xy: Floats  # (rows, 2) millimetres from the principal point, y up
@@ -143,7 +143,7 @@ class ReducedImages:
 
 
 def reduced_images(project: Project, digits: int | None = None) -> ReducedImages:
-    """Return the images of a project reduced to a perspective camera without distortion."""
+    """Return the images reduced to a camera without distortion."""
     block = project.block
     cameras, which = known_cameras(block)
     pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
@@ -173,7 +173,7 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
 
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
-    """Return positions of control and check points, and which coordinates are fixed or weighted."""
+    """Return control and check points, and their fixed or weighted coordinates."""
     block = project.block
     full = correlated_control(block)
     found = {}

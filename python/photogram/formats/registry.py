@@ -113,13 +113,13 @@ def recognised(path: Path) -> Format:
     Raises
     ------
     InputError
-        If the path does not exist, has no known format, or fits several formats.
+        If the path does not exist, its format is unknown, or fits several formats.
     """
     return _located(path)[0]
 
 
 def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
-    """Return format and location of a project; a folder may contain a single file with a format."""
+    """Return format and location of a project."""
     among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()
@@ -220,7 +220,7 @@ class Target:
     file: str | None = None  # Name of the first file, if the user specifies it
 
     def files(self, project: Project) -> Mapping[Path, bytes]:
-        """Return the files of a project by path; files with the name of the first one are renamed too."""
+        """Return the files of a project by path, renamed as the first one."""
         found = to_files(project, self.format.name)
         if self.file is None:
             return {self.folder / name: content for name, content in found.items()}

@@ -1,4 +1,4 @@
-"""Photos on frames: mounts for a block, and substitutes for frames whose first sensor has no photo."""
+"""Mounts of photos on frames, and substitutes for missing frame photos."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class FrameOf:
 
 @dataclass(frozen=True)
 class Stand:
-    """A photo without images that represents a frame; its camera is named, or as of another photo."""
+    """A photo without images that represents a frame."""
 
     name: str
     camera: str

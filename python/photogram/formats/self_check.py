@@ -1,4 +1,4 @@
-"""Check whether positions and observations of a file agree under the conventions of the reader."""
+"""Check of positions and observations against reader conventions."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _rows_of_photos(block: Block, photos: Indices) -> dict[str, Indices]:
 
 
 def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return positions and axes of a photo at the times of its images, and its focal coordinates."""
+    """Return poses of a photo at image times, and focal coordinates."""
     time, since, there = own.images(xy)
     scale = 1.0 if own.readout is None else float(own.readout.position[0])
     offset = 0.0 if own.offset is None else float(own.offset.position[0])
@@ -112,7 +112,7 @@ def agreement(project: Project) -> Agreement:
 
 
 def doubts(project: Project) -> list[Message]:
-    """Return messages on disagreement of observations and positions, with a convention that fits.
+    """Return messages on disagreement, with a convention that fits.
 
     The project is not changed.
     """

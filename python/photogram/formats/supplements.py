@@ -1,4 +1,4 @@
-"""User additions to a project: control, observations, names, standard deviations, free cameras."""
+"""User additions to a project, such as control and observations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similar
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return standard deviations by table from arguments such as `images=0.5` or `control=0.02,0.02,0.03`."""
+    """Return standard deviations by table from `control=0.02,0.02,0.03`."""
     found = {}
     for each in given:
         name, equals, numbers = each.partition("=")
@@ -81,10 +81,10 @@ def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
 
 
 def with_repeated(project: Project) -> Project:
-    """Return a project in which the mean of repeated observations replaces the first one.
+    """Return a project in which means replace repeated observations.
 
-    With the sum of the weights the adjustment is equivalent to all single observations, because the sum of
-    squares of their differences from the mean does not depend on any unknown. A message reports this sum.
+    With the sum of the weights the adjustment is equivalent to all single observations. The sum of squares of
+    their differences from the mean does not depend on any unknown. A message reports this sum.
     """
     block = project.block
     first, second = _repeated_rows(project)
@@ -108,7 +108,7 @@ def with_repeated(project: Project) -> Project:
 
 
 def repeated_remarks(project: Project, result: Result) -> list[Message]:
-    """Report the sum of squares with the additional observations of points in photos, if there are any."""
+    """Report the sum of squares with repeated observations, if any."""
     if not result.converged:
         return []
     block = project.block
@@ -191,7 +191,7 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
-    """Return a project with fixed coordinates of chosen points as datum: `A=XYZ`, `B=YZ`, `C=Z`.
+    """Return a project with fixed coordinates as datum: `A=XYZ`, `B=YZ`, `C=Z`.
 
     Previously fixed or weighted points become check points.
     """
@@ -215,7 +215,7 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
 
 
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
-    """Return a project with additional image observations: columns and rows of points in photos."""
+    """Return a project with more image observations, in pixels."""
     messages: list[Message] = []
     found = _with_table(project, path, pixel_table(path, messages), pixel_origin)
     return found.replace(messages=(*found.messages, *messages))
@@ -253,7 +253,7 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
 
 
 def _known_photos(project: Project, given: ControlList) -> ColumnTable:
-    """Return observations in photos of the project; underscores in the list replace blanks."""
+    """Return observations in photos of the project, with their names."""
     exact = set(project.block.photo_ids)
     plain: dict[str, list[str]] = {}
     for name in project.block.photo_ids:
@@ -271,7 +271,7 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
 
 
 def _present_rows(project: Project, table: ColumnTable) -> set[int]:
-    """Return the rows of observations that the project already has at the same position."""
+    """Return rows of observations that the project already has."""
     known = _image_rows(project.block)
     pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
     if not any(pair in known for pair in pairs):
@@ -313,7 +313,7 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    """Return a project with control and check points of a table; a free model is transformed to them."""
+    """Return a project with control and check points of a table."""
     from photogram.formats.control_lists import read_control_list
     from photogram.formats.control_system import check_systems
 
@@ -393,7 +393,7 @@ def with_control(
 def _carried(
     project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
 ) -> Project:
-    """Transform a model to control by a similarity if this improves the fit sufficiently."""
+    """Transform a free model to control if the fit improves enough."""
     block = project.block
     model = project.starts[points].copy()
     unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))

@@ -1,4 +1,4 @@
-"""Streaming XML reader: named elements are processed with their lines and then discarded."""
+"""Streaming XML reader that processes and discards named elements."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Element:
         return (each for each in self.children if each.name == name)
 
     def need(self, name: str) -> Element:
-        """Return the first child of a name; raise an error if there is none."""
+        """Return the first child of a name, which is required."""
         found = self.child(name)
         if found is None:
             raise self.error(phrase("format.member", name=name))
@@ -132,7 +132,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 
 
 def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
-    """Return name and attributes of the root element of a file; empty if it is not XML."""
+    """Return name and attributes of the root; empty if not XML."""
     found: list[tuple[str, Mapping[str, str]]] = []
     parser = xml.parsers.expat.ParserCreate()
     parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))

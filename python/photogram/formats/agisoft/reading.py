@@ -1,4 +1,4 @@
-"""Reader of Metashape camera XML: poses, references and markers, without tie points."""
+"""Reader of Metashape camera XML: poses, references and markers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _Similarity(NamedTuple):
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the first or the requested chunk of a document; PhotoScan has a list of chunks."""
+    """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
     messages: list[Message] = []
     chunk = _chunk(root, wishes.model, messages)
@@ -92,7 +92,7 @@ def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Elemen
 
 
 def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
-    """Return default standard deviations of references: of the user, otherwise of the settings."""
+    """Return default standard deviations of the user, else of the settings."""
     settings = _properties(_members(chunk, "settings", "property"), "accuracy_cameras", "accuracy_markers")
     return {
         kind: np.broadcast_to(wishes.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
@@ -101,7 +101,6 @@ def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
 
 
 def _properties(elements: Iterable[Element], *names: str) -> dict[str, float]:
-    """Return the values of named properties."""
     own = ((each.attributes.get("name", ""), each) for each in elements)
     return {name: each.attribute("value") for name, each in own if name in names}
 
@@ -238,7 +237,7 @@ class _Positions:
     known: bool = True
 
     def reference(self, element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-        """Return a reference and its standard deviations; None without reference or transformation."""
+        """Return a reference with standard deviations; None if it is unusable."""
         return _reference(element, default) if self.known else None
 
     def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
@@ -253,7 +252,7 @@ class _Positions:
 
 
 def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
-    """Return whether a world is geocentric; local references, or unnamed ones outside degrees, exclude it."""
+    """Return whether a world is geocentric, judged by size and references."""
     if np.linalg.norm(centres.mean(axis=0)) < GEOCENTRIC or reference.upper().startswith(LOCAL):
         return False
     return bool(reference or (np.abs(references[:, :2]) <= (360.0, 90.0)).all())
@@ -284,7 +283,7 @@ def _frame(
 
 
 def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-    """Return the reference of a camera or marker and its standard deviations; None if missing."""
+    """Return a reference and its standard deviations; None if missing."""
     own = element.child("reference")
     if own is None or any(axis not in own.attributes for axis in "xyz"):
         return None

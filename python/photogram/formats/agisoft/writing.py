@@ -1,4 +1,4 @@
-"""Writer of Metashape camera XML: sensors, poses, references, and markers of control."""
+"""Writer of Metashape camera XML: sensors, poses, references, markers."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class _World:
     frame: Frame
 
     def references(self, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions in the system of references, and standard deviations along its axes."""
+        """Return positions and standard deviations in the reference system."""
         if self.crs and len(xyz):
             from photogram.formats.crs import from_frame
 
@@ -122,7 +122,7 @@ def _sensor(row: int, camera: Camera, size: Size | None, pixel: float | None) ->
 
 
 def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, float]]:
-    """Return type and parameters of a sensor; a spherical one has no parameters."""
+    """Return type and parameters of a sensor, without parameters for a spherical one."""
     if camera.model == "equirectangular":
         return "spherical", {}
     if camera.model.startswith("agisoft_"):
@@ -175,7 +175,7 @@ def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
 
 
 def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
-    """Return a reference: disabled, with optional standard deviations, for a check point."""
+    """Return a reference; the reference of a check point is disabled."""
     values = dict(zip("xyz", position.tolist(), strict=True))
     if not check or (sd > 0).all():
         values |= dict(zip(("sx", "sy", "sz"), sd.tolist(), strict=True))
@@ -184,7 +184,7 @@ def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
 
 
 def _marked(project: Project) -> Bools:
-    """Return which points are markers: control with all coordinates fixed or weighted, and check points."""
+    """Return which points are markers: complete control, and check points."""
     block, full = project.block, correlated_control(project.block)
     known = np.isfinite(block.point_positions).all(axis=1)
     held = np.isfinite(block.point_sd)

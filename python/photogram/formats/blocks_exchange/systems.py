@@ -1,4 +1,4 @@
-"""Transformation of the coordinate systems of a BlocksExchange file into one cartesian frame."""
+"""Coordinate systems of a BlocksExchange file, transformed into one frame."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOCAL = "local"
 
 @dataclass
 class PhotoRecord:
-    """A photo of a file: its pose with axes x right, y up, z back, and the ids of its systems."""
+    """A photo of a file: its pose (y up, z back) and the ids of its systems."""
 
     path: str
     group: int
@@ -37,7 +37,7 @@ class PhotoRecord:
 
 @dataclass
 class PointRecord:
-    """A point of a file; tie points have no standard deviations."""
+    """A point of a file, with standard deviations unless it is a tie point."""
 
     name: str
     place: Element

@@ -1,4 +1,4 @@
-"""Rotations as quaternions and as the three angles of ISIS (rotations about axes 3, 1, 3)."""
+"""Rotations as quaternions and as angles of ISIS (axes 3, 1, 3)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BEYOND = 4  # Records beyond either end: the number of neighbours on a side
 
 
 def of_quaternions(place: Failing, quaternions: Floats) -> Floats:
-    """Return the (n, 3, 3) matrices C of (n, 4) unit quaternions w, x, y, z of a file, applied as C v."""
+    """Return (n, 3, 3) matrices C (as in C v) of (n, 4) unit quaternions w, x, y, z."""
     lengths = np.linalg.norm(quaternions, axis=1)
     if not (np.abs(lengths - 1) < MAX_LENGTH_DIFFERENCE).all():
         row = int(np.argmax(np.abs(lengths - 1)))
@@ -27,7 +27,7 @@ def of_quaternions(place: Failing, quaternions: Floats) -> Floats:
 
 
 def of_angles(angles: Floats) -> Floats:
-    """Return the (n, 3, 3) matrices [a3]_3 [a2]_1 [a1]_3 of (n, 3) angles a1, a2, a3 in radians."""
+    """Return (n, 3, 3) matrices [a3]_3 [a2]_1 [a1]_3 of (n, 3) angles, radians."""
     (c1, c2, c3), (s1, s2, s3) = np.cos(angles).T, np.sin(angles).T
     rows = [
         [c3 * c1 - s3 * c2 * s1, c3 * s1 + s3 * c2 * c1, s3 * s2],
@@ -38,7 +38,7 @@ def of_angles(angles: Floats) -> Floats:
 
 
 def to_angles(matrices: Floats) -> Floats:
-    """Return the (n, 3) angles of consecutive (n, 3, 3) matrices, without jumps of 2 pi."""
+    """Return (n, 3) continuous angles of consecutive (n, 3, 3) matrices."""
     m = matrices
     a1 = np.arctan2(m[:, 2, 0], -m[:, 2, 1])
     a2 = np.arctan2(np.hypot(m[:, 2, 0], m[:, 2, 1]), m[:, 2, 2])
@@ -47,14 +47,14 @@ def to_angles(matrices: Floats) -> Floats:
 
 
 def angle_axes(angles: Floats) -> Floats:
-    """Return (n, 3, 3) the rotation axes of (n, 3) angles, in columns, in the axes before rotation."""
+    """Return (n, 3, 3) rotation axes of (n, 3) angles, as columns."""
     (c1, c2, _), (s1, s2, _) = np.cos(angles).T, np.sin(angles).T
     zero, one = np.zeros_like(c1), np.ones_like(c1)
     return np.moveaxis(np.array([[zero, c1, s2 * s1], [zero, s1, -s2 * c1], [one, zero, c2]]), 2, 0)
 
 
 def to_quaternions(matrices: Floats) -> Floats:
-    """Return (n, 4) quaternions w, x, y, z of consecutive (n, 3, 3) matrices with consistent signs."""
+    """Return (n, 4) quaternions w, x, y, z of consecutive (n, 3, 3) matrices."""
     found = np.array(Attitudes(matrices).values("quaternion"))
     turned = np.einsum("ni,ni->n", found[1:], found[:-1]) < 0
     found[1:][np.cumsum(turned) % 2 == 1] *= -1
@@ -62,7 +62,7 @@ def to_quaternions(matrices: Floats) -> Floats:
 
 
 class Polynomials(NamedTuple):
-    """Three angles, or coordinates, as polynomials of (t - reference) / scale, both in seconds.
+    """Three angles or coordinates: polynomials of (t - reference) / scale, seconds.
 
     `coefficients` are (3, degree + 1), powers from 0 on.
     """
@@ -83,14 +83,14 @@ class Polynomials(NamedTuple):
         return self._replace(coefficients=slopes).at(times) if len(powers) else np.zeros((len(times), 3))
 
     def sampled(self, first: float, last: float) -> tuple[Floats, Floats]:
-        """Return (k,) times and (k, 3) values from which `lagrange` interpolates without loss."""
+        """Return (k,) times and (k, 3) values for lossless interpolation."""
         steps = np.arange(-BEYOND, RECORDS + BEYOND + 1, dtype=float)
         times: Floats = first + (last - first) / RECORDS * steps
         return times, self.at(times)
 
 
 def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
-    """Return polynomials fitted to the angles of (k, 3, 3) matrices, inertial to camera, as in jigsaw."""
+    """Return polynomials fitted to angles of (k, 3, 3) matrices, as in jigsaw."""
     return fitted(times, to_angles(matrices), degree)
 
 

@@ -76,7 +76,7 @@ def _group(within: Group, name: str, path: Path) -> Group:
 
 
 def _members(group: Group, path: Path) -> Tree:
-    """Return the values of a group by key, without units, as a tree whose errors name them."""
+    """Return the values of a group by key, without units."""
     return Tree({key: _plain(value) for key, value in group.items}, path, group.name)
 
 
@@ -194,12 +194,11 @@ def read_turns(label: Group, name: str, path: Path) -> Turns:
 
 
 def _named(instrument: Tree) -> tuple[str, str]:
-    """Return spacecraft and instrument."""
     return instrument["SpacecraftName"].text().upper(), instrument["InstrumentId"].text().upper()
 
 
 def serial_number(label: Group, path: Path) -> str:
-    """Return the serial number of a cube in control networks; raise an error for unknown instruments."""
+    """Return the serial number of a cube in control networks."""
     instrument = _members(_group(_group(label, "IsisCube", path), "Instrument", path), path)
     spacecraft, name = _named(instrument)
     if spacecraft == _LRO and name in _NAC:
@@ -229,7 +228,7 @@ def read_cube(path: Path) -> Isd:
 
 
 def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
-    """Return support data of the Narrow Angle Camera of the Lunar Reconnaissance Orbiter."""
+    """Return support data of the LRO Narrow Angle Camera."""
     keywords = _members(_group(label, "NaifKeywords", path), path)
     code = f"INS{_members(_group(cube, 'Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
     size = _members(_group(_group(cube, "Core", path), "Dimensions", path), path)
@@ -277,7 +276,6 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
 
 
 def _radii(keywords: Tree) -> tuple[float, float]:
-    """Return semi-axes of the body in metres."""
     name = f"BODY{keywords['BODY_CODE'].whole()}_RADII"
     a, other, b = KM * keywords[name].numbers(3)
     if a != other or not 0 < b <= a:
@@ -286,7 +284,7 @@ def _radii(keywords: Tree) -> tuple[float, float]:
 
 
 def _start(instrument: Tree, keywords: Tree) -> float:
-    """Return the ephemeris time of the clock at the start of reading, computed by spiceinit.
+    """Return the ephemeris time of the start of reading, from spiceinit.
 
     The label contains its bytes as hexadecimal digits, the least significant first.
     """
@@ -332,7 +330,7 @@ def read_list(path: Path) -> dict[str, Path]:
     Raises
     ------
     InputError
-        If a file is missing, an ISD has no serial number, a serial number is repeated, or the list is empty.
+        If a file is missing, an ISD lacks a serial number, a serial number is repeated, or the list is empty.
     """
     found: dict[str, Path] = {}
     for place in filled_lines(path):

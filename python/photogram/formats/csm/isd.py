@@ -1,4 +1,4 @@
-"""Support data of an image: detector, lens, times, and tables of poses and body rotation."""
+"""Support data of an image: detector, lens, times, poses, body rotation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}  # Coordinate of the co
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Camera positions: (k,) seconds, (k, 3) metres from the body's centre, inertial, (k, 3) m/s.
+    """Camera positions (k, 3), metres, and velocities, inertial, at (k,) seconds.
 
     `interpolation` is specified by the records; None: by the user.
     """
@@ -37,7 +37,7 @@ class Positions:
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Rotations: (k,) seconds, (k, 3, 3) matrices from the inertial axes, including constant ones.
+    """Rotations (k, 3, 3) from inertial axes at (k,) seconds.
 
     `interpolation` as for :class:`Positions`.
     """
@@ -49,13 +49,13 @@ class Turns:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Detector to focal plane: offset + matrix (sample, line), from the centre, millimetres."""
+    """Detector to focal plane: offset + matrix (sample, line), millimetres."""
 
     offset: Floats
     matrix: Floats
 
     def places(self, detector: Floats) -> Floats:
-        """Return (n, 2) x, y in camera axes, y down, of (n, 2) sample, line from the centre."""
+        """Return (n, 2) x, y in camera axes of (n, 2) centred sample, line."""
         return self.offset + detector @ self.matrix.T
 
     def detector(self, places: Floats) -> Floats:
@@ -78,7 +78,7 @@ class Detector:
     planes: Mapping[Pixels, Plane]
 
     def from_centre(self, image: Floats, pixels: Pixels) -> Floats:
-        """Return (n, 2) detector pixels from its centre of (n, 2) sample, line from the corner.
+        """Return (n, 2) detector pixels, centred, of (n, 2) image sample, line.
 
         Image coordinates are 0.5 in the centre of the first pixel for any pixel counting. In ISIS they are
         half a detector pixel larger.
@@ -92,7 +92,7 @@ class Detector:
 
 @dataclass(frozen=True, eq=False)
 class Jitter:
-    """Line shifts of a frame: pixels, as polynomials of the (n,) times at which each line was read.
+    """Line shifts of a frame, pixels: polynomials of (n,) line times.
 
     `coefficients` are (2, k), of samples and of lines, from the highest power to the first.
     """
@@ -101,7 +101,7 @@ class Jitter:
     times: Floats
 
     def shifts(self, lines: Floats) -> Floats:
-        """Return (m, 2) corrections to subtract from samples and lines measured at (m,) lines."""
+        """Return (m, 2) corrections to subtract from samples and lines."""
         rows = np.clip(np.floor(lines + 0.5), 1, len(self.times)).astype(int) - 1
         powers = self.times[rows, np.newaxis] ** np.arange(self.coefficients.shape[1], 0, -1)
         return np.asarray(powers @ self.coefficients.T)
@@ -109,7 +109,7 @@ class Jitter:
 
 @dataclass(frozen=True)
 class Framelets:
-    """The framelets of a push frame camera: `count` of `height` lines, each at one time.
+    """Framelets of a push frame camera: `count` of `height` lines.
 
     The earliest is at `first` seconds, the next `every` seconds later. If `backwards`, the last framelet of
     the image is the earliest. If `flipped`, the first line of each is the last of the detector.
@@ -127,7 +127,7 @@ class Framelets:
         return self.first + self.every * (self.count - 1 - number if self.backwards else number)
 
     def numbers(self, lines: Floats) -> Floats:
-        """Return the framelets of lines from the upper edge; the last one includes the lower edge."""
+        """Return the framelets of lines from the upper edge."""
         return np.clip(np.floor(lines / self.height), 0, self.count - 1)
 
     def rows(self, lines: Floats, numbers: Floats) -> Floats:
@@ -188,7 +188,7 @@ class Isd:
 
     @property
     def axes(self) -> Floats:
-        """(3,) factors between camera axes and photo axes, which look along -z; their own inverse."""
+        """(3,) factors between camera axes and photo axes (looking along -z)."""
         return np.array([1.0, -self.look, -self.look])
 
     def error(self, message: str | Phrase) -> InputError:

@@ -1,4 +1,4 @@
-"""Images with support data as photos on a trajectory, and the ground positions of their pixels."""
+"""Images with support data as photos on a trajectory."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def trajectory_of(
     position: Basis | None = None,
     rotation: Basis | None = None,
 ) -> Trajectory:
-    """Return the trajectory of a camera: inertial records in metres, with the body rotation.
+    """Return the trajectory of a camera: inertial records, metres, body rotation.
 
-    `interpolation` applies to records that do not specify it, as those of cubes do. `csm`: polynomials
+    `interpolation` applies to records that do not specify it; records of cubes do. `csm`: polynomials
     through eight records of positions and quaternions, at any spacing in time; `isis`: linear positions, and
     attitudes with uniform rotation between records. Corrections are as for :class:`Trajectory`.
     """
@@ -58,12 +58,12 @@ def trajectory_of(
 
 
 def to_camera(isd: Isd, attitudes: Floats) -> Floats:
-    """Return (n, 3, 3) matrices from inertial axes to the camera, from attitudes photo to inertial."""
+    """Return (n, 3, 3) matrices inertial to camera of photo attitudes."""
     return np.asarray(np.swapaxes(attitudes * isd.axes, 1, 2))
 
 
 def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
-    """Return support data whose pointing is replaced by polynomials of its three angles, as in jigsaw.
+    """Return support data with pointing as polynomials, as in jigsaw.
 
     `degree` is CKDEGREE of jigsaw; the number of records must not be less than the number of coefficients.
     """
@@ -185,7 +185,7 @@ class SupportedImage:
         return photos, self._corrected(image)
 
     def _corrected(self, image: Floats) -> Floats:
-        """Return (n, 2) positions without distortion, in photo axes, of samples and lines."""
+        """Return (n, 2) undistorted positions of samples and lines, photo axes."""
         detector, lens = self.isd.detector, self.isd.lens
         places = detector.planes[self.pixels].places(detector.from_centre(image, self.pixels))
         if lens is not None:
@@ -284,7 +284,7 @@ class SupportedImage:
 
 
 def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
-    """Return (n, 2) samples and lines of points in the framelet that sees them nearest to its centre.
+    """Return (n, 2) samples and lines in the framelet nearest to its centre.
 
     `images` are (framelets, n, 2) samples and rows in each framelet; NaN for points not visible in any.
     """
@@ -298,7 +298,7 @@ def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
 
 
 def _nearest_intersection(origins: Floats, rays: Floats, a: float, b: float) -> Floats:
-    """Return (n, 3) the intersections of lines with a spheroid about the origin nearest to their origins.
+    """Return (n, 3) nearest intersections of lines with a spheroid.
 
     If a line misses the spheroid, the enlarged spheroid touches it there. `a` is the semi-axis along X and Y.
     """

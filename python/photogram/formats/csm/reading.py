@@ -1,4 +1,4 @@
-"""Reader of support data in JSON (ISDs, as written by ALE for the Community Sensor Model)."""
+"""Reader of support data in JSON: ISDs, as written by ALE."""
 
 from __future__ import annotations
 
@@ -119,7 +119,6 @@ def _unit(tree: Tree) -> float:
 
 
 def _radii(tree: Tree) -> tuple[float, float]:
-    """Return semi-axes in metres."""
     a, b = (tree[name].number() * _unit(tree) for name in ("semimajor", "semiminor"))
     if not 0 < b <= a:
         raise tree.error(phrase("csm.radii", a=a, b=b))
@@ -221,7 +220,7 @@ def _flat(tree: Tree) -> list[float]:
 
 
 def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
-    """Return the detector; ISIS uses other transformations to millimetres, in the keywords of NAIF."""
+    """Return the detector; ISIS uses its own transformation to millimetres."""
 
     def pair(form: str) -> Floats:
         return np.array([tree[form.format(axis)].number() for axis in ("sample", "line")])
@@ -245,7 +244,7 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
 
 
 def from_pixels(samples: Tree, lines: Tree) -> Plane:
-    """Return the inverse of the transformation from millimetres to samples and lines of the detector."""
+    """Return the inverse of a transformation from millimetres to detector pixels."""
     rows = _affine(samples, lines)
     inverse: Floats = np.asarray(np.linalg.inv(rows[:, 1:]), dtype=float)
     return Plane(-inverse @ rows[:, 0], inverse)
@@ -259,7 +258,7 @@ def _affine(first: Tree, second: Tree) -> Floats:
 
 
 def _instrument(tree: Tree, keywords: Tree) -> str | None:
-    """Return the prefix of an instrument's keywords, as `INS-85600`; None without keywords."""
+    """Return the prefix of keywords, as `INS-85600`; None without keywords."""
     codes = sorted({own[1] for name, _ in keywords.items() if (own := _TRANSX.fullmatch(name))})
     frames = tree["instrument_pointing"].get("time_dependent_frames", []).value
     named = [code for code in codes if isinstance(frames, list) and frames and code == f"INS{frames[0]}"]
@@ -284,7 +283,7 @@ def not_zero(tree: Tree) -> float:
 
 @dataclass(frozen=True)
 class Drift:
-    """Corrections of line times: the rate is dt (1 + factor) + further, with a shift by `lines`."""
+    """Corrections of line times: rate dt (1 + factor) + further, shift `lines`."""
 
     factor: float
     further: float
@@ -299,7 +298,7 @@ class Drift:
 
 
 def read_lines(tree: Tree, center: float) -> Lines:
-    """Return the times of lines from the upper edge; ISIS counts 1 in the centre of the first."""
+    """Return the times of lines from the upper edge."""
     rates = tree["line_scan_rate"]
     rows = np.array([row.numbers(3) for row in rates])
     if not len(rows):
@@ -309,7 +308,7 @@ def read_lines(tree: Tree, center: float) -> Lines:
 
 
 def read_drift(keywords: Tree, code: str | None) -> Drift | None:
-    """Return the corrections in an instrument's keywords; None if there are none."""
+    """Return the corrections in an instrument's keywords; None without corrections."""
     names = [
         f"{code}_{name}" for name in ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
     ]
@@ -348,7 +347,7 @@ _PLANE = "three numbers: the {} of the detector at x = y = 0 mm, and its change 
 
 
 def _middle(axis: str) -> Callable[[Tree], float | None]:
-    """Return a function that derives the centre of a whole frame; None for a part of a frame."""
+    """Return a function that derives the centre of a whole frame."""
 
     def derive(tree: Tree) -> float | None:
         if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
@@ -384,7 +383,7 @@ _RULES: tuple[tuple[str, str, Callable[[Tree], Any], str], ...] = (
 
 
 def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple[Phrase, ...]]:
-    """Return support data with the values that other fields determine, and remarks on these.
+    """Return support data completed from other fields, and remarks.
 
     `code` is the prefix of the instrument's keywords.
     """
@@ -408,7 +407,7 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
 
 
 def _center_in_corner(tree: Tree) -> list[Phrase]:
-    """Return a remark on a whole frame whose camera axis meets a corner of the detector."""
+    """Return a remark on a frame whose camera axis meets a corner."""
     offsets = (tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line"))
     middle = _middle("sample")(tree), _middle("line")(tree)
     center = tree["detector_center"]

@@ -110,7 +110,7 @@ class Content:
 
 
 def project_of(content: Content, wishes: Wishes) -> Project:
-    """Return the project; user-defined standard deviations of observations are in pixels."""
+    """Return the project; user-defined standard deviations are in pixels."""
     if not content.image_photos:
         raise InputError(phrase("format.missing", what="image observations"), file=content.path)
     order = {number: row for row, number in enumerate(content.photos)}
@@ -171,7 +171,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
 
 
 def _names(content: Content) -> list[str]:
-    """Return the names of photos: file names, with folders if necessary for unique names."""
+    """Return unique names of photos: file names, with folders if necessary."""
     whole = [name.replace("\\", "/").strip() for name in content.photos.values()]
     short = [name.rpartition("/")[2] for name in whole]
     if all(short) and len(set(short)) == len(short):

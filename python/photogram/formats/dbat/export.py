@@ -1,4 +1,4 @@
-"""The export file of PhotoModeler (`NAME-pmexport.txt`): cameras, poses, control, points and observations.
+"""The export file of PhotoModeler, `NAME-pmexport.txt`.
 
 Lines 1 to 5 are a title; tolerance, iterations and image size; nine standard deviations; the camera
 `c px py width height K1 K2 K3 P1 P2` in mm, and its standard deviations. Then six lines for each photo,
@@ -61,7 +61,6 @@ class _Lines:
         self.path, self._lines, self._next = path, read_lines(path), 0
 
     def take(self, what: str) -> Card:
-        """Return the next line."""
         if self._next >= len(self._lines):
             raise InputError(phrase("format.end", name=what), file=self.path, record=self._next)
         self._next += 1

@@ -86,7 +86,7 @@ def _path(element: Element, base: Path) -> Path:
 
 
 def _known(element: Element, word: str) -> str:
-    """Return a path without $HERE, the folder of the script; other variables are rejected."""
+    """Return a path without $HERE, the folder of the script."""
     own = word.replace("\\", "/")
     if own.startswith("$HERE"):
         own = own.removeprefix("$HERE").removeprefix("/")
@@ -130,7 +130,7 @@ def _deviation(element: Element) -> float:
 
 
 def _operations(operations: Element, name: str) -> Iterator[Element]:
-    """Yield the operations of a name; older scripts have no enclosing element."""
+    """Yield the operations of a name, without enclosing element in older scripts."""
     for each in (operations, *operations.all("operation")):
         yield from each.all(name)
 
@@ -162,7 +162,7 @@ def _estimates(operations: Element, content: Content) -> None:
 
 
 def _datum(operations: Element, content: Content) -> None:
-    """Apply the datum `depend`: one fixed photo, and one more fixed coordinate for the scale."""
+    """Apply the datum `depend`: one fixed photo, and a coordinate for scale."""
     for each in _operations(operations, "set_datum"):
         if each.text.strip() != "depend":
             continue
@@ -316,7 +316,7 @@ def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, S
 
 
 def read_folder(path: Path, wishes: Wishes) -> Content:
-    """Read `images.txt`, `markpts.txt`, and, if present, `stations.txt` and `control.txt`."""
+    """Read `images.txt`, `markpts.txt`, optionally `stations.txt`, `control.txt`."""
     content = Content(path, "tables of DBAT")
     content.sensors = _sensors(path, wishes, content.messages)
     take_photos(titled(path / PHOTOS), content)
@@ -329,7 +329,7 @@ def read_folder(path: Path, wishes: Wishes) -> Content:
 
 
 def read_measurements(path: Path, wishes: Wishes) -> Content:
-    """Read `NAME-2dpts.txt`, with initial positions from `NAME-3dpts.txt` of the same folder, if any."""
+    """Read `NAME-2dpts.txt`, with initial positions of `NAME-3dpts.txt`."""
     content = Content(path, "PhotoModeler measurements")
     content.sensors = _sensors(path, wishes, content.messages)
     if len(content.sensors) > 1:

@@ -1,4 +1,4 @@
-"""Tables of DBAT: commas, `#` comments, columns named in a comment or by the script."""
+"""Tables of DBAT: commas, `#` comments, columns by comment or script."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _spelled(columns: Sequence[str]) -> list[str]:
 
 
 def titled(path: Path) -> ColumnTable:
-    """Read a table with a header in a comment, `# id, image, x, y`; the first name is optional."""
+    """Read a table with a header in a comment, `# id, image, x, y`."""
     table = read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
     return table.renamed({NAMELESS: "id"}) if NAMELESS in table and "id" not in table else table
 
@@ -111,7 +111,7 @@ def take_points(
     check: bool = False,
     wanted: Callable[[int], bool] = lambda _: True,
 ) -> None:
-    """Add control or check points, with standard deviations of the user, otherwise of the table."""
+    """Add control or check points; `sd` replaces their standard deviations."""
     table.require("id", "x", "y", "z")
     numbers = _whole(table, "id")
     _once(table, numbers, "point")
@@ -145,7 +145,7 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
 
 
 def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> None:
-    """Add observations; `sd` is their standard deviation in pixels if the table has none."""
+    """Add observations; `sd` is their default standard deviation, pixels."""
     table.require("id", "im", "x", "y")
     photos = _whole(table, "im")
     _check_photos(table, photos, content)

@@ -1,4 +1,4 @@
-"""Control networks of ISIS, the planetary mapping system of the U.S. Geological Survey."""
+"""Control networks of ISIS, the planetary mapping system of the USGS."""
 
 from __future__ import annotations
 

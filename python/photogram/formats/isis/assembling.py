@@ -69,7 +69,7 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
 
 
 def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
-    """Return serial numbers of the images of HELDLIST, which contains serial numbers or files."""
+    """Return serial numbers of images in HELDLIST, a list of numbers or files."""
     if settings.held is None:
         return set()
     names = {str(file.resolve()): serial for serial, file in files.items()}
@@ -84,7 +84,7 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
 
 
 class _Seen(NamedTuple):
-    """Measures in use: rows of measures and their n points in the network, and m observations of a block."""
+    """Measures in use and their n points (rows), as m observations of a block."""
 
     measures: Indices
     points: Indices
@@ -116,7 +116,7 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
 
 
 def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Place) -> Floats:
-    """Return (n, 3) initial X, Y, Z of points: given, or the mean intersection of rays with the spheroid."""
+    """Return (n, 3) initial X, Y, Z: given, or mean ray intersections."""
     starts = given_starts(network, seen.points, place)
     unknown = np.asarray(np.isnan(starts).any(axis=1))
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
@@ -134,7 +134,7 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
 
 
 def _spheroid(contents: PlanetaryContents) -> Spheroid | None:
-    """Return the sphere that heights of points refer to; None if X, Y, Z are adjusted."""
+    """Return the sphere below points; None if X, Y, Z are adjusted."""
     if contents.settings.axes == "rectangular":
         return None
     a, b = contents.different[0].supported.isd.radii
@@ -180,7 +180,7 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
 
 
 def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
-    """Return approximate positions and attitudes of photos in the coordinates of the block."""
+    """Return approximate positions and attitudes of photos."""
     axes, found = Cartesian(spheroid), []
     for own in contents.different:
         found += [about(own.supported.flown, _begin(each)) for each in own.supported.timed]
@@ -208,7 +208,7 @@ def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
 
 
 def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
-    """Return remarks on ignored points and measures, unused images, and reinstated measures."""
+    """Return remarks on ignored, unused and reinstated measures."""
     measures, points = network.measures, network.points
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
     counts = {

@@ -1,4 +1,4 @@
-"""Control networks: points and measures as columns, for Python and for the engine."""
+"""Control networks: points and measures as columns."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ def _absent(name: str) -> np.generic:
 
 
 def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> dict[str, Any]:
-    """Return the columns of points or measures; an empty one has the missing value in all rows."""
+    """Return columns of points or measures; an empty one has missing values."""
 
     def column(name: str) -> NDArray[Any]:
         shape = (rows, _WIDTHS[name]) if name in _WIDTHS else (rows,)
@@ -255,7 +255,7 @@ def points_of(columns: Mapping[str, Any]) -> ControlPoints:
 
 
 def measures_of(columns: Mapping[str, Any]) -> ControlMeasures:
-    """Return measures from columns of the engine: `serial`, `types`, and optional ones."""
+    """Return measures from engine columns `serial`, `types` and optional ones."""
     serial, serials = columns["serial"]
     own = _from_core(ControlMeasures, columns, len(serial))
     return ControlMeasures(serials=serials, serial=serial, **own)

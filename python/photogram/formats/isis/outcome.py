@@ -1,4 +1,4 @@
-"""Adjusted control networks: contents, results in pixels and body axes, rejection of measures."""
+"""Adjusted control networks: results in pixels and body axes, rejection."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A network after the adjustment of its block, possibly without removed images and points."""
+    """A network after adjustment of its block."""
 
     contents: PlanetaryContents
     result: Result
@@ -58,7 +58,7 @@ class Outcome:
 
     @cached_property
     def measure_rows(self) -> Indices:
-        """(m,) the network measure of each block observation: the first of its point in the image."""
+        """(m,) network measure of each observation: first of its point in the image."""
         network, block = self.contents.network, self.result.block
         measures, count = network.measures, len(network.points)
         serial_of = {serial: row for row, serial in enumerate(measures.serials)}
@@ -80,7 +80,7 @@ class Outcome:
 
     @cached_property
     def residuals(self) -> Floats:
-        """(m, 2) measured minus computed sample and line, at the time of the measured line, in pixels."""
+        """(m, 2) measured minus computed sample and line, in pixels."""
         found = np.full((len(self.result.residuals), 2), np.nan)
         for image, mine in self.rows.items():
             isd = image.supported.isd
@@ -104,7 +104,7 @@ class Outcome:
 
     @cached_property
     def latitudes(self) -> Floats:
-        """(n, 3) latitude and longitude of points (radians, longitude from 0), and radius in metres."""
+        """(n, 3) latitude, longitude from 0 (radians), and radius (metres)."""
         return spherical(self.xyz)
 
     @cached_property
@@ -125,7 +125,7 @@ class Outcome:
 
     @cached_property
     def point_rms(self) -> Floats:
-        """(n,) root mean squares of the residuals of points, both coordinates of all measures, in pixels."""
+        """(n,) root mean square residuals of points, pixels."""
         used, block = self.result.used_images, self.result.block
         points, count = block.image_points[used], len(block.point_ids)
         squares = np.bincount(points, (self.residuals[used] ** 2).mean(axis=1), minlength=count)
@@ -167,7 +167,7 @@ PITCHES = 1.4  # Standard deviation of image coordinates, in pixels of the detec
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image of a network: serial number, file, support data with photos, and free parameters."""
+    """An image of a network: serial number, file, support data, parameters."""
 
     serial: str
     path: Path
@@ -183,7 +183,7 @@ class Image:
 
 @dataclass(frozen=True, eq=False)
 class PlanetaryContents:
-    """A network as read, its images with measures by photo name, and its adjustment settings.
+    """A network as read, its images by photo name, and its settings.
 
     `starts` are (N, 3) initial X, Y, Z of all its points in metres; NaN for ignored ones.
     """
@@ -207,7 +207,7 @@ def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
-    """Return the contents of a project; raise an error if it is not from a control network."""
+    """Return the contents of a project from a control network."""
     found = details.get(DETAILS)
     if not isinstance(found, PlanetaryContents):
         raise InputError(phrase("isis.project"))
@@ -217,14 +217,14 @@ def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
 NORMAL = 1.4826  # Standard deviation of normal errors, in median absolute deviations
 FEWEST = 2  # Smallest number of remaining measures of a point
 FAINT = 1e6
-"""Factor of the standard deviations of rejected measures, which keeps their residuals computable for a
-possible reinstatement.
+"""Factor of the standard deviations of rejected measures, so that residuals can be computed for a possible
+reinstatement.
 """
 MOST_ROUNDS = 30
 
 
 def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
-    """Return a call that adjusts the block of a control network with rejection of measures.
+    """Return a call that adjusts a control network with rejection.
 
     Adjustment and rejection or reinstatement of measures (:func:`flagged`) alternate until nothing changes.
     The last adjustment is without the rejected measures.
@@ -274,7 +274,7 @@ def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
-    """Return median + multiplier x 1.4826 x median absolute deviation of (n,) lengths without NaN."""
+    """Return median + multiplier x 1.4826 x median absolute deviation."""
     median = float(np.nanmedian(lengths))
     return median + multiplier * NORMAL * float(np.nanmedian(np.abs(lengths - median)))
 

@@ -1,4 +1,4 @@
-"""Conversion of points of control networks to points of blocks, with prior values."""
+"""Points of control networks as points of blocks, with prior values."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def known_points(
 
 
 def per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
-    """Return (n, 3) coordinate units per metre: 1 / (R cos B) of longitude, 1 / R of latitude B."""
+    """Return (n, 3) coordinate units per metre at (n, 3) coordinates."""
     if spheroid is None:
         return np.ones_like(coordinates)
     radius = spheroid.a + coordinates[:, 2]
@@ -116,7 +116,7 @@ def _report(known: KnownPoints, code: str, ids: Sequence[str], rows: Indices) ->
 
 
 def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
-    """Return (n, 3) X, Y, Z of points in a network, preferably a-priori ones; NaN without.
+    """Return (n, 3) X, Y, Z of points, preferably a-priori ones; NaN without.
 
     They are required for fixed and constrained points.
     """

@@ -1,4 +1,4 @@
-"""Reader of control networks: binary ones of versions 2 and 5, text of versions 3 to 5."""
+"""Reader of control networks: binary versions 2 and 5, text 3 to 5."""
 
 from __future__ import annotations
 
@@ -179,7 +179,6 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
 
 
 def _radii(value: Value, network: Group, path: Path) -> Floats:
-    """Return radii in metres."""
     try:
         if isinstance(value, Quantity):
             if value.unit.lower() != "meters":

@@ -118,7 +118,7 @@ _AXES = _word(latitudinal="latitudinal", rectangular="rectangular")
 
 
 class _Parameter(NamedTuple):
-    """A field of the settings, the function that reads its text, and its index in a field of three."""
+    """A field of settings, its reader, and its index in a field of three."""
 
     field: str
     read: Callable[[str], Any]

@@ -56,7 +56,7 @@ def _scaled(times: Floats) -> tuple[float, float]:
 def _positions(
     isd: Isd, own: Positions, settings: Settings, count: int
 ) -> tuple[Polynomial | None, Isd, Floats]:
-    """Return position corrections, support data as their reference, and its coefficients.
+    """Return position corrections, support data they refer to, coefficients.
 
     The initial polynomials are fitted to the image's own records; the support data may extend beyond them.
     """
@@ -76,7 +76,7 @@ def _positions(
 
 
 def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
-    """Return angle corrections, support data as their reference, and its coefficients.
+    """Return angle corrections, support data they refer to, coefficients.
 
     Polynomial angles are added to a table of one record, the attitude at the centre.
     """
@@ -100,7 +100,7 @@ def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polyn
 
 
 def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
-    """Return polynomials of another degree: padded with zeros, or truncated, as in jigsaw."""
+    """Return polynomials of another degree, padded or truncated."""
     own = np.zeros((3, degree + 1))
     most = min(degree + 1, fit.coefficients.shape[1])
     own[:, :most] = fit.coefficients[:, :most]
@@ -108,7 +108,7 @@ def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
 
 
 def deviations(sigmas: Sequence[float | None], count: int, degree: int) -> Floats:
-    """Return (degree + 1, 3) standard deviations of coefficients; the first `count` are free."""
+    """Return (degree + 1, 3) standard deviations; the first `count` are free."""
     given = [np.inf if sigma is None else sigma for sigma in sigmas]
     of_degrees = [*given, *[np.inf] * count][:count] + [0.0] * (degree + 1 - count)
     return np.repeat(of_degrees, 3).reshape(-1, 3)
@@ -132,7 +132,7 @@ COMPARED = 16  # Number of times for the comparison
 
 
 def observation_number(serial: str) -> str:
-    """Return the observation of an image from its serial number; raise an error without a rule."""
+    """Return the observation of an image from its serial number."""
     count = next((count for begin, count in _KEYWORDS.items() if re.match(begin, serial)), 0)
     if count == 0:
         raise InputError(phrase("isis.observation-rule", image=serial))
@@ -140,7 +140,7 @@ def observation_number(serial: str) -> str:
 
 
 def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[str]]:
-    """Return the images of each observation by its number; without sharing, each image is one."""
+    """Return the images of each observation by number."""
     found: dict[str, list[str]] = {}
     for serial in serials:
         found.setdefault(observation_number(serial) if shared else serial, []).append(serial)
@@ -148,7 +148,7 @@ def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[s
 
 
 def one_flight(isds: Sequence[Isd]) -> Isd:
-    """Return the support data of the first image with the tables of all, which must agree."""
+    """Return the first support data with the tables of all, which must agree."""
     first, *others = isds
     for each in others:
         _check(first, each)
@@ -169,7 +169,7 @@ def one_flight(isds: Sequence[Isd]) -> Isd:
 
 
 def _once(times: Sequence[Floats]) -> tuple[Floats, Indices]:
-    """Return the different times of tables, ascending, and the first record with each time."""
+    """Return different times in order, and the first record of each."""
     own, rows = np.unique(np.concatenate(times), return_index=True)
     return own, rows
 

@@ -1,4 +1,4 @@
-"""Writer of adjusted control networks: binary (version 5) and text, support data, and results."""
+"""Writer of adjusted control networks, support data and results."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def binary_network(network: ControlNetwork) -> bytes:
     Raises
     ------
     InputError
-        If columns are inconsistent, or a value that was read from text has no field in a binary network. The
-        message names the value and the point.
+        If columns are inconsistent, or a value that was read from text cannot be written to a binary network.
+        The message names the value and the point.
     """
     columns = columns_of_points(network.points), columns_of_measures(network.measures)
     points = _photocore.control_point_messages(*columns, network.firsts)
@@ -87,8 +87,8 @@ def network_text(network: ControlNetwork) -> bytes:
     Raises
     ------
     InputError
-        If columns are inconsistent, or a value that was read from a binary network has no key in text. The
-        message names the value and the point.
+        If columns are inconsistent, or a value that was read from a binary network cannot be written as text.
+        The message names the value and the point.
     """
     if network.header_rest:
         raise InputError(phrase("isis.fields"))
@@ -121,7 +121,7 @@ def results(project: Project, result: Result) -> Mapping[str, bytes]:
 
 
 def _updated_network(outcome: Outcome) -> ControlNetwork:
-    """Return a network with adjusted coordinates, a-posteriori covariances, residuals and rejections.
+    """Return a network with adjusted coordinates, covariances and residuals.
 
     Ignored points and measures are unchanged. A point is rejected if all of its measures are rejected.
     """
@@ -162,7 +162,7 @@ HALVINGS = 8  # Largest number of halvings of the intervals of a table
 
 
 def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
-    """Return the support data of an image with adjusted tables; None for a cube, whose tables are binary.
+    """Return support data with adjusted tables; None for a (binary) cube.
 
     Positions, velocities, quaternions and angular velocities are at the times of the records. The intervals
     are halved until linear interpolation projects a thousand points within :data:`CLOSE`; otherwise an error
@@ -187,7 +187,7 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
 
 
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:
-    """Return an image on its adjusted trajectory; unadjusted tables are from the image itself."""
+    """Return an image on its adjusted trajectory, with its other tables."""
     own, over = adjusted.given, image.solving.over
     table = trajectory_of(image.supported.isd, own.name, interpolation="isis").table
     taken: tuple[str, ...] = ()
@@ -214,7 +214,7 @@ class _Corrected:
         self.table = replace(trajectory_of(self.original, own.name, interpolation="isis"), body=None)
 
     def isd(self, halvings: int) -> Isd:
-        """Return support data with corrected tables, whose intervals are halved repeatedly."""
+        """Return support data with corrected tables of halved intervals."""
         found = self.original
         if self.places is not None:
             times = _halved(found.position.times, halvings)
@@ -227,7 +227,7 @@ class _Corrected:
         return found
 
     def put(self, document: dict[str, Any], halvings: int) -> None:
-        """Write the corrected tables into a document; a single record keeps its velocity."""
+        """Write the corrected tables into a document; for one record without velocity."""
         isd = self.isd(halvings)
         if self.places is not None:
             own, times = document["instrument_position"], isd.position.times
@@ -280,7 +280,7 @@ def _given(own: Mapping[str, Any], name: str, times: Floats) -> Floats | None:
 
 
 def _halved(times: Floats, halvings: int) -> Floats:
-    """Return times, and times that divide their intervals into 2^halvings equal parts."""
+    """Return times of intervals divided into 2^halvings equal parts."""
     parts = 2**halvings
     places = np.arange((len(times) - 1) * parts + 1) / parts
     return np.asarray(np.interp(places, np.arange(len(times)), times))

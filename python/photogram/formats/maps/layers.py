@@ -1,4 +1,4 @@
-"""Layers of a map of a result: geometries with attributes, as data frames of geopandas."""
+"""Layers of a map of a result, as data frames of geopandas."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def map_layers(
         The result of a block.
     crs
         Coordinate reference system of the map. None: the system of the frame, or its zone of UTM (WGS 84). If
-        the position of the frame on the earth is unknown, layers have no system and the coordinates of the
-        frame.
+        the position of the frame on the earth is unknown, layers have the coordinates of the frame, without a
+        system.
     scale
         Magnification of error ellipses and residuals. None: a round number at which they are visible.
     confidence
@@ -256,7 +256,7 @@ def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) ->
 
 
 def _given(found: Placed, differences: tuple[Indices, Floats]) -> tuple[Indices, Floats, Floats]:
-    """Return rows of points, given positions, and (c, 3) differences from there to adjusted positions."""
+    """Return rows of points, given positions, and (c, 3) differences."""
     rows, steps = differences
     places = {row: k for k, row in enumerate(found.rows.tolist())}
     adjusted = found.points[[places[row] for row in rows.tolist()]]
@@ -417,7 +417,7 @@ def _ids(found: Placed) -> np.ndarray[Any, Any]:
 
 
 def _metric_places(found: Placed) -> Floats:
-    """Return (k, 2) places in metres, for the distances between them."""
+    """Return (k, 2) positions in metres, for the distances between them."""
     if found.names[0] != "longitude" or not len(found.points):
         return found.points[:, :2]
     one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]

@@ -1,4 +1,4 @@
-"""Positions of photographs in their systems, as observations of a project and as tables."""
+"""Positions of photographs as observations of a project and as tables."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ DETERMINED = 3.0  # Smallest ratio of spread across the line to misfit for posit
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
-    """Return a project with the positions of `--gnss`, and of the files of its photographs."""
+    """Return a project with positions of `--gnss` and of photo files."""
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
     files = wishes.photos or (None if own is None else own.photo_files)
@@ -57,7 +57,7 @@ def with_wished_photos(project: Project, wishes: Wishes) -> Project:
 def with_gnss_file(
     project: Project, file: GnssFile, sd: Mapping[str, tuple[float, ...]], directory: Path | None = None
 ) -> Project:
-    """Return a project with the positions of a file as observations, which replace those of the project.
+    """Return a project whose positions are replaced by those in a file.
 
     `sd` are standard deviations by table; `gnss` applies to positions without one. `directory` is the folder
     of all photographs, whose order assigns events to photos.
@@ -78,10 +78,10 @@ def with_gnss_file(
 
 
 def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple[float, ...]]) -> Project:
-    """Return a project with the positions in the files of its photographs, as observations.
+    """Return a project with positions in photo files as observations.
 
-    Photos with an observed position are unchanged. RTK positions with standard deviations get a common shift
-    per flight with a priori 0.05 m, and a lever arm with 0.01 m, for errors of the base and of the shutter
+    Photos with an observed position are unchanged. RTK positions with standard deviations share a shift (0.05
+    m a priori) and a lever arm (0.01 m) per flight. These represent errors of the base and of the shutter
     time. A model without georeference is transformed to the positions. `sd` are standard deviations by table;
     `gnss` applies to positions without one.
     """
@@ -200,7 +200,7 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
 
 def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) -> Project:
-    """Transform a model to the positions of its photos; too few positions remove its poses."""
+    """Transform a model to photo positions; without enough, remove poses."""
     block = project.block
     places = {name: row for row, name in enumerate(block.photo_ids)}
     model = block.photo_positions[[places[each] for each in photos]]
@@ -301,7 +301,7 @@ class Located:
         return xyz, turned, remarks
 
     def geographic(self) -> tuple[Floats, Floats]:
-        """Return (n, 3) longitudes, latitudes (degrees), heights above the ellipsoid (WGS 84), and (n, 3) sd.
+        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights, and sd.
 
         Positions that are already in this system are not changed.
         """
@@ -321,7 +321,7 @@ def located(
     sd: Sequence[float] | None = None,
     option: str = PHOTOS_CRS,
 ) -> Located:
-    """Return the positions of photos with one; all heights must have the same reference.
+    """Return the positions of photos; all heights have one reference.
 
     `crs` is the system of positions if their source does not name it or the reference of its heights. `sd`
     are default standard deviations: one number or three, metres. `option` names the system. Positions of
@@ -345,7 +345,7 @@ def located(
 
 
 def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
-    """Return the system of each position: its own, otherwise `crs`; empty without both."""
+    """Return the system of each position: its own, else `crs`, else empty."""
     from photogram.formats.crs import is_on
 
     if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
@@ -389,7 +389,7 @@ def _is_above_geoid(system: str) -> bool:
 def gnss_files(
     metadata: Metadata, path: Path, crs: str | None = None, sd: Sequence[float] | None = None
 ) -> dict[Path, bytes]:
-    """Return a table `gnss` of a plain project, and `gnss_groups` if positions share parameters."""
+    """Return a table `gnss` of a plain project, and `gnss_groups` if needed."""
     known = located(list(metadata.photos.values()), crs, sd)
     if not known.records:
         raise InputError(phrase("format.missing", what="positions of photos"), file=metadata.directory)

@@ -1,4 +1,4 @@
-"""Metadata of each photo of a folder, by priority of sources, separately for positions and accuracies."""
+"""Metadata of each photo of a folder, by priority of sources."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class PhotoRecord:
 
     @property
     def rtk(self) -> bool:
-        """Whether a receiver with real-time corrections determined the position and its accuracy."""
+        """Whether a receiver with real-time corrections provided the accuracy."""
         source = self.deviations or self.position
         return source is not None and source.rtk
 
@@ -87,7 +87,7 @@ class Metadata(Brief):
     messages: tuple[Message, ...]
 
     def sources(self) -> dict[str, int]:
-        """Return the number of positions by source of their standard deviations, and without any."""
+        """Count positions by source of their standard deviations, or without any."""
         located = [each for each in self.photos.values() if each.position is not None]
         return counts(each.deviations for each in located)
 
@@ -130,7 +130,7 @@ def told(sources: Mapping[str, int]) -> str:
 
 
 def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = False) -> Metadata:
-    """Read positions of photos and their accuracy from metadata of a folder and its subfolders.
+    """Read positions and accuracies of photos from files of a folder.
 
     Sources are image headers (EXIF, XMP of DJI and Pix4D), `*_Timestamp.MRK`, `geo.txt`, references of
     Metashape and geolocations of Pix4D. The priority is geo.txt and references, .MRK, XMP, EXIF, separately
@@ -235,7 +235,7 @@ def read_gnss_file(
 def _of_exposures(
     path: Path, photos: Sequence[str], messages: list[Message], *, antenna: bool
 ) -> Mapping[str, Said]:
-    """Return the exposures of an .MRK file by photo; photo names contain the exposure number."""
+    """Return exposures of an .MRK file by photo, by number in its name."""
     exposures = read_exposures(path)
     if not exposures:
         raise InputError(phrase("format.missing", what="exposures"), file=path)
@@ -290,7 +290,7 @@ def _in_order(photos: Sequence[str], directory: Path | None) -> tuple[list[str],
 def _check_intervals(
     path: Path, events: Sequence[Event], names: Sequence[str], times: Sequence[float]
 ) -> None:
-    """Reject events whose intervals differ from the intervals between the image files."""
+    """Reject events whose intervals do not fit the image files."""
     for (first, second), (before, after), name in zip(
         pairwise(events), pairwise(times), names[1:], strict=True
     ):

@@ -1,4 +1,4 @@
-"""Metadata in image headers: EXIF and XMP of JPEG, TIFF and DNG, without decoding (extra `photos`).
+"""Metadata in image headers: EXIF and XMP (extra `photos`).
 
 EXIF contains position (degrees, minutes, seconds), height and radial accuracy. XMP packets contain positions
 and standard deviations of DJI, and accuracies of Pix4D. Some tools convert XMP attributes to nested elements
@@ -48,7 +48,7 @@ _SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # Spelling of older cameras
 
 
 def said_by_picture(path: Path) -> list[Said]:
-    """Return the metadata of an image file: of its XMP, then of its EXIF; empty without both."""
+    """Return metadata of an image file: XMP, then EXIF."""
     packet, tags = _head(path, GPS)
     found = [None if packet is None else said_by_packet(packet, path), said_by_tags(tags, Place(path))]
     return [each for each in found if each is not None]
@@ -169,7 +169,7 @@ class _WithoutDoctype(ElementTree.TreeBuilder):
 
 
 def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
-    """Return simple properties of a packet by namespace (without final slash) and name."""
+    """Return simple properties of a packet by namespace and name."""
     place = Place(path)
     if len(data) > LARGEST:
         raise place.error(phrase("photos.packet", n=len(data), most=LARGEST))

@@ -1,4 +1,4 @@
-"""Positions of photos from one source each: `Said`, `.MRK` files of DJI, and events of RTKLIB."""
+"""Positions of photos: class `Said`, `.MRK` files, events of RTKLIB."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ class Said:
     rtk
         Whether they are internal accuracies of a receiver with real-time corrections.
     flag, fix
-        DJI code of the solution, and its meaning: `fixed`, `float`, `single`, `none`, `unknown`; empty if the
-        source has no code.
+        DJI code of the solution, and its meaning: `fixed`, `float`, `single`, `none`, `unknown`; empty
+        without a code.
     angles
         Three angles in degrees of the source (yaw, pitch, roll); they are not observations.
     remark
@@ -83,7 +83,7 @@ class Said:
 
 
 def fix_of(flag: int | None) -> str:
-    """Return the meaning of a DJI flag (`RtkFlag` of XMP, `Q` of .MRK; section 6 of the specification)."""
+    """Return the meaning of a DJI flag (`RtkFlag` of XMP, `Q` of .MRK)."""
     if flag is None:
         return "unknown"
     if 50 <= flag <= 59:
@@ -92,7 +92,7 @@ def fix_of(flag: int | None) -> str:
 
 
 def usable_deviations(east: float, north: float, height: float) -> Triple | None:
-    """Return standard deviations; None if one of them is not positive or missing (NaN).
+    """Return standard deviations; None if one is missing or not positive.
 
     A receiver without a solution writes 0. Values outside :data:`LEAST` and :data:`HIGHEST` are not usable
     either.
@@ -102,7 +102,7 @@ def usable_deviations(east: float, north: float, height: float) -> Triple | None
 
 
 def geographic_position(place: Place, values: Sequence[float]) -> Triple | None:
-    """Return longitude, latitude (degrees) and height of a source; None for 0, 0 (no position)."""
+    """Return longitude, latitude (degrees), height; None for 0, 0."""
     longitude, latitude, height = values
     if not (abs(longitude) <= 180 and abs(latitude) <= 90):
         raise place.error(phrase("photos.degrees", longitude=longitude, latitude=latitude))
@@ -119,7 +119,7 @@ LARGEST_FLAG = 1000
 
 @dataclass(frozen=True)
 class Exposure:
-    """A line of an .MRK file: number of an exposure, from 1, and its time in seconds of the GPS week.
+    """An exposure of an .MRK file: number, from 1, and GPS seconds of week.
 
     `offset` is the vector from antenna to camera: north, east, down, metres; `position` is longitude,
     latitude (degrees) and ellipsoidal height of the camera; `sd` are standard deviations of east, north and
@@ -136,7 +136,7 @@ class Exposure:
     place: Place
 
     def said(self, antenna: bool) -> Said:
-        """Return the position and accuracy; `antenna`: the position is an antenna position."""
+        """Return the metadata; `antenna`: the position is an antenna position."""
         position = self.position
         if antenna and position is not None:
             position = _moved(position, self.offset)
@@ -158,7 +158,7 @@ def _moved(position: Triple, offset: Triple) -> Triple:
 
 
 def number_of(stem: str) -> int | None:
-    """Return the exposure number in a photo name: `DJI_0042`, `..._0042_V`; None without."""
+    """Return the exposure number of `DJI_0042`, `..._0042_V`; None without."""
     found = _NUMBER.findall(stem)
     return int(found[-1]) if found else None
 
@@ -301,7 +301,7 @@ def _event(place: Place, head: Place, heights: str) -> Event:
 
 
 def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:
-    """Convert X, Y, Z to longitude, latitude, height, and standard deviations of east, north, up.
+    """Convert X, Y, Z to geographic coordinates with standard deviations.
 
     `deviations` are standard deviations of X, Y, Z, and signed roots of the covariances XY, YZ, ZX. X, Y, Z
     of 0 are not converted.
@@ -324,7 +324,7 @@ def _degrees(words: Sequence[str], place: Place) -> float:
 
 
 def _seconds(words: Sequence[str], place: Place) -> float:
-    """Return seconds since the first GPS week from a date and a time, or from a week and its seconds."""
+    """Return seconds since the first GPS week from date or week."""
     if "/" not in words[0]:
         return place.whole(words[0], "week", highest=10**5) * SECONDS_OF_WEEK + place.number(
             words[1], "seconds"

@@ -1,4 +1,4 @@
-"""Positions by photo name: `geo.txt`, references of Metashape, geolocation of Pix4D."""
+"""Positions by photo name: `geo.txt`, Metashape references, Pix4D tables."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _SEPARATORS = re.compile(r"[,;\t|]")
 
 
 def is_reference(path: Path, pictures: Callable[[str], object] | None = None) -> bool:
-    """Return whether a text file has positions by photo name, with a header or in the Pix4D format.
+    """Return whether a text file has positions by photo name.
 
     A table with columns of photos and points has image observations. So has one without header that repeats a
     photo. If the names may be point names, one must name an image file: by its suffix, or by `pictures`,
@@ -76,7 +76,7 @@ def _cells(line: str) -> list[str]:
 
 
 def _header(line: str) -> list[str] | None:
-    """Return the headings of a line with photo and position columns; None for another line."""
+    """Return the headings of photo and position columns; None without."""
     own = [each.lower() for each in _cells(line.lstrip().removeprefix("#"))]
     return own if set(_REQUIRED) <= set(PLAIN.spelled(_KNOWN, own)) else None
 
@@ -136,7 +136,7 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
 
 
 def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[ColumnTable, bool]:
-    """Return the table in internal units, and whether it contains longitudes and latitudes."""
+    """Return the table in internal units, and whether it is geographic."""
     rows = [line for line in head if _is_row(line)]
     plain = bool(rows) and not any(_header(line) for line in head)
     angular = False
@@ -152,7 +152,7 @@ def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[Co
 
 
 def _deviations(table: ColumnTable) -> Floats:
-    """Return (rows, 3) standard deviations of the axes, by axis or common; NaN without."""
+    """Return (rows, 3) standard deviations by axis; NaN without."""
     own = table.vectors(deviation_columns(AXES), infinite=True)
     common = table.numbers("sd", infinite=True)[:, np.newaxis]
     found: Floats = np.where(np.isnan(own), common, own)

@@ -1,4 +1,4 @@
-"""Search of a folder of photographs for files with positions, and matching of lines to photos."""
+"""Search of a folder of photographs for positions, matched to photos."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXPOSURES = ".mrk"
 
 @dataclass
 class Found:
-    """Metadata of each photo of a folder, by its relative path, and the files that were read.
+    """Metadata of each photo by relative path, and the files read.
 
     `said` contains its sources in order of priority; `flights` its folder, and its .MRK file if the folder
     has several.
@@ -65,7 +65,7 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
 
 
 def files_of(directory: Path) -> Iterator[Path]:
-    """Yield the files of a folder and its subfolders in sorted order, without hidden ones."""
+    """Yield the visible files of a folder and its subfolders in order."""
     for folder, folders, names in os.walk(directory):
         folders[:] = sorted(each for each in folders if not each.startswith("."))
         yield from (Path(folder) / name for name in sorted(names) if not name.startswith("."))
@@ -86,7 +86,7 @@ class Photos:
                 names.setdefault(name, []).append(key)
 
     def meant(self, name: str, folder: str = ".") -> list[str]:
-        """Return the photos of a folder with a name: by path, otherwise file name, otherwise stem."""
+        """Return photos of a folder by path, otherwise file name, otherwise stem."""
         path = PurePosixPath(name.replace("\\", "/"))
         paths, names, stems = self._known
         tried = (
@@ -103,7 +103,7 @@ class Photos:
 
 
 def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, Said]:
-    """Return the metadata in geo.txt and reference tables by photo; geo.txt has priority."""
+    """Return metadata of geo.txt (with priority) and reference tables."""
     photos = Photos(_key(directory, path) for path in found.pictures)
     texts = [path for path in files if path.suffix.lower() in _TEXTS and path.stem not in TABLES]
     given: dict[str, Said] = {}
@@ -132,7 +132,7 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
 def _add_exposures(
     directory: Path, exposures: Mapping[Path, Mapping[int, Exposure]], found: Found, *, antenna: bool
 ) -> None:
-    """Add the exposures of .MRK files to the photos of their folders, by number in the name."""
+    """Add exposures of .MRK files to the photos of their folders."""
     of_folder: dict[str, list[Path]] = {}
     for path in exposures:
         of_folder.setdefault(_key(directory, path.parent), []).append(path)
@@ -163,7 +163,7 @@ def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
 def _of_flight(
     key: str, paths: Sequence[Path], number: int, exposures: Mapping[Path, Mapping[int, Exposure]]
 ) -> Path | None:
-    """Return the .MRK file of a photo: the only one of its folder, or the one with its prefix."""
+    """Return the .MRK file of a photo: the only one, or the one with its prefix."""
     if len(paths) == 1:
         return paths[0]
     named = [each for each in paths if PurePosixPath(key).name.startswith(f"{prefix_of(each)}_")]

@@ -1,4 +1,4 @@
-"""Parts of a plain project with images in Parquet, read batch by batch and never completely in memory.
+"""Parts of a plain project with images in Parquet, read in batches.
 
 Photos, control and ties are few and remain in memory. Image observations are read twice: first into buckets
 by point name, so that a bucket contains all observations of its points, then into the parts.
@@ -109,7 +109,7 @@ class Streamed:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def source(self, options: CoreOptions) -> str:
-        """Return a fingerprint of project and adjustment: options, settings, sizes and times of files."""
+        """Return a fingerprint of options, settings, sizes and times of files."""
         digest = hashlib.sha256(repr((options, self._settings)).encode())
         for name, table in sorted(self._settings.tables.items()):
             found = table.stat()
@@ -144,7 +144,7 @@ class Streamed:
         return manifest
 
     def _without_images(self) -> Settings:
-        """Return the settings of the project with nearly empty tables of points and images."""
+        """Return settings with nearly empty tables of points and images."""
         import pyarrow
         import pyarrow.parquet
 
@@ -177,7 +177,6 @@ class Streamed:
 
     @cached_property
     def _rows(self) -> dict[str, int]:
-        """Rows of photos."""
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     @property
@@ -187,7 +186,7 @@ class Streamed:
 
     @cached_property
     def _spread_out(self) -> tuple[int, Floats]:
-        """Distribute image observations over buckets; return their number, and (P,) observations by photo."""
+        """Distribute observations over buckets; return counts."""
         import pandas as pd
         import pyarrow
         import pyarrow.parquet
@@ -262,7 +261,7 @@ class Streamed:
         path.unlink()
 
     def _edges(self, number: int, points: int) -> tuple[Indices, Indices]:
-        """Return the edge of each point of a bucket; for the first bucket also of each observation."""
+        """Return the edge of each point and, in the first bucket, observation."""
         if number:
             return np.arange(points), np.zeros(0, dtype=np.int64)
         tied = [tuple(self._tied[name] for name in each.points) for each in self.block.observations]
@@ -342,6 +341,6 @@ def read_head(path: Path) -> list[str]:
 
 
 def _stripped(column: Any) -> tuple[list[str], Indices]:
-    """Return the names of a column without outer blanks, and the name index of each row."""
+    """Return column names without outer blanks, and the index of each row."""
     names, rows = coded(column)
     return [str(name).strip() for name in names], rows

@@ -25,7 +25,7 @@ TIMES = "times of photos on frames"
 
 
 def read_boards(tables: Tables) -> dict[str, Board]:
-    """Read boards of columns and rows; other boards have the control points of the project."""
+    """Read boards of columns and rows; others use control points."""
     table = tables.rows("boards")
     if table.count > 1:
         raise table.error(1, phrase("plain.several-boards"))
@@ -50,7 +50,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
 
 
 def read_regularised(tables: Tables) -> str | None:
-    """Return the source of weak camera priors of a calibration; None without a board or priors."""
+    """Return the source of weak camera priors; None without."""
     table = tables.rows("boards")
     if not table.count:
         return None
@@ -72,7 +72,7 @@ def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
 
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:
-    """Return the columns of boards, with their deflection and camera priors; empty without boards."""
+    """Return columns of boards, deflections and camera priors."""
     if not boards:
         return {}
     each = boards.values()
@@ -95,7 +95,7 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
 
 
 def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:
-    """Return (m,) levels l if standard deviations of observations are 2^l of a default; otherwise None."""
+    """Return (m,) levels l of standard deviations 2^l; None if given."""
     if not assumed:
         return None
     found = np.log2(image_sd[:, 0])

@@ -101,7 +101,7 @@ def read_cameras(tables: Tables) -> Cameras:
 def _from_mm(
     image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
 ) -> tuple[float, bool]:
-    """Return the divisor from lengths of a row to camera units, and whether the row is in mm."""
+    """Return the divisor to camera units, and whether the row is in mm."""
     pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
     least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
     small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
@@ -165,7 +165,7 @@ class _Row:
 
 
 def _rows(table: ColumnTable) -> Iterator[_Row]:
-    """Yield the rows; columns are read once, as a project may have a camera for each photo."""
+    """Yield the rows; columns are read once for many cameras."""
     words = [table.texts(name) for name in ("for_each", "model", "weights", "calibration")]
     texts = [table.names_once("camera"), *words]
     facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
@@ -279,7 +279,7 @@ _ALL = frozenset(name.lower() for facts in _MODELS.values() for name, _ in facts
 def spread_over_photos(
     cameras: Cameras, photo_cameras: Sequence[int], photos: Sequence[str], groups: Sequence[str]
 ) -> tuple[Cameras, list[int]]:
-    """Create separate cameras for photos or groups of them, if the table requires them."""
+    """Create separate cameras for photos or groups as in the table."""
     if set(cameras.for_each) == {"all"}:
         return cameras, list(photo_cameras)
     found = Cameras()
@@ -347,7 +347,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
 
 
 def _both(camera: Camera) -> tuple[Floats, Floats] | None:
-    """Return (ny, nx, 2) knots and their standard deviations; None for a camera without knots."""
+    """Return (ny, nx, 2) knots and standard deviations; None without."""
     if camera.knots is None or camera.knot_sd is None:
         return None
     return camera.knots, camera.knot_sd

@@ -1,4 +1,4 @@
-"""Fiducial marks of film cameras: their table, and certificates in separate files."""
+"""Fiducial marks of film cameras: table and certificate files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SD_MARK = 0.002  # Default (mm) for positions in a certificate, which are printe
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
-    """Return certificates named in the table of photos, or in the film section, by camera name."""
+    """Return the certificates of cameras by camera name."""
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
@@ -57,7 +57,6 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
 
 
 def _cameras_of_films(tables: Tables, table: ColumnTable) -> dict[int, str]:
-    """Return the camera of each row with a film."""
     films, names = table.texts("film"), table.texts("camera")
     cameras = tables.read("cameras")
     only = "" if cameras is None or cameras.count != 1 else cameras.texts("camera")[0]
@@ -154,7 +153,7 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
 
 
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
-    """Return the covariance matrix of all marks of a camera with a datum, which distances lack."""
+    """Return a covariance matrix of all marks of a camera with a datum."""
     try:
         found, free = with_datum(xy, covariance)
     except InputError as error:
@@ -182,7 +181,7 @@ class Fiducials:
         read: Collection[tuple[str, str]],
         covariances: Covariances,
     ) -> list[Observation]:
-        """Return prior observations of marks: joint for a camera, or one per measured mark."""
+        """Return prior observations of marks, joint or per mark."""
         found: list[Observation] = []
         for camera, own in marks.items():
             words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]

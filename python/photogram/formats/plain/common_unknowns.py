@@ -23,7 +23,7 @@ def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any,
 
 
 def called(cell: str, title: str) -> str:
-    """Return the name in a cell: the title for `true`, empty for `false`, otherwise the cell itself."""
+    """Return the name in a cell: title for `true`, empty for `false`, else the cell."""
     word = cell.lower()
     return title if word in TRUE else "" if word in FALSE else cell
 

@@ -1,4 +1,4 @@
-"""The table of covariances: joint priors of a camera, a lever arm, a plane, a sensor ..."""
+"""The table of covariances: joint priors of cameras, lever arms, sensors ..."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Covariances:
     def over(
         self, kind: str, name: str, components: Sequence[str], *, singular: bool = False
     ) -> Floats | None:
-        """Return the covariance matrix of films, scanners or marks; None if it is missing.
+        """Return the matrix of films, scanners or marks; None if missing.
 
         If `singular` is True, the matrix may be singular.
         """
@@ -187,7 +187,7 @@ def covariance_tables(
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:
-    """Return a factor for each component of an unknown: the angle unit, and the sign of its axis.
+    """Return unit and sign factors of the components of an unknown.
 
     Signs are the signs of photo and body axes in tables.
     """
@@ -197,7 +197,6 @@ def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) 
 
 
 def _name(unknown: Unknown, rigs: Rigs) -> str:
-    """Return the name of an unknown in the tables."""
     if isinstance(unknown, Sensor):
         return rigs.title(unknown)
     return word_of(unknown) if isinstance(unknown, Shift | Drift | GyroBias) else unknown.name

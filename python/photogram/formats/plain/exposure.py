@@ -82,7 +82,7 @@ def _edges(
     sizes: Sequence[Size | None],
     directions: Sequence[Direction],
 ) -> Floats:
-    """Return (rows, 2) first and last coordinate of the readout, in camera coordinates; NaN if unknown."""
+    """Return (rows, 2) readout limits in camera coordinates; NaN if unknown."""
     settings = tables.settings
     pixels = settings.image == "px"
     given = table.vectors(("readout_begin", "readout_end"))
@@ -153,7 +153,6 @@ def exposure_columns(
 
 
 def _line_columns(lines: Sequence[LineSensor | None]) -> dict[str, Any]:
-    """Return the columns of line sensors."""
     found: dict[str, Any] = {
         column: [None if each is None else float(getattr(each, column)) for each in lines]
         for column in OF_LINES
@@ -170,7 +169,6 @@ def _shutter_columns(
     pixel_mm: Sequence[float | None],
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of rolling shutters."""
     found: dict[str, Any] = {}
     readouts = [each.readout if each and isinstance(each.readout, Readout) else None for each in own]
     found["readout"] = [None if each is None else each.value for each in readouts]
@@ -191,7 +189,7 @@ def _shutter_columns(
 def _edges_written(
     shutter: Shutter, camera: Camera, size: Size | None, pixel_mm: float | None, image_y: str
 ) -> tuple[float, float] | None:
-    """Return the readout limits in table coordinates; None if size and direction define them."""
+    """Return readout limits of a table; None if size and direction suffice."""
     if size is not None:
         unit = 1.0 if camera.unit == "px" else pixel_mm or math.nan
         usual = picture_edges(camera, shutter.direction, np.array(size) * unit)

@@ -1,4 +1,4 @@
-"""Detection of mistakes in marks of films before the adjustment: pitch, side, names, resampled scans."""
+"""Mistakes in marks of films: pitch, side, names, resampled scans."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FEWEST = 4  # Smallest number of marks that detects names rotated by a quarter
 
 
 def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phrase | None:
-    """Return an error of the scanner pitch; `places` are (n, 2) of the marks in the camera frame."""
+    """Return an error of the scanner pitch; `places` are (n, 2) camera marks."""
     if len(places) < 2:
         return None
     *_, m = conformal(places, photo.true, mirrored=mirrored)
@@ -39,7 +39,7 @@ def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phr
 
 
 def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> Phrase | None:
-    """Return a remark on images beyond a distortion table if the curve is less accurate than they are.
+    """Return a remark on images beyond a distortion table with an inaccurate curve.
 
     `places` are (m,) complex, in the camera frame, and `sd` (m,) their standard deviations, mm.
     """
@@ -86,7 +86,7 @@ def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
 
 
 def _round(photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]]) -> Iterator[Phrase]:
-    """Yield remarks on cameras whose marks fit far better with names rotated by a quarter."""
+    """Yield remarks on marks that fit better with names rotated by a quarter."""
     sums: dict[str, Floats] = {}
     counts: dict[str, int] = {}
     for photo in photos:

@@ -26,13 +26,13 @@ TIES = 4  # Smallest number of common points of two photos
 
 @dataclass(frozen=True)
 class Lying:
-    """A placement of a film: positions of the measured marks in the camera frame, and the side."""
+    """A placement of a film: positions of marks in the camera frame, and side."""
 
     places: Floats
     mirrored: bool
 
     def back(self, true: Floats, images: Floats) -> Floats:
-        """Transform images to (m,) complex camera coordinates, using true positions (n, 2) of the marks."""
+        """Transform images to (m,) complex camera coordinates."""
         t1, t2, theta, m = conformal(self.places, true, mirrored=self.mirrored)
         q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
         return np.asarray(-np.conj(q) if self.mirrored else q)
@@ -40,7 +40,7 @@ class Lying:
 
 @dataclass(frozen=True)
 class Laid:
-    """A film with known placement, and true scanner positions of its marks and images."""
+    """A placed film, with true scanner positions of marks and images."""
 
     way: Lying
     marks: Floats
@@ -61,7 +61,7 @@ class Expected:
     but: Literal["nothing", "shift", "rotation"] = "nothing"
 
     def apart(self, q: Floats) -> float:
-        """Return the root mean square distance of images (m,) from their expected positions."""
+        """Return the root mean square distance of images from expectation."""
         left = q - self.places
         if self.but != "nothing":
             own, other = q - q.mean(), self.places - self.places.mean()
@@ -92,7 +92,7 @@ class Seen:
         return found
 
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
-        """Yield expected positions of images: from the pose, and from tie points on another photo."""
+        """Yield expected image positions: from pose, and from tie points."""
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
@@ -131,7 +131,7 @@ class Seen:
         return np.flatnonzero(self.images.photos == self.photos.names.index(photo))
 
     def _pose(self, photo: str) -> tuple[Floats, Floats, float]:
-        """Return centre, axes as columns, and principal distance of the positive plane; NaN if unknown."""
+        """Return centre, axes (columns) and principal distance; NaN if unknown."""
         row = self.photos.names.index(photo)
         c = -abs(self.cameras.cameras[self.photos.cameras[row]].parameters.get("c", np.nan))
         centres, matrices = np.asarray(self.photos.centres), np.asarray(self.photos.matrices)
@@ -145,7 +145,7 @@ def _projected(rays: Floats, c: float) -> Floats:
 
 
 def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
-    """Return the index of the placement that agrees with expected positions; None if not unique.
+    """Return the placement that fits expected positions; None if not unique.
 
     `true` are (n, 2) true positions of the marks on the scanner, `images` (m, 2) of all images of the photo.
     """
@@ -226,7 +226,7 @@ class MarkReadings:
         self._name_marks(table)
 
     def _name_marks(self, table: ColumnTable) -> None:
-        """Identify the marks of readings without names; photos that depend on others are last."""
+        """Identify marks of unnamed readings, dependent photos last."""
         waiting = [photo for photo in self.photos if not all(photo.marks)]
         for photo in waiting:
             if any(photo.marks):
@@ -239,7 +239,7 @@ class MarkReadings:
             waiting = left
 
     def _named(self, table: ColumnTable, photo: ScannedPhoto) -> InputError | None:
-        """Identify the marks of the readings of a photo; return an error if it is ambiguous."""
+        """Identify the marks of a photo; return an error if ambiguous."""
         places = self.places.get(photo.camera, {})
         try:
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
@@ -283,14 +283,14 @@ class MarkReadings:
         return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
 
     def given_side(self, photo: ScannedPhoto) -> bool | None:
-        """Return whether a photo is mirrored according to the table; None if not specified."""
+        """Return whether the table marks a photo as mirrored; None: unknown."""
         word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
         if word and word not in TRUE | FALSE:
             raise self.seen.photos.table.cell_error(photo.row, "mirrored", "error.flag", value=word)
         return None if not word else word in TRUE
 
     def side(self, photo: ScannedPhoto) -> bool:
-        """Return whether a photo is mirrored: given, or from its marks, or from images and its pose."""
+        """Return whether a photo is mirrored: given, by marks, or by images."""
         given = self.given_side(photo)
         q = self.places_of(photo)
         true = photo.true if len(q) else q

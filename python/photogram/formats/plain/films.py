@@ -83,8 +83,6 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
 
 
 class _Reader:
-    """Reader of the films of photos."""
-
     def __init__(
         self,
         tables: Tables,
@@ -204,7 +202,7 @@ class _Reader:
         ]
 
     def _neighbour(self, k: int, found: Sequence[tuple[bool, Floats | None]]) -> Floats:
-        """Return initial values from a photo of the same film and scanner, for one without marks."""
+        """Return initial values of a photo of the same film and scanner."""
         photo, mirrored = self.photos[k], found[k][0]
         for other in sorted(range(len(found)), key=lambda j: abs(j - k)):
             start = found[other][1]

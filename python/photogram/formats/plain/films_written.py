@@ -161,7 +161,7 @@ class WrittenFilms:
         return row | _pattern_cells(film)
 
     def _size(self, photo: str, held: Floats) -> list[float | None]:
-        """Return standard deviations of m, b1, b2; None if a covariance matrix contains them."""
+        """Return standard deviations of m, b1, b2; None with covariances."""
         known = self.known.get(photo)
         if known is not None and known.covariance is not None:
             if tuple(known.known) != FILM:
@@ -177,7 +177,6 @@ class WrittenFilms:
         return list((sd | dict(zip(known.known, own, strict=True))).values())
 
     def _machines(self) -> dict[str, Machine]:
-        """Return the scanners by name."""
         found: dict[str, Machine] = {}
         known = {id(one): each for each in self.together for one in each.joined}
         for film in self.films.values():
@@ -270,7 +269,7 @@ def _joined(machine: Machine, what: str) -> Floats:
 
 
 def _words(machine: Machine, unknown: Unknown) -> Sequence[str]:
-    """Return the names of the components of a scanner or a curve in the table of covariances."""
+    """Return covariance table names of a scanner's or curve's components."""
     at = [*map(id, machine.curves)].index(id(unknown)) if unknown in machine.curves else -1
     return ("Sx", "Sy", "alpha") if at < 0 else CURVES[3 * at : 3 * at + 3]
 
@@ -286,7 +285,6 @@ def _own_deviations(machine: Machine) -> Floats:
 
 
 def _pattern_cells(film: Film) -> dict[str, Any]:
-    """Return the cells of the pattern of a film."""
     pattern = film.pattern
     if pattern is None:
         return {"pattern": "none"}

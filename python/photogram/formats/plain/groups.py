@@ -1,4 +1,4 @@
-"""The tables of groups: shared parameters of positions and velocities, or of attitudes and rates."""
+"""The tables of groups: shared parameters of pose observations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _ANTENNA = {kind: tuple(f"{kind}_{axis}" for axis in AXES) for kind in ("lever",
 
 @dataclass(frozen=True)
 class Group:
-    """The parameters of a group; a fixed lever arm is three numbers, a fixed boresight a matrix."""
+    """Parameters of a group; a fixed lever arm or boresight is an array."""
 
     lever_arm: LeverArm | tuple[float, ...] = (0.0, 0.0, 0.0)
     shift: Shift | None = None
@@ -61,7 +61,7 @@ def group_of(observation: Any) -> Group:
 
 
 def grouped(tables: Tables, table: ColumnTable, groups: Mapping[str, Group], name: str) -> list[Group]:
-    """Return the group of each row; groups of antennas without a table are names only."""
+    """Return the group of each row, possibly a name only."""
     names = table.texts("group")
     if name in tables.settings.tables or name == "attitude_groups":
         for row, text in enumerate(names):
@@ -165,7 +165,7 @@ def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats
 
 
 def named_groups(observations: Sequence[Any], *, numbered: bool) -> tuple[list[str], dict[str, Group]]:
-    """Return the group name of each observation (empty if none), and all groups by name.
+    """Return the group name of each observation, and groups by name.
 
     Groups of antennas are `numbered`; others have the names of their boresights.
     """

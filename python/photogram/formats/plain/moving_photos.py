@@ -88,7 +88,7 @@ def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
 
 
 def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
-    """Return velocity and rate of each row, as arguments of :class:`Timed`; empty if not specified."""
+    """Return arguments of :class:`Timed` for velocity and rate of each row."""
     values = table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)])
     sd = table.vectors(_SD, infinite=True)
     silent = np.isnan(values).all(axis=1) & np.isnan(sd).all(axis=1)
@@ -103,7 +103,7 @@ def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
 def _on_rig(
     table: ColumnTable, row: int, name: str, own: str, camera: str, rigs: Mapping[str, Rig]
 ) -> tuple[Sensor | None, Clock | None]:
-    """Return pose and clock of a photo's camera on its carrier; None: as the trajectory."""
+    """Return pose and clock of a camera on its carrier; None: trajectory."""
     if not name and not own:
         return None, None
     if not name and len(rigs) != 1:

@@ -1,4 +1,4 @@
-"""Tables of point observations, one per row, with shared parameters; each type is declared once."""
+"""Tables of point observations with shared parameters."""
 
 from __future__ import annotations
 
@@ -56,7 +56,6 @@ class _Common:
 
     @property
     def table(self) -> str:
-        """The name of the table."""
         return f"{self.column}s"
 
 
@@ -78,7 +77,6 @@ class _Kind:
 
     @property
     def sd_columns(self) -> tuple[str, ...]:
-        """The columns of standard deviations."""
         return deviation_columns(self.sd) or ("sd",)
 
 

@@ -1,4 +1,4 @@
-"""Tables of positions, velocities, attitudes, rates and relative poses of photos and of trajectories."""
+"""Tables of positions, velocities, attitudes, rates and relative poses."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def _written(
     components: Sequence[str] = (),
     units: Sequence[float] | None = None,
 ) -> dict[str, Any]:
-    """Return the columns of observed values, with standard deviations and covariances."""
+    """Return columns of observed values, standard deviations, covariances."""
     components = components or names
     precisions = np.array([each.precision for each in observations])
     sd = np.sqrt(np.einsum("nii->ni", precisions)) * (1.0 if units is None else units)
@@ -190,7 +190,7 @@ def _written(
 
 
 def _group_tables(block: Block) -> _Columns:
-    """Return the tables of positions, velocities, attitudes and rates, and of their groups."""
+    """Return tables of pose observations and their groups."""
     found: _Columns = {}
     for name in ("gnss_groups", "attitude_groups"):
         kinds = [kind for kind in _KINDS if kind.groups == name]

@@ -26,7 +26,7 @@ _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 @dataclass(frozen=True)
 class Photos:
-    """The table of photos, in the frame of the project; unused photos are listed separately.
+    """The table of photos in the project frame; unused photos are separate.
 
     `rows` are the used rows of the table.
     """
@@ -111,7 +111,7 @@ def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
 def _attitude_weights(
     tables: Tables, table: ColumnTable, matrices: Floats
 ) -> tuple[Floats, list[Observation]]:
-    """Return standard deviations of omega, phi, kappa, and attitude observations for other weights."""
+    """Return attitude standard deviations, and other attitude observations."""
     settings = tables.settings
     own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
     steps = deviation_columns(ROTATIONS)
@@ -232,7 +232,7 @@ def _sd_is_given(tables: Tables, table: ColumnTable) -> bool:
 def image_coordinates(
     settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, scanned: Bools
 ) -> tuple[Floats, Floats | None]:
-    """Return image coordinates and standard deviations in the units and axes of the cameras.
+    """Return image coordinates and standard deviations of the cameras.
 
     Line scanners have samples and lines, with standard deviations in the unit of images. Readings of scanned
     films are unchanged.

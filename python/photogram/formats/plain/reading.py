@@ -1,4 +1,4 @@
-"""Reader of the plain project: tables with a file of settings (schema: docs/formats/plain-tables.md)."""
+"""Reader of the plain project (docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def _check_features(settings: Settings, names: Sequence[str]) -> None:
 def _with_stands(
     photos: Photos, stands: Sequence[Stand], photo_cameras: Sequence[int], cameras: Cameras
 ) -> dict[str, Any]:
-    """Return photos, and substitutes for frames without photo, as arguments of :func:`assembled`."""
+    """Return photos and substitutes of frames for :func:`assembled`."""
     free = np.full((len(stands), 3), np.inf)
     owners = {each.name: row for row, each in enumerate(cameras.cameras)}
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
@@ -229,7 +229,7 @@ def _unknowns(
 
 @dataclass(frozen=True)
 class _Given:
-    """Control and check points: fixed, weighted, checked, or observed with correlations."""
+    """Control and check points: fixed, weighted, checked or correlated."""
 
     table: ColumnTable
     names: list[str]
@@ -287,7 +287,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
 
 
 class _PointRows(Mapping[str, int]):
-    """The row of each point by name, with a dictionary that is created at the first lookup."""
+    """The row of each point by name, in a dictionary made on demand."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names

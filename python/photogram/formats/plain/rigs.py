@@ -28,7 +28,7 @@ ZERO = 1e-6  # Largest difference of the first sensor's pose from zero
 
 
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
-    """Read rigs; the first sensor defines the frame. Sensors have camera names or their own."""
+    """Read rigs; the first sensor of each defines the frame."""
     table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
@@ -90,7 +90,7 @@ def read_frames(
 
 
 def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> str:
-    """Return the sensor name of a photo in a rig: explicit, otherwise the camera name."""
+    """Return the sensor of a photo in a rig: explicit, else its camera."""
     sensor = own or camera
     if sensor != rig.reference and sensor not in rig.sensors:
         raise table.error(row, phrase("plain.no-sensor-of-rig", rig=rig.name, sensor=sensor))
@@ -125,7 +125,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
         for column, end in zip(("from", "to"), ends, strict=True):
             if end != rig.reference and end not in rig.sensors:
                 raise table.cell_error(row, column, "plain.no-sensor-of-rig", rig=name, sensor=end)
-        # The reference is the frame; a distance between two cameras has no direction.
+        # The reference is the frame; a distance between two cameras is undirected.
         first, second = sorted(ends, key=lambda end: end != rig.reference)
         if first == second:
             raise table.error(row, phrase("plain.same-ends", name=first))
@@ -135,7 +135,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
 
 
 class Rigs:
-    """The rigs of a block; sensors have the camera names of their photos if these are unique."""
+    """Rigs of a block; sensors have camera names if these are unique."""
 
     def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
         self._times = times
@@ -158,7 +158,7 @@ class Rigs:
         self.lost = len(bases) - len(self._bases)
 
     def _told_by_cameras(self) -> bool:
-        """Return whether two cameras (of frame and photo) identify a sensor, and vice versa.
+        """Return whether cameras of frame and photo identify a sensor.
 
         On trajectories no photo represents a frame, so the rig is unknown.
         """
@@ -192,7 +192,7 @@ class Rigs:
         )
 
     def clock(self, sensor: Sensor | None) -> Clock | None:
-        """Return the clock of a sensor if all of its photos, and no photos on frames, have it."""
+        """Return the clock of a sensor, if all of its photos have it."""
         return self._clocks.get(id(sensor))
 
     def title(self, sensor: Sensor) -> str:
@@ -250,7 +250,7 @@ class Rigs:
 
 
 def _clocks(block: Block) -> dict[int, Clock]:
-    """Return the clocks of sensors by object identity, if all of their photos have the same clock."""
+    """Return clocks of sensors, if all of their photos share one."""
     found: dict[int, Clock | None] = {id(each.sensor): None for each in block.mounts}
     for each in block.timed:
         if each.sensor is not None and found.setdefault(id(each.sensor), each.offset) is not each.offset:

@@ -50,7 +50,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class FilmKind:
-    """A row of the table of films: its roll, and the priors of the films of its photos."""
+    """A row of the table of films: its roll, and priors of its films."""
 
     roll: Roll
     model: str

@@ -1,4 +1,4 @@
-"""The tables of the plain project, each declared once (docs/formats/plain-tables.md)."""
+"""Tables of the plain project (docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in n
 
 
 def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
-    """Return the columns of covariances by pair of component indices: `cov_xy`, `cov_x_rotation_y`."""
+    """Return covariance columns by index pair: `cov_xy`, `cov_x_rotation_y`."""
     return {
         f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
         for j in range(len(names))
@@ -79,7 +79,7 @@ GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
 FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
 BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
-_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # Of angles about axes
+_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # For angles about axes
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
 _CLOCK = ("time_offset", "sd_time_offset")
@@ -394,7 +394,7 @@ _ANGLES = frozenset((*ALL_ANGLES[:9], *ROTATIONS))
 
 
 def column_units(name: str, length: str = "m", angle: str = "deg", image: str = "px") -> Units:
-    """Return type and size of the unit of each numeric column, from the units of a project."""
+    """Return unit type and size of each numeric column of a table."""
     metres, radians = UNITS[length], KINDS_OF_UNITS["angle"].get(angle, KINDS_OF_UNITS["angle"]["deg"])
     of_image = ("pixel", 1.0) if image == "px" else ("length", UNITS[image])
     found = dict.fromkeys(TABLES[name].numbers, ("", 1.0))

@@ -1,4 +1,4 @@
-"""`project.toml`: units, axes, frame, standard deviations and options of a plain project."""
+"""`project.toml`: settings of a plain project."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Settings:
     """The settings of `project.toml`, or defaults for tables without it."""
 
     path: Path  # The file, or the path for error messages
-    name: str = ""  # Of the project
+    name: str = ""  # Name of the project
     frame: Frame = field(default_factory=Frame)  # As in a project
     options: Options = field(default_factory=Options)
     length: str = "m"  # Units
@@ -86,7 +86,7 @@ class Settings:
     # Standard deviations of tables without columns for them: three numbers, of images two
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     tables: Mapping[str, Path] = field(default_factory=dict)  # The file of each existing table
-    crs: Mapping[str, str] = field(default_factory=dict)  # Of tables not in the frame
+    crs: Mapping[str, str] = field(default_factory=dict)  # Systems of tables not in the frame
     # Columns of point tables in the form of `--columns` and `--roles`
     columns: Mapping[str, Columns] = field(default_factory=dict)
     # By name, as arguments of :func:`photogram.features`
@@ -123,7 +123,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
     if project.value("format", "") is not VERSION:
         raise project.value_error("format", "plain.version", version=VERSION)
     length = _word(file, "units", "length")
-    # Defaults of the keys are those of the settings.
+    # Defaults of the keys are the defaults of the settings.
     words: dict[str, Any] = {
         key: _word(file, section, key)
         for section in ("units", "axes")
@@ -204,7 +204,6 @@ def _certificates(table: Table) -> tuple[Path, ...]:
 
 
 def _flown(table: Table) -> date | None:
-    """Return the day of the flight."""
     try:
         return day_of(table.values["flown"]) if "flown" in table else None
     except ValueError:
@@ -225,7 +224,6 @@ def _features(table: Table) -> dict[str, Definition]:
 
 
 def _origin(table: Table) -> tuple[float, float, float] | None:
-    """Return latitude, longitude, height."""
     if "origin" not in table:
         return None
     latitude, longitude, height = table.numbers("origin", 3)
@@ -247,7 +245,6 @@ def _time_origin(table: Table) -> float | str:
 
 
 def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
-    """Return the standard deviations of tables."""
     found = {name: tuple(table.numbers(name, WITH_SD[name])) for name in table.values}
     for name, values in found.items():
         if min(values) < 0:
@@ -256,7 +253,7 @@ def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
 
 
 def unread_tables(settings: Settings) -> list[Message]:
-    """Return a remark on unused tables in the folder of the settings, with similar names."""
+    """Return a remark on unused tables, with similar names."""
     used = {os.path.realpath(path) for path in settings.tables.values()}
     others = [
         path
@@ -274,7 +271,6 @@ def unread_tables(settings: Settings) -> list[Message]:
 
 
 def _tables(table: Table) -> dict[str, Path]:
-    """Return the file of each table."""
     folder = table.file.parent
     found: dict[str, Path] = {}
     for name in TABLES:

@@ -1,4 +1,4 @@
-"""Sections `[check]` and `[statement]` of `project.toml`: settings of the accuracy statement."""
+"""Sections `[check]` and `[statement]` of `project.toml`."""
 
 from __future__ import annotations
 
@@ -54,7 +54,6 @@ def read_asked(file: Document, unit: str) -> dict[str, Any]:
 
 
 def _value(table: Table, key: str, unit: str) -> Any:
-    """Return the value of a key."""
     value = table.values[key]
     match key:
         case "survey_common_sd":
@@ -117,7 +116,7 @@ def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def read_sentences(path: Path) -> dict[str, str]:
-    """Return the sentences of a TOML file by key: `"asprs.tested.h" = "Tested with {n} points."`."""
+    """Return sentences of a TOML file by key."""
     file = TomlFile(path)
     for key, sentence in file.content.items():
         if not isinstance(sentence, str):

@@ -1,4 +1,4 @@
-"""Tables for the accuracy statement of a plain project: calibrated lengths, cover of check points."""
+"""Tables for the accuracy statement: calibrated lengths, cover."""
 
 from __future__ import annotations
 
@@ -52,7 +52,6 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
 
 
 def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
-    """Return the rows of the table of calibrated lengths."""
     table = tables.rows("lengths")
     table.names("line")
     for end in ENDS:
@@ -111,7 +110,7 @@ def asked_by_other_names(asked: Mapping[str, Any], names: Mapping[str, str]) -> 
 
 
 def _quantity(asked: str, names: Mapping[str, str]) -> str:
-    """Rename the points of `point C08 z` or `distance C01 C30`; names may contain blanks."""
+    """Rename the points of `point C08 z` or `distance C01 C30`."""
     kind, *words = asked.split()
     if kind == "point" and (point := " ".join(words[:-1])) in names:
         return f"point {names[point]} {words[-1]}"

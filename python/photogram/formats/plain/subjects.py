@@ -28,7 +28,7 @@ class Subjects:
     trajectories: Mapping[str, Trajectory]  # By name
 
     def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
-        """Return the subject of each row, as arguments of its observation; None for skipped rows.
+        """Return the subject of each row as arguments; None for skipped rows.
 
         Rows at times outside their trajectory are skipped; a remark contains their number.
         """

@@ -1,4 +1,4 @@
-"""The tables of a plain project: conversion of cells to numbers, and back to columns."""
+"""Conversion of the tables of a plain project to numbers, and back."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ DEGREE = 180 / np.pi  # Degrees per radian
 
 
 def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
-    """Return internal column names; latitudes and longitudes need a table with a coordinate system."""
+    """Return internal column names; geographic ones need a system."""
     names = PLAIN.spelled(known, own)
     return [heading if is_angular(heading) else name for heading, name in zip(own, names, strict=True)]
 
@@ -50,14 +50,14 @@ def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
 class Tables:
     """The tables of a project with its settings, read on demand; collects remarks."""
 
-    settings: Settings  # Of the project
+    settings: Settings  # Settings of the project
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Observed points, if they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Shared parameters in rows of all tables
     _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table if it exists. It is parsed once, except images, which are too large to store."""
+        """Return a table if it exists, parsed once except images."""
         if name in self._tables:
             return self._tables[name]
         table = self._parsed(name)
@@ -88,7 +88,7 @@ class Tables:
         return settled(table, given, known, units, required, self.names, name, self.messages)
 
     def _photos_of_images(self) -> ColumnTable | None:
-        """Return a table of the photos in the table of images, for a project without a table of photos."""
+        """Return a table of photos from the images, for a project without one."""
         images = self.read("images")
         assert images is not None
         photos = images.names("photo")
@@ -104,7 +104,7 @@ class Tables:
         return ColumnTable(images.path, images.head, tuple(cells), len(rows), cells, records)
 
     def rows(self, name: str) -> ColumnTable:
-        """Return a table, without rows if it does not exist; raises the errors of :meth:`read`."""
+        """Return a table, possibly without rows; errors as :meth:`read`."""
         found = self.read(name)
         if found is not None:
             return found
@@ -146,7 +146,7 @@ class Tables:
         return found
 
     def known_matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; raise an error for a missing one."""
+        """Return (rows, 3, 3) attitudes A, photo to object, all required."""
         found = self.matrices(table)
         unknown = np.isnan(found).any(axis=(1, 2))
         if unknown.any():
@@ -164,7 +164,7 @@ class Tables:
         return Y_DOWN if self.settings.photo == "y_down" else np.eye(3)
 
     def turns(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) the axes of one photo in the axes of another, as columns; NaN without."""
+        """Return (rows, 3, 3) axes of one photo in another, as columns."""
         found: Floats = self.flip @ self.matrices(table)
         return found
 
@@ -174,14 +174,14 @@ class Tables:
         return found
 
     def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
-        """Return (rows, 6, 6) covariances of poses from internal standard deviations and columns."""
+        """Return (rows, 6, 6) covariances of poses in internal units."""
         found = covariances_of(sd, table, POSE, (1.0,) * 3 + (self.radians,) * 3)
         signs = np.tile(np.diag(self.flip), 2)
         turned: Floats = found * signs * signs[:, np.newaxis]
         return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Reject quaternions whose length is not 1 and matrices that are not rotations, with their rows."""
+        """Reject invalid quaternions and matrices, with their rows."""
         kind = self.settings.attitude
         for row in known.tolist():
             if kind == "quaternion":
@@ -194,7 +194,7 @@ class Tables:
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
     ) -> Floats:
-        """Return (rows, k) standard deviations: of the table, otherwise of `[sd]`, otherwise the default."""
+        """Return (rows, k) standard deviations: table, `[sd]`, or default."""
         given = self.settings.sd.get(kind)
         defaults = (
             [default] * len(columns)
@@ -240,7 +240,7 @@ def covariances_of(
     names: Sequence[str] = AXES,
     units: Sequence[float] | None = None,
 ) -> Floats:
-    """Return (n, k, k) covariances from standard deviations (n, k) and the columns cov_xy ... of a table.
+    """Return (n, k, k) covariances of (n, k) standard deviations and cov_xy ...
 
     `units` are the internal units per unit of the table of each component; None: 1.
     """
@@ -289,7 +289,7 @@ def vectors_of(
 def correlations(
     covariances: Floats, names: Sequence[str], units: Sequence[float] | None = None
 ) -> dict[str, Any]:
-    """Return the columns of covariances, if any; `units` are table units per internal unit."""
+    """Return covariance columns, if any; `units`: table per internal unit."""
     scales = (1.0,) * len(names) if units is None else units
     columns = covariance_columns(names)
     if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
@@ -315,6 +315,6 @@ def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
 
 
 def angles_of(matrices: Floats, block: Block) -> Floats:
-    """Return (n, 3) omega, phi, kappa in degrees of attitudes, axes of a photo as columns."""
+    """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns."""
     kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return degrees_typed(Attitudes(matrices).values(kind), MATRIX_ROUNDING)

@@ -1,4 +1,4 @@
-"""The tables of trajectories: records, corrections, knots, coefficients, sums of coefficients."""
+"""Tables of trajectories: records, corrections, knots, coefficients."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = Fal
 
 
 def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
-    """Return (rows,) times that increase in each group; if `multiple`, equal times are allowed."""
+    """Return (rows,) times, increasing in each group (or equal if `multiple`)."""
     times = table.given((column,))[:, 0]
     for rows in groups.values():
         steps = np.diff(times[rows])
@@ -90,7 +90,7 @@ def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple
 def _turned(
     tables: Tables, name: str, places: Mapping[str, int], flip: Floats | None = None
 ) -> dict[str, tuple[Floats, Floats]]:
-    """Return (k,) times and (k, 3, 3) attitudes of each trajectory in a table; `flip`: axes of a body."""
+    """Return (k,) times and (k, 3, 3) attitudes by trajectory."""
     table = tables.rows(name)
     groups = _rows_of(table, places)
     times, matrices = _times(table, groups), tables.known_matrices(table)
@@ -134,7 +134,7 @@ _WITH_SD = ("smooth", "correlation")
 
 
 class _Bases:
-    """The bases of corrections of positions or rotations (`kind`): one per trajectory."""
+    """Bases of position or rotation corrections (`kind`) by trajectory."""
 
     def __init__(self, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> None:
         self.table, self.kind = table, kind
@@ -188,7 +188,6 @@ class _Bases:
             raise self.table.error(row, phrase("error.not-applicable", name=others[0], other=other))
 
     def _basis(self, row: int, name: str, word: str) -> Basis:
-        """Return the basis of a row."""
         degree = self._whole(row, "degree")
         if word == "polynomial":
             return Polynomial(degree or 0, self._number(row, "reference"), self._number(row, "scale"))
@@ -222,7 +221,7 @@ class _Bases:
         return value, sd
 
     def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
-        """Return (K, 3) values and standard deviations of coefficients, with defaults for missing rows."""
+        """Return (K, 3) coefficients and standard deviations, with defaults."""
         table = self.coefficients
         values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
         numbers = table.numbers("k")[rows]

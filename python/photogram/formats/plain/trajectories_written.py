@@ -29,7 +29,7 @@ Place = tuple[str, str, int]  # Trajectory, position or rotation, and number of 
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectories of a block, except those of single photos, without repetition."""
+    """Return trajectories of a block, except trajectories of single photos."""
     own = [each.trajectory for each in block.timed if each.trajectory is not None]
     found = all_trajectories(own, block.observations)
     names = [each.name for each in found]
@@ -107,7 +107,7 @@ def _basis_columns(kind: str, bases: Sequence[Basis | None]) -> dict[str, Any]:
 
 
 def _common_sd(own: Trajectory, which: int) -> float | None:
-    """Return the standard deviation of all coefficients if their given values are 0; otherwise None."""
+    """Return the common standard deviation of coefficients of 0, else None."""
     coefficients = own.coefficients[which]
     sd = {value for each in coefficients for value in each.deviations.tolist()}
     alike = len(sd) == 1 and not any(each.position.any() for each in coefficients)
@@ -115,7 +115,7 @@ def _common_sd(own: Trajectory, which: int) -> float | None:
 
 
 def _coefficient_rows(parts: Sequence[tuple[Trajectory, int]]) -> dict[str, Any]:
-    """Return the table of the coefficients of positions (0) or rotations (1) of trajectories."""
+    """Return the coefficient table of positions (0) or rotations (1)."""
     rows = [(own.name, which, each) for own, which in parts for each in own.coefficients[which]]
     units = np.array([_unit(BASES[which]) for _, which, _ in rows])[:, np.newaxis]
     return {
@@ -161,7 +161,7 @@ def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
 
 
 def smoothness_table(block: Block) -> dict[str, Any]:
-    """Return the table of sums of neighbouring coefficients; empty if splines define all sums."""
+    """Return the table of sums of neighbouring coefficients."""
     own = [(each, place) for each, place in _beside(block) if place is not None]
     if not own:
         return {}
@@ -181,12 +181,12 @@ def smoothness_table(block: Block) -> dict[str, Any]:
 
 
 def lost_smoothness(block: Block) -> int:
-    """Return the number of sums that the table cannot contain: not neighbours, or too many."""
+    """Return the number of sums that the table cannot contain."""
     return sum(place is None for _, place in _beside(block))
 
 
 def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
-    """Return sums that splines do not define, each with the key of its first coefficient, if any."""
+    """Return sums not defined by splines, each with its first key."""
     shared = shared_trajectories(block)
     places = {
         id(each): (trajectory.name, of, k)

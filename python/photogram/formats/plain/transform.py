@@ -1,4 +1,4 @@
-"""Transformation of table coordinates in other systems into the frame of a project."""
+"""Transformation of table coordinates of other systems into the frame."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Transform:
     def positions(
         self, name: str, values: Floats, covariances: Floats | None, table: ColumnTable
     ) -> tuple[Floats, Floats]:
-        """Return (n, 3) positions of a table in the frame, and their (n, 3, 3) covariances, m2."""
+        """Return (n, 3) positions in the frame, and (n, 3, 3) covariances, m2."""
         own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
         crs = self.settings.crs.get(name, "")
         if not crs:
@@ -61,7 +61,7 @@ class Transform:
         return positions, rotated
 
     def _settle(self, crs: str, values: Floats) -> None:
-        """Choose the origin of a topocentric frame without one: the mean of the first given positions."""
+        """Choose the origin of a topocentric frame: mean of the first positions."""
         from photogram.formats.crs import amid
 
         if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):

@@ -62,7 +62,7 @@ def _second_positions(block: Block) -> int:
 
 
 def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
-    """Return the cameras of a block, also for principal distances, and the camera of each photo."""
+    """Return cameras (also for principal distances), and the one of each photo."""
     if block.cameras:
         assert block.photo_cameras is not None
         cameras = [
@@ -123,7 +123,7 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure]) -> str:
-    """Return the direction of y in frame images: down from the corner, or up from the centre."""
+    """Return the direction of y: down (corner) or up (centre)."""
     if camera_unit(project.block) != "px":
         return "up"
     sizes, _ = _pictures(project, cameras)
@@ -137,7 +137,7 @@ def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Ex
 
 
 def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | None], list[float | None]]:
-    """Return the image size of each camera, preferably from its parameters, and its pixel size."""
+    """Return image size and pixel size of each camera."""
     if not project.block.cameras:
         # Principal distances are not cameras of the project.
         return [None] * len(cameras), [None] * len(cameras)
@@ -149,7 +149,7 @@ def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | 
 
 
 def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a camera table with exposure columns; a model may use the same column names."""
+    """Return a camera table with exposure columns."""
     found = {**table, **more}
     for name in OF_LINES:
         if name in table and name in more:
@@ -241,12 +241,12 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
 
 
 def _times_of(project: Project) -> Mapping[str, float]:
-    """Return the times of photos of a board; other photos have times in their observations."""
+    """Return the times of photos of a board."""
     return project.details.get(TIMES, {}) if project.boards else {}
 
 
 def _given(block: Block, what: str) -> tuple[Floats, Floats]:
-    """Return values of photos, observed ones if weighted, and their standard deviations."""
+    """Return photo values (observed if weighted) and standard deviations."""
     initial, sd = getattr(block, f"photo_{what}s"), getattr(block, f"photo_{what}_sd")
     observed = getattr(block, f"photo_{what}s_observed")
     return (initial if observed is None else np.where(np.isfinite(sd), observed, initial)), sd
@@ -260,7 +260,7 @@ def _images(
     plain: Bools,
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of images, followed by omitted ones; samples of scanners are unchanged."""
+    """Return image columns; omitted observations are last."""
     block, left = project.block, project.unused
     photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
     places = {name: row for row, name in enumerate(block.photo_ids)}

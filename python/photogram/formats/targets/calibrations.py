@@ -1,4 +1,4 @@
-"""Conversion of target calibrations to projects whose control is the board, and back; cameras only."""
+"""Conversion of target calibrations to projects, and back."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def read_project(path: Path, wishes: Wishes) -> Project:
 
 
 def project_of(calibration: Start, path: Path | None = None) -> Project:
-    """Convert a calibration to a project, whose pixels count from the upper-left corner."""
+    """Convert a calibration to a project; pixels count from the corner."""
     middle = calibration.block()
     cameras = [shifted(each) for each in middle.cameras]
     block, lacks = middle.replace(cameras=cameras, image_xy=middle.image_xy + MIDDLE), []
@@ -70,7 +70,7 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
 
 
 def _times(calibration: Start) -> dict[str, float]:
-    """Return the times of photos on frames; photos on trajectories contain their times."""
+    """Return the times of photos on frames."""
     corners = calibration.corners
     if corners.times is None or calibration.sync == "offset":
         return {}
@@ -78,7 +78,7 @@ def _times(calibration: Start) -> dict[str, float]:
 
 
 def _unused(calibration: Start) -> Unused:
-    """Return the omitted corners as image observations from the corner of the first pixel."""
+    """Return omitted corners as observations from the first corner."""
     corners, names = calibration.corners, calibration.board.names
     rows = np.flatnonzero(~corners.use).tolist()
     sd = corners.sd[rows] * (calibration.sd0 or calibration.assumed)
@@ -172,8 +172,8 @@ def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
     """Return the corners of a project, and (V,) the photo of each view.
 
-    `number` is (n,) the board point of each point, `stands` (P,) the photo with the pose of the view of each
-    photo, `sd0` the standard deviation of a corner of level 0.
+    `number` is (n,) the board point of each point. `stands` is (P,) the photo with the pose of the view of
+    each photo. `sd0` is the standard deviation of a corner of level 0.
     """
     block = project.block
     assert block.photo_cameras is not None
@@ -213,7 +213,7 @@ def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[I
 
 
 def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
-    """Return (K,) references of cameras, (K, 4, 4) sensors, their sd, and (P,) the photo of each view."""
+    """Return (K,) references, (K, 4, 4) sensors, sd, and (P,) view photos."""
     assert block.photo_cameras is not None
     places = {name: row for row, name in enumerate(block.photo_ids)}
     count = len(block.cameras)
@@ -229,7 +229,7 @@ def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
 
 
 def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
-    """Return photos on sensors, with the photo of their frame, or itself if there is none."""
+    """Return photos on sensors, with the photo of their frame or itself."""
     flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
     return [(each.photo, each.frame, each.sensor) for each in block.mounts] + [
         (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
@@ -249,7 +249,7 @@ def _numbers_of(project: Project, board: Board) -> Indices:
 
 
 def _with_places(board: Board, block: Block, number: Indices) -> Board:
-    """Return a board with positions and standard deviations of the control of a block."""
+    """Return a board with positions and standard deviations of control."""
     if board.kind == "points":
         return board.replace(points=block.point_positions, point_names=block.point_ids)
     far = np.abs(board.places[number] - block.point_positions)
@@ -269,7 +269,7 @@ def adjusted_project(calibrated: Calibrated) -> Project:
 
 
 def shifted(camera: Camera, by: float = MIDDLE) -> Camera:
-    """Return a camera with a shifted principal point: from the corner of the first pixel."""
+    """Return a camera whose principal point counts from the first corner."""
     if "w" in camera.names or not {"cx", "cy"} <= {*camera.names}:
         return camera  # From the image centre, which does not change
     centre = {name: camera.parameters[name] + by for name in ("cx", "cy")}
@@ -277,7 +277,7 @@ def shifted(camera: Camera, by: float = MIDDLE) -> Camera:
 
 
 def rig_of_project(project: Project) -> Rig:
-    """Return the pixel cameras of a project, and their poses on frames relative to camera 0."""
+    """Return pixel cameras of a project, and their poses relative to camera 0."""
     block = project.block
     if not block.cameras:
         raise InputError(phrase("board-project.cameras"), file=project.path)
@@ -292,7 +292,7 @@ def rig_of_project(project: Project) -> Rig:
 
 
 def _sensors(project: Project) -> Floats:
-    """Return (K, 4, 4) camera 0 -> camera k; NaN if they are not one sensor on one frame."""
+    """Return (K, 4, 4) camera 0 -> camera k; NaN if not on one frame."""
     block = project.block
     found = np.full((len(block.cameras), 4, 4), np.nan)
     found[0] = np.eye(4)
