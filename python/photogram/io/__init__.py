@@ -1,1 +1,1 @@
-"""Files: text, CSV tables, records of fixed columns, and the writer of all results."""
+"""Files: text, CSV tables, records, and the writer of all results."""

@@ -27,7 +27,7 @@ TRUE, FALSE = (
 
 @dataclass(frozen=True)
 class Names:
-    """A column of names: different names in the order of their first rows, and the name of each row.
+    """A column of names: different names in order, and the name of each row.
 
     `distinct` is True if the reader knows that no name is empty, and that all differ by more than blanks and
     case.
@@ -159,7 +159,7 @@ class ColumnTable:
         return [cell or default for cell in self._cells(column)]
 
     def _cells(self, column: str) -> Sequence[str]:
-        """Return the cells of a column of text; reject numbers of a Parquet file, unless all are empty."""
+        """Return text cells of a column; reject Parquet numbers."""
         numbers = self.ready.get(column)
         if numbers is None:
             return self.cells[column]
@@ -175,7 +175,7 @@ class ColumnTable:
         infinite: bool = False,
         read: Callable[[str], float] | None = None,
     ) -> Floats:
-        """Return (rows,) a column of numbers; empty cells, and all cells of a missing column, are `default`.
+        """Return (rows,) a column of numbers, with `default` for missing cells.
 
         `infinite` permits `inf`; `read` replaces :func:`finite_number`.
         """
@@ -227,7 +227,7 @@ class ColumnTable:
         return values
 
     def check_given(self, values: Floats, columns: Sequence[str], table: str = "") -> None:
-        """Reject NaN in (rows, k) numbers of some columns; `[sd]` may contain those of a named table."""
+        """Reject NaN in (rows, k) numbers; `[sd]` may replace columns of `table`."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
@@ -237,7 +237,7 @@ class ColumnTable:
     def words(
         self, column: str, known: Sequence[str], default: str | None = None, *, optional: bool = False
     ) -> list[str]:
-        """Return a column of known words in small letters; empty cells have the default, or the first.
+        """Return a column of known words in small letters.
 
         If `optional`, the default of empty cells may be another word.
         """
@@ -248,7 +248,7 @@ class ColumnTable:
         return words
 
     def flags(self, column: str) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true."""
+        """Return (rows,) a column of true or false; empty cells are true."""
         values = np.ones(self.count, dtype=bool)
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
@@ -260,7 +260,7 @@ class ColumnTable:
 
 
 def _all_apart(names: Sequence[str]) -> bool:
-    """Return whether all names are certainly valid: without blanks, and different ignoring case."""
+    """Return whether names are valid: no blanks, different ignoring case."""
     text = "\n".join(names).casefold()
     words = text.split()
     if len(words) < len(names) or text.count("\n") >= len(names):

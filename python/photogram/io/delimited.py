@@ -1,4 +1,4 @@
-"""Reader of text tables: any usual delimiter, decimal point or comma, comments, any order of columns.
+"""Reader of text tables with any usual delimiter and column order.
 
 The header defines the columns. A record is a line; names may have quotation marks. The extension module reads
 large tables of regular lines. All other tables, and tables with errors, are read line by line with the same
@@ -62,7 +62,7 @@ def read_columns(
 
 
 def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
-    """Return the names of all columns; `settled` if the user can resolve two candidates for one."""
+    """Return the names of all columns; `settled`: the user may choose."""
     columns = tuple(spelling(own))
     for column in columns:
         if column and columns.count(column) > 1:
@@ -124,7 +124,7 @@ def _head(
     spelling: Spelling,
     hint: Callable[[Sequence[str]], str | Phrase] | None,
 ) -> tuple[Place, str]:
-    """Find the header: the first line, or the comment before it if only the comment has known columns.
+    """Find the header: the first line, or the last comment before it.
 
     If title lines precede it, it is the first line below them with several known columns.
     """
@@ -192,8 +192,7 @@ def _by_lines(
 ) -> tuple[list[list[str]], list[int]]:
     """Split the lines below a header into rows of equal width.
 
-    If rows have one cell more, the first column has no name, provided that numeric columns then contain
-    numbers.
+    If rows have one cell more than the header, the first column may be unnamed; see `_shifted`.
     """
     rows, records = list[list[str]](), list[int]()
     width = len(columns)
@@ -217,7 +216,7 @@ def _by_lines(
 
 
 def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Return whether a record has one cell per column, and numbers in numeric columns."""
+    """Return whether a record fits the columns and their numbers."""
     cells = _split(place, _delimiter(place))
     return len(cells) == len(columns) and all(
         _NUMBER.fullmatch(cell) is not None
@@ -227,7 +226,7 @@ def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> boo
 
 
 def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Return whether numeric columns contain numbers only if the first cell has no column."""
+    """Return whether numbers fit their columns if the first cell is unnamed."""
     numeric = [k for k, column in enumerate(columns) if column in numbers]
     as_is, shifted = (
         all(_NUMBER.fullmatch(cells[k + step]) or not cells[k + step] for k in numeric) for step in (0, 1)
@@ -236,7 +235,7 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
 
 
 def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
-    """Read a large table; None if a line is irregular: `_by_lines` then reports its location."""
+    """Read a large table; None if a line is irregular."""
     head, own, columns, delimiter = header
     assert head.record is not None
     if delimiter == " " or not all(columns):
@@ -265,7 +264,7 @@ def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTab
 def _decoded(
     contents: Mapping[str, Floats | tuple[bytes, Indices, bool]], encoding: str
 ) -> dict[str, Floats | Names] | None:
-    """Return columns with names in an encoding; None if the names have another encoding."""
+    """Return columns with decoded names; None for another encoding."""
     ready: dict[str, Floats | Names] = {}
     for column, content in contents.items():
         if isinstance(content, np.ndarray):

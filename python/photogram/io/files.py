@@ -1,4 +1,4 @@
-"""Reader of text files; errors are :class:`~photogram.errors.InputError` with the file."""
+"""Reader of text files; errors name the file."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read_beginning(path: Path, size: int = HEAD) -> str:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, UTF-16, otherwise Windows; any line ends become line feeds.
+    """Read a text file: UTF-8, UTF-16 or Windows, with any line ends.
 
     The first sheet of an Excel workbook is text, too: one line per row, with tabs between cells.
     """
@@ -51,7 +51,7 @@ def read_text(path: Path) -> str:
 
 
 def _decoded(data: bytes, *, whole: bool = True) -> str:
-    """Decode the bytes of a file; if they are only a part, the last character may be incomplete."""
+    """Decode the bytes of a file, or of its start."""
     for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
         try:
             return codecs.getincrementaldecoder(encoding)().decode(data, whole)
@@ -61,7 +61,7 @@ def _decoded(data: bytes, *, whole: bool = True) -> str:
 
 
 def _wide(data: bytes) -> str | None:
-    """Return a two-byte encoding, detected by its mark, or by zeros in alternate bytes; None for others."""
+    """Return a two-byte encoding, by its mark or by zero bytes, else None."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     head = data[:HEAD]

@@ -1,4 +1,4 @@
-"""JSON: the format of all documents, and trees of read values whose errors contain the path."""
+"""JSON: format of all documents, and trees of read values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LARGEST = 1e300
 
 
 def to_json(document: object) -> bytes:
-    """Return a document as JSON: UTF-8, indent of two blanks, exact numbers, final line end.
+    """Return a document as JSON: UTF-8, indented, exact numbers.
 
     Arrays of NumPy become lists, dataclasses objects, numeric keys text, and NaN and infinite numbers null.
     """
@@ -32,7 +32,7 @@ def to_json(document: object) -> bytes:
 
 
 def _rows(value: object) -> object:
-    """Return the rows of an array that is not contiguous, or contains other values than numbers."""
+    """Return the rows of an unusual array as lists."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     raise TypeError(f"a JSON document cannot contain {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""Numbers in text files: one strict spelling, and the marks of decimals and thousands in tables."""
+"""Numbers in text files: strict spelling, decimal and thousands marks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BLANKS = re.compile(r"(?<=\d)['’ \u00a0\u202f](?=\d{3}(?!\d))")
 
 
 def is_whole_number(text: str) -> bool:
-    """Return whether a text has only digits 0 to 9; signs and other alphabets are not accepted."""
+    """Return whether a text consists of digits 0 to 9."""
     return text.isascii() and text.isdigit()
 
 
@@ -88,9 +88,9 @@ class Marks:
 def marks_of(cells: Iterable[str], delimiter: str) -> Marks:
     """Return the number format of a table, from all cells that look like numbers.
 
-    The last of two different marks in a number is the decimal mark. A mark that is repeated in a number, or
-    has groups of three digits around it, may separate thousands. If the cells do not decide, a comma is the
-    decimal mark unless it is the delimiter.
+    The last of two different marks in a number is the decimal mark. A repeated mark separates thousands. A
+    single mark before groups of three digits is ambiguous; other single marks are decimal marks. If all marks
+    are ambiguous, a comma is the decimal mark unless it is the delimiter.
     """
     decimals, thousands = set[str](), set[str]()
     doubtful = ""

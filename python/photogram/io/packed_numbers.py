@@ -1,4 +1,4 @@
-"""Files of numbers separated by white space, optionally packed by bzip2 or gzip, read in pieces."""
+"""Files of numbers and white space, optionally packed, read in pieces."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _whole_words(path: Path, file: BinaryIO) -> Iterator[bytes]:
 
 
 def packed(content: bytes, suffix: str) -> bytes:
-    """Return content packed as required by a suffix (`.bz2`, `.gz`); unchanged for others."""
+    """Return content packed as its suffix (`.bz2`, `.gz`) requires."""
     if suffix == ".bz2":
         return bz2.compress(content)
     return gzip.compress(content, mtime=0) if suffix == ".gz" else content

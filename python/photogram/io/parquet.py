@@ -1,4 +1,4 @@
-"""Self-describing Parquet files: unit and description are metadata of every field.
+"""Parquet files with unit and description in each field.
 
 pyarrow is an extra (`pip install 'photogram[parquet]'`).
 """
@@ -76,7 +76,7 @@ class Sheet:
         return values
 
     def numbers(self, name: str, columns: int = 0) -> Any:
-        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides their number."""
+        """Return a column of numbers: (rows,), or (rows, columns)."""
         values = self.column(name)
         kind = values.dtype.kind if isinstance(values, np.ndarray) else ""
         width = values.shape[1] if kind and values.ndim == 2 else 0
@@ -87,7 +87,7 @@ class Sheet:
 
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
-    """Return a function that writes columns of one length, with metadata of the table, to an open file."""
+    """Return a function that writes columns and metadata to an open file."""
     from pyarrow import parquet, types  # Import is slow
 
     table = _table(columns, about)
@@ -123,7 +123,7 @@ def read_sheet(path: Path) -> Sheet:
 
 
 def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
-    """Return the names of a column of text, and the name of each row; -1 for empty cells."""
+    """Return names of a text column, and the index of each row (-1: empty)."""
     import pyarrow
 
     whole = column.unify_dictionaries().combine_chunks()
@@ -135,7 +135,7 @@ def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
 
 
 def packed(matrices: np.ndarray) -> np.ndarray:
-    """Return (n, k (k + 1) / 2) the lower triangles of (n, k, k) symmetric matrices, row by row."""
+    """Return (n, k (k + 1) / 2) lower triangles of (n, k, k) matrices by row."""
     rows, columns = np.tril_indices(matrices.shape[1])
     return np.ascontiguousarray(matrices[:, rows, columns])
 

@@ -15,7 +15,7 @@ from photogram.words import Phrase, phrase
 
 
 class Failing(Protocol):
-    """An object with a location in a file: a place, an element of XML, a member of JSON."""
+    """An object with a location: a place, XML element or JSON member."""
 
     def error(self, message: str | Phrase, /) -> InputError:
         """Return an error with the location."""
@@ -46,7 +46,7 @@ class Place:
         return InputError(message, file=self.file, record=self.record, text=self.text)
 
     def number(self, text: str, what: str | Phrase = "") -> float:
-        """Read a finite number from a text; an error contains the location, and the name of the number."""
+        """Read a finite number; errors contain the location and its name."""
         with at_place(self, what):
             return finite_number(text)
 

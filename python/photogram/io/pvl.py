@@ -1,4 +1,4 @@
-"""Labels in PVL (parameter value language), as in ISIS and archives of planetary images.
+"""Labels in PVL (parameter value language) of planetary images.
 
 This reader is short; the package `pvl` would be an additional dependency of every installation.
 """
@@ -189,7 +189,7 @@ def _scalar(reader: _Reader, key: str) -> str | int | float:
 
 
 def _number(word: str) -> str | int | float:
-    """Convert a word to a number; return the word itself if it is not a finite number."""
+    """Return the finite number in a word, otherwise the word."""
     if _WHOLE.fullmatch(word):
         return int(word)
     if (based := _BASED.fullmatch(word)) is not None:

@@ -26,7 +26,7 @@ _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 class Source:
     """The records of one file."""
 
-    path: Path  # Where the file is
+    path: Path  # Path of the file
     lines: list[str]  # Its records without line ends, cut after column 80
     messages: list[Message] = field(default_factory=list)  # Remarks of the reader
 
@@ -102,7 +102,7 @@ def parse_real(field: str, decimals: int) -> Decimal:
 
     A blank field is zero, blanks inside are ignored (BLANK='NULL'), and without a decimal point the last
     `decimals` digits are the fraction. An exponent follows E or D, with or without a sign, or is a sign and
-    digits without a letter: `1.5+2` is 150. NaN and infinity have no spelling.
+    digits without a letter: `1.5+2` is 150. NaN and infinity are not supported.
     """
     digits = field.replace(" ", "")
     if not digits:

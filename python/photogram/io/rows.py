@@ -1,4 +1,4 @@
-"""Tables with commas, semicolons, tabs or bars, whose errors contain file, record and text.
+"""Tables with commas, semicolons, tabs or bars, and located errors.
 
 No file can make reading expensive or cause another error than :class:`InputError`. Records have a maximum
 length, which limits cells below the limit of the module `csv`. Columns are looked up by name, and numbers
@@ -32,7 +32,7 @@ class Row:
     commas: bool = False  # Whether decimals may have commas, which then do not separate cells
 
     def integer(self, column: str, default: int | None = None) -> int:
-        """Return an integer that is not negative; `default` if the cell or the column is missing."""
+        """Return an integer that is not negative; `default` if missing."""
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
@@ -56,7 +56,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: the names of its columns, and its records, which are split one at a time."""
+    """A table: column names, and records, which are split one at a time."""
 
     path: Path  # The file
     head: Place  # The record with the column names
@@ -96,7 +96,7 @@ class Table:
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
     def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
-        """Return the table with columns renamed by the first existing alias (small letters)."""
+        """Return the table with columns renamed by their first alias."""
         names, lowered = list(self.columns), [name.casefold() for name in self.columns]
         for column, others in aliases.items():
             if column not in names and (own := next((each for each in others if each in lowered), None)):
@@ -120,7 +120,7 @@ class Table:
 
 
 def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[str]:
-    """Split a record at its commas, or another delimiter, except inside quotation marks.
+    """Split a record at a delimiter, except inside quotation marks.
 
     `blanks`: whether blanks may precede quotation marks.
     """

@@ -1,4 +1,4 @@
-"""Checksums (SHA-256) of sets of files: changed, incomplete or exchanged files are rejected."""
+"""Checksums (SHA-256) that reject changed or exchanged files."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Seals:
 
 
 class _Hashing(io.RawIOBase):
-    """A file that is written sequentially; the underlying file is closed by its owner."""
+    """A sequentially written file; its owner closes the file below."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._at, self.digest = file, 0, hashlib.sha256()

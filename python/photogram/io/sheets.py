@@ -1,4 +1,4 @@
-"""Sheets of Excel as text (extra `excel`), and the limits of zip archives, which reject packed bombs."""
+"""Sheets of Excel as text (extra `excel`), and limits of zip archives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NEEDS_OPENPYXL = phrase("error.package", what="an Excel workbook", package="ope
 
 
 def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> None:
-    """Reject members of an archive whose headers announce a suspicious ratio of unpacked to packed bytes.
+    """Reject archive members with suspicious unpacked sizes.
 
     No member is unpacked beyond its header.
     """
@@ -34,7 +34,7 @@ def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> Non
 
 
 def sheet_text(path: Path) -> str:
-    """Return the first sheet of a workbook: one line per row, tabs between cells, values of formulas."""
+    """Return the first sheet of a workbook as lines with tabs."""
     try:
         import openpyxl
     except ImportError:
@@ -72,7 +72,7 @@ def _cell(value: Any) -> str:
 
 
 def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[str, str]) -> bytes:
-    """Return tables as a workbook, one sheet each, with notes on tables in a last sheet.
+    """Return tables as a workbook, with notes in a last sheet.
 
     Headers are in the first row; text is never a formula.
     """

@@ -1,4 +1,4 @@
-"""Lossless conversion of dataclass objects to JSON values, and back for known classes only.
+"""Lossless conversion of dataclass objects to JSON values, and back.
 
 Unlike pickle, such a document runs no code. It contains names of classes, which must be in a list of the
 reader, and their fields. Shared objects remain shared. Numbers outside JSON (NaN, infinite), arrays, tuples
@@ -26,7 +26,7 @@ _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class Stand(ABC):
-    """A dataclass object that represents, in a document, one that its own fields cannot create."""
+    """A substitute, in a document, for an object with computed fields."""
 
     @abstractmethod
     def original(self) -> object:
@@ -34,7 +34,7 @@ class Stand(ABC):
 
 
 class Encoder:
-    """Converter to plain values; one per document, because it remembers written objects."""
+    """Converter to plain values of one document."""
 
     def __init__(self, stands: Mapping[type, Callable[[Any], Stand]] | None = None) -> None:
         self._stands = stands or {}

@@ -1,4 +1,4 @@
-"""TOML files: values are read with type and range; errors contain file, line, table and key."""
+"""TOML files: values with type and range, and located errors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")  # Python reports no line fo
 class TomlFile:
     """The content of a file.
 
-    `replaced` are values that replace those of the file: `section.key=value`, texts with or without quotes.
+    `replaced` are values that replace values of the file: `section.key=value`, texts with or without quotes.
     """
 
     def __init__(self, path: Path, replaced: Sequence[str] = ()) -> None:
@@ -67,7 +67,7 @@ class TomlFile:
         return Place(self.path, record, self.lines[record - 1] if record and known else None)
 
     def error(self, key: str, message: str | Phrase, section: str = "") -> InputError:
-        """Return an error at the first line with a key or table, preferably in the section."""
+        """Return an error at the line of a key or table, if in the section."""
         replaced = [text for pair, text in self._replaced.items() if pair == (section, key) or pair[0] == key]
         if replaced:
             return InputError(
@@ -88,7 +88,7 @@ class TomlFile:
         return self._place(own[0][0] if own else None)
 
     def _lines_of(self, section: str) -> Iterator[tuple[int, str]]:
-        """Yield the numbered lines of a section: below its header, or with its name before keys.
+        """Yield the numbered lines of a section.
 
         The section `NAME 2` is the second table of an array.
         """
@@ -106,7 +106,7 @@ class TomlFile:
 
 
 def day_of(value: object) -> date:
-    """Return a date of TOML, or of a text such as 1983-07-02; `ValueError` if it is neither."""
+    """Return a date of TOML or text (1983-07-02); else `ValueError`."""
     # A datetime of Python is a date, too.
     return value if type(value) is date else date.fromisoformat(value if isinstance(value, str) else "")
 
@@ -193,7 +193,7 @@ class Table:
         return number
 
     def says(self, today: str, report: str) -> bool:
-        """Return whether the value is given in present units instead of units of the report."""
+        """Return whether the key in present units is set; reject both keys."""
         if today in self and report in self:
             raise self.error(today, phrase("error.exclusive", first=today, second=report))
         return today in self
@@ -252,7 +252,7 @@ class Table:
     def numbers(
         self, key: str, counts: int | Collection[int], default: Sequence[float] | None = None
     ) -> list[float]:
-        """Return one of some counts of finite numbers; infinite ones mark fixed or free values.
+        """Return finite numbers of an allowed count; infinite: fixed or free.
 
         A single number needs no brackets.
         """
@@ -272,7 +272,7 @@ class Table:
         return list(self._of_kind(key, list | tuple, "error.list", default))
 
     def rows(self, key: str, kinds: tuple[type[str] | type[float], ...]) -> list[list[Any]]:
-        """Return a list of lists of names (`str`) and numbers (`float`); empty if it is missing."""
+        """Return a list of lists of names (`str`) and numbers (`float`)."""
         rows = []
         for row in self.items(key, []):
             if not isinstance(row, list) or len(row) != len(kinds):
@@ -326,7 +326,7 @@ class KeyPlace:
 
 
 class Document:
-    """A TOML file of tables by name, one or several of each; a missing or surplus one is an InputError."""
+    """A TOML file of named tables; missing or surplus ones are errors."""
 
     def __init__(self, tables: Mapping[str, list[Table]], source: TomlFile) -> None:
         self._tables, self.source = tables, source
@@ -363,7 +363,7 @@ class Document:
 def read_document(
     path: Path, keys: Mapping[str, Collection[str] | None], replaced: Sequence[str] = ()
 ) -> Document:
-    """Read a TOML file with the keys of each table; None: the reader of the table checks its keys."""
+    """Read a TOML file with the allowed keys of each table (None: any)."""
     source = TomlFile(path, replaced)
     tables: dict[str, list[Table]] = {}
     for name, content in source.content.items():

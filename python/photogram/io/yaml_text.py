@@ -1,4 +1,4 @@
-"""YAML as in OpenCV, ROS and Kalibr: mappings, sequences, flow lists, plain and quoted values, tags.
+"""YAML as in OpenCV, ROS and Kalibr, without anchors and block text.
 
 Anchors, block text and several documents are rejected with their lines. Tags such as `!!opencv-matrix` are
 ignored.
@@ -105,7 +105,7 @@ class _Reader:
         return found
 
     def _value(self, text: str, indent: int, depth: int) -> Any:
-        """Return the value after a key or dash, or in the following lines with larger indent."""
+        """Return the value after a key or dash, or in indented lines."""
         line = self.lines[self.at]
         text = _TAG.sub("", text, count=1) if text.startswith("!") else text
         if text[:1] in ("&", "*", "|", ">", "@", "`"):
@@ -224,7 +224,7 @@ def camera_info(
     turn: Floats | None = None,
     projection: Floats | None = None,
 ) -> bytes:
-    """Return a camera in ROS format (`sensor_msgs/CameraInfo`); turn and projection rectify it.
+    """Return a camera in ROS format (`sensor_msgs/CameraInfo`).
 
     The lens is the distortion model with its coefficients.
     """

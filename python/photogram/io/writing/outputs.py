@@ -1,4 +1,4 @@
-"""A set of files that are completed first, and then moved to their paths together."""
+"""A set of files that are completed, then moved to their paths together."""
 
 from __future__ import annotations
 
@@ -71,7 +71,6 @@ class _Staged:
     placed: bool = False
 
     def complete(self) -> None:
-        """Flush the content to the disk."""
         if not self.file.closed:
             with naming(self.target.given):
                 self.file.flush()
@@ -79,14 +78,13 @@ class _Staged:
             self.file.close()
 
     def keep(self) -> None:
-        """Preserve the existing file under another name for :meth:`restore`, if the file system can."""
+        """Preserve the existing file for :meth:`restore`, if possible."""
         if self.target.status:
             with suppress(OSError):
                 os.link(self.target.place, f"{self.path}.old", follow_symlinks=False)
                 self.old = f"{self.path}.old"
 
     def place(self) -> None:
-        """Move the file to its path."""
         with naming(self.target.given):
             os.replace(self.path, self.target.place)
         self.placed = True
@@ -182,7 +180,6 @@ class OutputSet:
         return file
 
     def _make(self, directory: str) -> None:
-        """Create a directory and its parents."""
         if os.path.isdir(directory):
             return
         self._make(os.path.dirname(directory))
@@ -300,7 +297,7 @@ def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Defer termination signals until the end of the block; then restore and call their handlers.
+    """Defer termination signals until the end of the block.
 
     Only the main thread runs handlers of signals; other threads defer nothing.
     """

@@ -1,4 +1,4 @@
-"""Hidden directories in which files are completed, and marks of incomplete sets of files."""
+"""Hidden directories for incomplete files, and marks of incomplete sets."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ that stand in this directory have been written again, or remove it yourself.
 class Staging:
     """A private directory with a random name, locked during the life of its process.
 
-    The lock shows whether the process lives. Process ids are reused, and have no meaning in other containers
+    The lock shows whether the process lives. Process ids are reused, and are meaningless in other containers
     or on other machines that share a disk. On file systems without locks, every such directory counts as
     active.
     """
@@ -59,7 +59,7 @@ class Staging:
         return os.path.join(self.directory, f".photogram-{self.token}")
 
     def _begin(self) -> bool:
-        """Create and lock the directory; return False if another run removed it as a leftover meanwhile."""
+        """Create and lock the directory; False if another run removed it."""
         os.mkdir(self.path, 0o700)
         lock = os.path.join(self.path, LOCK)
         try:
@@ -122,7 +122,7 @@ def _remove_dead(path: str) -> None:
 
 
 def _empty(path: str) -> None:
-    """Remove the files of a staging directory, the lock last, and itself; links are not followed."""
+    """Remove a staging directory, the lock last, without following links."""
     opened = os.open(path, DIRECTORY)
     try:
         for name in sorted(os.listdir(opened), key=lambda name: name == LOCK):
@@ -133,7 +133,7 @@ def _empty(path: str) -> None:
 
 
 def try_lock(descriptor: int) -> bool | None:
-    """Lock a file; False if another process has the lock, None on file systems without locks."""
+    """Lock a file; False if it is locked, None without support of locks."""
     if sys.platform == "win32":
         return None
     try:
@@ -159,7 +159,7 @@ def sync_directory(directory: str) -> None:
 
 
 def mark(staging: Staging, places: Iterable[str]) -> None:
-    """Create a mark file in the directory of a set, which may be incomplete from now on."""
+    """Create the mark file of a set that may be incomplete."""
     lines = [json.dumps(os.path.relpath(place, staging.directory)) for place in places]
     content = (MARK_TEXT + "\n".join(lines) + "\n").encode()
     made = os.path.join(staging.path, "mark")
@@ -211,7 +211,7 @@ def _path(staging: Staging) -> str:
 
 
 def _dead_marks(directory: str) -> list[tuple[str, set[str]]]:
-    """Return the marks of terminated runs in a directory, with their paths, without invalid lines."""
+    """Return marks of terminated runs in a directory, with their paths."""
     found = []
     with suppress(OSError):
         for name in sorted(os.listdir(directory)):

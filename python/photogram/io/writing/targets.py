@@ -24,12 +24,12 @@ class Target:
 
     given: Path  # The path of the user, for errors
     place: str  # The path after all symbolic links
-    status: os.stat_result | None  # Of the existing file; None without
+    status: os.stat_result | None  # Status of the existing file; None without
     descriptor: int | None = None  # File descriptor of this process, for paths such as `/dev/stdout`
 
     @property
     def regular(self) -> bool:
-        """Whether the target is a (new) regular file; pipes and devices are written directly."""
+        """Whether the target is a (new) regular file, not a pipe or device."""
         return self.descriptor is None and (self.status is None or stat.S_ISREG(self.status.st_mode))
 
     @property
