@@ -6,7 +6,7 @@ inside.
 Why not a package: beartype does not convert values (strings to paths, NumPy integers to integers), raises its
 own errors, and accepts NaN, NUL and lone surrogates. pydantic does not support arrays and adds a compiled
 core to a light install. msgspec does not support arrays, does not list the allowed words or the nearest key,
-accepts 1e400 as a number, and its import is slower than that of this package.
+and accepts 1e400 as a number. Its import is slow.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ARRAYS = {"NDArray": NDArray, "np": np, "Floats": Floats, "Indices": Indices, "
 
 
 def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
-    """Add argument checks to the `public` functions and classes among the globals of a module.
+    """Add argument checks to `public` functions and classes of a module.
 
     A function is replaced by a checking one; a class checks the arguments of its constructor.
     """
@@ -103,7 +103,7 @@ def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> 
 
 
 class _Names(dict[str, Any]):
-    """Names in annotations, which are strings; names imported for type checking only are resolved."""
+    """Names in annotations; names imported for type checking only are resolved."""
 
     def __missing__(self, name: str) -> Any:
         modules = [vars(module) for key, module in list(sys.modules.items()) if key.startswith("photogram.")]
@@ -176,7 +176,7 @@ def _check_of_union(inner: tuple[Any, ...]) -> Check | None:
 
 
 def _several(hint: Any) -> Check | None:
-    """Return a check of each element of a sequence, and of its length if the annotation defines it."""
+    """Return a check of each element of a sequence, and of its defined length."""
     origin, inner = get_origin(hint), get_args(hint)
     fixed = origin is tuple and (len(inner) < 2 or inner[1] is not Ellipsis)
     checks = [
@@ -249,7 +249,7 @@ def _text(name: str, value: Any) -> str:
 
 
 def _array(name: str, value: Any) -> Any:
-    """Reject values that are not arrays of real numbers, and arrays with masked elements."""
+    """Reject other values than real numbers, and arrays with masked elements."""
     if value is None:
         raise _refused(name, value, "an array of numbers")
     try:

@@ -2,8 +2,8 @@
 
 Invalid values raise an :class:`~photogram.errors.InputError` with the name of the argument and its value.
 
-An argument is copied once into a read-only array, so that later changes of the caller's array have no effect.
-A read-only array that owns its data is shared.
+An argument is copied once into a read-only array, so that later changes of the caller's array do not affect
+it. A read-only array that owns its data is shared.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def shaped(
 
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
-    """Return an array of numbers of any shape, possibly the caller's array, as in :func:`shaped`."""
+    """Return an array of numbers of any shape, possibly the caller's array."""
     array = _plain(name, value, "numbers")
     kind = array.dtype.kind
     if kind == "O":
@@ -72,7 +72,7 @@ def _no_array(name: str, of: str, reason: str | Phrase) -> InputError:
 
 
 def _is_real(value: object) -> bool:
-    """Return whether a value is a real number, or None, which is a missing value (NaN)."""
+    """Return whether a value is a real number, or None, a missing value (NaN)."""
     return value is None or (isinstance(value, Real) and not isinstance(value, bool))
 
 
@@ -100,7 +100,7 @@ def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
-    """Return a contiguous read-only array: the array itself if possible, otherwise a copy."""
+    """Return a contiguous read-only array: the array itself or a copy."""
     flags = array.flags
     if not (flags.owndata and flags.c_contiguous and not flags.writeable):
         array = np.array(array, order="C", subok=False)
@@ -117,7 +117,7 @@ def freeze_fields(owner: Any) -> None:
 
 
 def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return the rows whose pair of indices also occurs in an earlier row; `second` is below `count`."""
+    """Return rows whose pair of indices repeats an earlier row; `second` < `count`."""
     pairs = np.asarray(first, dtype=np.int64) * max(count, 1)
     pairs += second
     if (pairs[1:] > pairs[:-1]).all():  # Sorted, as in most blocks
@@ -154,8 +154,8 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
 def names(name: str, values: Iterable[object]) -> list[str]:
     """Return names as strings; integers are valid names.
 
-    A missing name in a table is None or NaN. A column of integers with a missing value has become floats, and
-    1.0 is not the name 1.
+    Tables contain None or NaN for a missing name. A column of integers with a missing value has become
+    floats, and 1.0 is not the name 1.
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
@@ -226,7 +226,7 @@ def refused(name: str, value: object, what: str) -> InputError:
 
 
 def value_field(value: object) -> str | float | Phrase:
-    """Return a value as the field of a message: text, a number, or a short description."""
+    """Return a value as a field of a message: text, number, or short description."""
     if isinstance(value, int) and value.bit_length() > 128:
         return phrase("error.long-integer", bits=value.bit_length())
     if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
@@ -244,7 +244,7 @@ def shown(value: object) -> str:
 
 
 def argument_error(name: str, code: str, /, **fields: object) -> InputError:
-    """Return the error of an argument; `code` is a code of a message on values without `error.`."""
+    """Return the error of an argument; `code` is a message code without `error.`."""
     texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
     if "value" in fields and not isinstance(fields["value"], Phrase):
         texts["value"] = value_field(fields["value"])
@@ -259,7 +259,7 @@ def probability(name: str, value: float) -> float:
 
 
 def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:
-    """Return whether a square matrix is a covariance matrix: symmetric, positive definite.
+    """Return whether a square matrix is symmetric and positive definite.
 
     A singular one may have rows of zeros, and the others may be indefinite by rounding.
     """
@@ -278,12 +278,12 @@ def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> boo
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:
-    """Return an index of the chosen rows: a slice, which does not copy, if all are chosen."""
+    """Return an index of the chosen rows: a slice, without copy, for all."""
     return slice(None) if which.all() else which
 
 
 def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which of (m, 2) rows are finite; comparing column by column is several times faster."""
+    """Return which of (m, 2) rows are finite; faster column by column."""
     found: NDArray[np.bool_] = np.isfinite(pairs[:, 0]) & np.isfinite(pairs[:, 1])
     return found
 
@@ -298,6 +298,6 @@ _DIGITS = re.compile("([0-9]+)")
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:
-    """Return the key for natural sorting of names: runs of digits are compared as numbers."""
+    """Return the key for natural sorting of names: digits sort as numbers."""
     parts = _DIGITS.split(name)
     return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]

@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Valued:
-    """A dataclass whose instances are equal if all their fields are equal; NaN equals NaN.
+    """A dataclass that compares all fields by value; NaN equals NaN.
 
     Declare it with `eq=False`, which leaves `==` to this class. The hash uses names, types and sizes only.
     """
@@ -42,7 +42,7 @@ class Valued:
 
 
 def alike(a: object, b: object) -> bool:
-    """Return whether two values have one type and equal contents, including arrays in dataclasses."""
+    """Return whether two values have one type and equal contents."""
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):

@@ -12,7 +12,7 @@ _Kind = TypeVar("_Kind")
 
 
 def kind_error(name: str, kind: str, value: object) -> InputError:
-    """Return the error of an argument of a wrong type; `kind` is, e.g., `a Spheroid or None`."""
+    """Return the error of a wrong type; `kind` is, e.g., `a Spheroid or None`."""
     return argument_error(name, "kind", kind=kind, value=value)
 
 
@@ -33,6 +33,6 @@ def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]
 
 
 def require(condition: object, name: str, code: str, /, **fields: object) -> None:
-    """Reject an argument unless a condition is true; `code` and fields as in `argument_error`."""
+    """Reject an argument if a condition is false; see `argument_error`."""
     if not condition:
         raise argument_error(name, code, **fields)

@@ -13,7 +13,7 @@ from photogram.arguments.annotations import check_arguments
 def attach_checked(
     package: str, file: str, given: Collection[str] = ()
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """Return `__getattr__`, `__dir__` and `__all__` of a package, as `lazy_loader.attach_stub` does.
+    """Return `__getattr__`, `__dir__` and `__all__` of a lazily loaded package.
 
     Functions check their arguments. Classes in `given`, which users instantiate, check them too.
     """
