@@ -1,4 +1,4 @@
-"""Conversion of the five files to a block: the rules of the GIANT guide between files, and remarks."""
+"""Conversion of the five files to a block, with remarks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ UPRIGHT = 0.97  # Smallest vertical component of the axis of a near-vertical pho
 
 
 def remarks(block: Block, frames: list[Frame]) -> list[Message]:
-    """Return remarks on stations without enough rays, similar names, and map coordinates."""
+    """Return remarks on weak stations, similar names, and map coordinates."""
     messages = []
     for frame, count in zip(frames, ties(block).tolist(), strict=True):
         loose = not (all(frame.position_sd) and all(frame.attitude_sd))
@@ -147,7 +147,7 @@ def job_refraction(
     water: Water | Literal["none"] | None = None,
     index: float | None = None,
 ) -> Refraction | None:
-    """Return the refraction of a job: models of the guide as switched in COMMON, or the named ones.
+    """Return the refraction of a job as in COMMON, or of the named models.
 
     `none` omits a model that COMMON requires; None follows COMMON. `index` is the refractive index of water.
     """
@@ -165,7 +165,7 @@ def job_refraction(
 
 
 def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
-    """Pair FRAMES with IMAGES. Images of frames that FRAMES does not list are skipped silently."""
+    """Pair FRAMES with IMAGES; other images are skipped silently."""
     listed = {frame.name for frame in project.frames}
     measured: dict[str, ImageFrame] = {}
     for images in project.images:
@@ -185,7 +185,7 @@ def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, Ima
 
 
 def _lost_header(images: list[ImageFrame], name: str) -> Phrase | str:
-    """Return a hint if a point has the name of a frame: the terminator before its header is missing."""
+    """Return a hint on a missing terminator if a point has a frame's name."""
     for frame in images:
         if name in frame.points:
             record = frame.point_record(frame.points.index(name))
@@ -283,5 +283,5 @@ def _longitudes(positions: Floats, geographic: bool) -> Floats:
 
 
 def _linear_unit(common: Common) -> str:
-    """Determine feet or metres from the axes of the spheroid, which define the linear unit of the job."""
+    """Return the linear unit of a job, from the axes of its spheroid."""
     return "ft" if common.geographic and common.semi_major > LONGEST_METRES else "m"

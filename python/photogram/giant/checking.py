@@ -1,4 +1,4 @@
-"""The check of a project: check of its block in terms of the guide, with remarks on its files."""
+"""The check of a project, with remarks on its files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _type_code(kept: Bools) -> int:
 
 
 def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Diagnosis:
-    """Check a project as in Appendix H of the guide: first by intersection, then by adjustment.
+    """Check a project as in Appendix H of the guide.
 
     Nothing is changed or written. Later steps use the corrections of earlier ones (a wrong sign, a rotated
     photo) and omit invalid data, so that every error is reported separately.

@@ -77,7 +77,7 @@ class Columns:
         return values
 
     def position(self, geographic: bool) -> Floats:
-        """Read columns 9-44 (F12.3) as (n, 3): X, Y, Z, or longitude and latitude (rad) and height."""
+        """Read columns 9-44 (F12.3) as (n, 3): X, Y, Z, or geographic (rad)."""
         if not geographic:
             return np.column_stack([self.real(9, 20), self.real(21, 32), self.real(33, 44)])
         longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
@@ -85,7 +85,7 @@ class Columns:
         return np.column_stack([longitude, latitude, height])
 
     def deviations(self, *angles: bool) -> Floats:
-        """Read columns 45-74 as (n, 3) standard deviations; `angles` says which are DMS."""
+        """Read columns 45-74 as (n, 3) standard deviations; `angles` selects DMS fields."""
         fields = zip((45, 55, 65), angles, strict=True)
         return np.column_stack([self.deviation(first, first + 9, angle=angle) for first, angle in fields])
 
@@ -94,7 +94,7 @@ class Columns:
         return np.column_stack([self.angle(first, first + 11) for first in (9, 21, 33)])
 
     def rows(self, *values: Floats) -> list[tuple[Any, ...] | None]:
-        """Return (n, k) arrays that were read as rows, and None for records that are not plain."""
+        """Return (n, k) arrays as rows, None for records that are not plain."""
         rows = zip(*(zip(*array.T.tolist(), strict=True) for array in values), strict=True)
         return [row if plain else None for row, plain in zip(rows, self.plain.tolist(), strict=True)]
 
@@ -127,7 +127,7 @@ class Columns:
 
 
 def real_fields(values: ArrayLike, width: int, decimals: int) -> Table:
-    """Write numbers (n, k) to Fw.d fields, as :func:`photogram.giant.fields.format_real` does.
+    """Write numbers (n, k) to Fw.d fields; see `format_real`.
 
     Returns (n, k width) characters, at most 12 per field. Raises ValueError if a number is infinite or too
     large for the field.
@@ -147,7 +147,7 @@ def _reals(values: Floats, width: int, decimals: int) -> Table:
 
 
 def angle_fields(values: ArrayLike, width: int) -> Table:
-    """Write radians (n, k) to packed DMS fields, as :func:`photogram.giant.fields.format_angle` does.
+    """Write radians (n, k) to packed DMS fields; see `format_angle`.
 
     Returns (n, k width) characters, at most 12 per field. Raises ValueError if an angle exceeds 360 degrees.
     """
@@ -178,7 +178,7 @@ def _angles(values: Floats, width: int) -> Table:
 
 
 def position_fields(positions: ArrayLike, geographic: bool) -> Table:
-    """Write (n, 3) coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height.
+    """Write (n, 3) coordinates (F12.3): X, Y, Z, or geographic (rad).
 
     Returns (n, 36) characters.
     """
@@ -189,7 +189,7 @@ def position_fields(positions: ArrayLike, geographic: bool) -> Table:
 
 
 def deviation_fields(deviations: Sequence[tuple[float, ...]], angles: Sequence[bool]) -> list[str]:
-    """Write the standard deviations of records, as `photogram.giant.fields.format_deviations` does."""
+    """Write standard deviations of records; see `format_deviations`."""
     # A file has few different ones.
     different = {values: format_deviations(values, angles) for values in set(deviations)}
     return [different[values] for values in deviations]
@@ -203,7 +203,7 @@ def texts(table: Table) -> list[str]:
 
 
 def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) -> Table:
-    """Write (n, k) values as (n, k width) characters, in runs that fit into the processor cache."""
+    """Write (n, k) values as (n, k width) characters, in cached runs."""
     values = np.asarray(values, dtype=np.float64)
     flat = values.ravel()
     table = np.empty((len(flat), width), dtype=np.uint8)
@@ -213,7 +213,7 @@ def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) ->
 
 
 def _rounded(values: Floats, places: Indices) -> tuple[Indices, Bools]:
-    """Round to decimals: units of the last one, and which are too close to the middle to decide."""
+    """Round to units of the last decimal; return which are undecided."""
     scaled = values * POWERS[places]
     units = np.rint(scaled)
     return units.astype(np.int64), np.abs(scaled - units) > 0.5 - TIE
@@ -226,7 +226,7 @@ def _fitting(units: Indices, places: Indices, room: Indices) -> tuple[Indices, I
 
 
 def _packed(units: Indices, places: Indices) -> Indices:
-    """Convert seconds of arc to degrees, minutes and seconds, DDDMMSS, in units of the last decimal."""
+    """Convert seconds of arc to DDDMMSS, units of the last decimal."""
     unit = POWERS[places]
     minutes, seconds = np.divmod(units, 60 * unit)
     degrees, minutes = np.divmod(minutes, 60)

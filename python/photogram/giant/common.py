@@ -1,4 +1,4 @@
-"""COMMON (unit 7): title, job definition, standard deviations of control (GIANT guide, section II.B.1)."""
+"""COMMON (unit 7): title and job definition (GIANT guide, II.B.1)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SWITCHES = (
 
 @dataclass
 class Common:
-    """The job definition; the defaults are those of a blank record.
+    """The job definition; the defaults correspond to a blank record.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Common:
     max_iterations
         Column 14, 1 to 9; blank is 4.
     strip
-        Column 15: the character removed from the beginning of names; blank is none.
+        Column 15: the character removed from the beginning of names, if not blank.
     air_refraction, water_refraction
         Columns 16, 17.
     convergence_percent
@@ -76,7 +76,7 @@ class Common:
         Columns 51-60, 61-70: the axes of the spheroid, whose unit is the linear unit of the job; blank is
         Clarke 1866 in metres.
     control_sd
-        Record 3: standard deviations of control if GROUND has none; radians for longitude and latitude,
+        Record 3: standard deviations of control for blanks in GROUND; radians for longitude and latitude,
         otherwise linear units; 0 is the built-in default.
     """
 
@@ -107,20 +107,20 @@ class Common:
 
     @property
     def unbiased_variance(self) -> Literal["redundancy", "constrained", "unity"]:
-        """Basis of the unit variance: `redundancy` for free cameras, which do not count and cause no bias."""
+        """Basis of the unit variance: as in COMMON, but `redundancy` for `free`."""
         # A blank standard deviation of a station means 60,000 units: it is not an observation.
         return "redundancy" if self.unit_variance == "free" else self.unit_variance
 
     @property
     def default_control_sd(self) -> tuple[float, float, float]:
-        """Value of a blank standard deviation in GROUND: record 3, else 1 unit or 0.01 seconds of arc."""
+        """Standard deviations for blanks in GROUND: record 3, else 1 unit or 0.01 arcsec."""
         planimetry = 0.01 * ARCSEC if self.geographic else 1.0
         first, second, third = self.control_sd
         return first or planimetry, second or planimetry, third or 1.0
 
     @property
     def default_station_sd(self) -> tuple[float, float, float]:
-        """Value of a blank standard deviation of a station position: 60000 units or 10 minutes of arc."""
+        """Standard deviations for blanks of stations: 60000 units or 10 arcmin."""
         planimetry = 600 * ARCSEC if self.geographic else 60000.0
         return planimetry, planimetry, 60000.0
 

@@ -1,4 +1,4 @@
-"""The warnings of the 1987 program about points and control (GIANT guide, section III)."""
+"""Warnings of the 1987 program on points and control (guide, III)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ErrorWarning:
 
 
 def error_warnings(project: Contents, block: Block, limits: Limits | None = None) -> list[ErrorWarning]:
-    """Return the warnings of section III of the guide for a project, in the guide's order.
+    """Return the warnings of section III of the guide, in its order.
 
     A control point on one photograph that loses its control is listed there only, not with the pass points.
 

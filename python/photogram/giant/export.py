@@ -1,4 +1,4 @@
-"""Conversion of a block to GIANT files, and records of adjusted stations and points."""
+"""Conversion of blocks to GIANT files, and adjusted records."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Triple = tuple[float, float, float]
 def block_files(
     block: Block, common: Common | None
 ) -> tuple[Common, list[Camera], list[Frame], list[ImageFrame], list[GroundPoint], list[Message]]:
-    """Return the content of the five files for a block; see :meth:`Project.from_block`."""
+    """Return the five files of a block; see :meth:`Project.from_block`."""
     of_images_alone(checked(block), "GIANT files")
     common = dataclasses.replace(
         common or Common(error_propagation=True),
@@ -86,7 +86,7 @@ def _write_refraction(common: Common, block: Block) -> list[Message]:
 
 
 def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
-    """Return positions and attitudes for FRAMES, which has one set: observed ones if weighted."""
+    """Return positions and attitudes for FRAMES, observed if weighted."""
     stations, left = [], False
     for initial, observed, sd in (
         (block.photo_positions, block.photo_positions_observed, block.photo_position_sd),
@@ -127,7 +127,7 @@ def _ground(block: Block) -> list[GroundPoint]:
 
 
 def _weights(what: str, names: list[str], sd: Floats) -> Floats:
-    """Return standard deviations with 0, the default of GIANT, for infinite ones; reject fixed values."""
+    """Return standard deviations, 0 for infinite ones; reject fixed values."""
     fixed = (sd == 0).any(axis=1)
     if fixed.any():
         name = names[int(fixed.argmax())]
@@ -136,7 +136,7 @@ def _weights(what: str, names: list[str], sd: Floats) -> Floats:
 
 
 def _turns(attitudes: Floats) -> Floats:
-    """Convert omega and phi to -180 to 180 degrees and kappa to 0 to 360, as in the guide."""
+    """Convert angles to -180 to 180 degrees, kappa to 0 to 360."""
     omega_phi = np.remainder(attitudes[:, :2] + math.pi, 2 * math.pi) - math.pi
     return np.column_stack([omega_phi, np.remainder(attitudes[:, 2], 2 * math.pi)])
 
@@ -147,7 +147,7 @@ def _triple(values: Floats) -> Triple:
 
 
 def adjusted_frames(project: Contents, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
-    """Return stations for units 8 and 20: adjusted values (P, 3), standard deviations of the input."""
+    """Return stations for units 8 and 20: adjusted values (P, 3), input sd."""
     turned = _turns(attitudes)
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     return [
@@ -163,7 +163,7 @@ def adjusted_frames(project: Contents, block: Block, positions: Floats, attitude
 def adjusted_ground(
     project: Contents, block: Block, positions: Floats, *, as_published: bool = False
 ) -> list[GroundPoint]:
-    """Return the points for unit 9: every point on two or more photographs; NaN positions are unused.
+    """Return the points for unit 9: all on two or more photographs.
 
     Control has its standard deviations and type code. Pass points get the type code 7, so that the file can
     be read as GROUND without turning them into control. Points are sorted, P9 before P10, unless COMMON

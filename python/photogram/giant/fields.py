@@ -1,4 +1,4 @@
-"""Single fields of fixed-column records: numbers, packed degrees-minutes-seconds and names, read and written.
+"""Reading and writing of single fields of fixed-column records.
 
 Functions process the characters of one field and raise ValueError; :mod:`photogram.giant.records` adds file,
 record and columns. Rules: GIANT guide, section II.B.
@@ -21,7 +21,7 @@ LARGEST_PACKED = 10**8  # Larger than every angle, and safe for decimal division
 
 
 def parse_name(field: str, strip: str = "") -> str:
-    """Read a name: left-justified, without the leading `strip` characters of COMMON column 15.
+    """Read a name without the leading `strip` characters (COMMON column 15).
 
     A name that consists of this character is reduced to one of it, so that it is not empty.
     """
@@ -32,7 +32,7 @@ def parse_name(field: str, strip: str = "") -> str:
 
 
 def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
-    """Split DDDMMSS.sss into sign (1 or -1), degrees, minutes and seconds, in decimal arithmetic."""
+    """Split decimal DDDMMSS.sss into sign, degrees, minutes and seconds."""
     sign, value = (-1 if packed < 0 else 1), abs(packed)
     degrees, rest = divmod(value, 10000)
     minutes, seconds = divmod(rest, 100)
@@ -56,7 +56,7 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
 
 
 def format_real(value: float, width: int, decimals: int) -> str:
-    """Write a number for an Fw.d field: explicit point, necessary digits only, right-justified.
+    """Write a number for an Fw.d field with an explicit point, right-justified.
 
     A number that does not fit is rounded. It has at least `decimals` decimals if they fit. The implied point
     of the format is used only if the explicit one would cost a digit. NaN, an unknown value, is a blank
@@ -84,7 +84,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
 
 
 def _rounded(value: float, width: int) -> str:
-    """Round to the decimals that fit; too long if the integer part and its point do not fit."""
+    """Round to the decimals that fit; the result may be too long."""
     places, excess = width + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
@@ -96,7 +96,7 @@ def _rounded(value: float, width: int) -> str:
 
 
 def pack_dms(arcseconds: Decimal) -> str:
-    """Write seconds of arc as DDDMMSS.sss with all their decimals, without leading zeros."""
+    """Write seconds of arc as DDDMMSS.sss without leading zeros."""
     whole_minutes, seconds = divmod(abs(arcseconds), 60)
     degrees, minutes = divmod(int(whole_minutes), 60)
     packed = 10000 * degrees + 100 * minutes + seconds
@@ -121,7 +121,7 @@ def format_angle(value: float, width: int) -> str:
 
 
 def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
-    """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
+    """Write radians as packed DMS with `least` to `most` decimals."""
     if not abs(value) <= MOST_ANGLE:
         raise ValueError(phrase("giant.angle", value=value))
     arcseconds = Decimal(repr(float(value) / ARCSEC))
@@ -145,7 +145,7 @@ def format_name(name: str) -> str:
 
 
 def printed_order(name: str) -> tuple[int, str]:
-    """Return the sort key of the program: names as right-justified fields, character by character.
+    """Return the sort key of the program: right-justified names.
 
     A blank precedes every first character of a name, so shorter names are first.
     """

@@ -1,4 +1,4 @@
-"""CAMERAS (unit 1) and FRAMES (units 3, 8, 20): cameras and stations (GIANT guide, sections II.B.2 and 4)."""
+"""CAMERAS (unit 1) and FRAMES (units 3, 8, 20) (GIANT guide, II.B)."""
 
 from __future__ import annotations
 

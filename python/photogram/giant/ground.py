@@ -1,4 +1,4 @@
-"""GROUND (units 4 and 9): ground control and adjusted ground points (GIANT guide, section II.B.5)."""
+"""GROUND (units 4 and 9): ground points (GIANT guide, II.B.5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""IMAGES (unit 2): the image coordinates, frame by frame (GIANT guide, section II.B.3)."""
+"""IMAGES (unit 2): image coordinates (GIANT guide, II.B.3)."""
 
 from __future__ import annotations
 

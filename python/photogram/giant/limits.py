@@ -1,4 +1,4 @@
-"""The installation parameters N1 to N6 of the 1987 program (GIANT guide, section I.E)."""
+"""Limits N1 to N6 of the 1987 program (GIANT guide, section I.E)."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def check_files(project: Contents, limits: Limits) -> None:
     control = sum(1 + point.repeats for point in project.ground)
     _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)
     _check("GROUND CONTROL", project.ground, control, limits.control)
-    # The guide has no message for N5; this one follows the others.
+    # The guide lacks a message for N5; this one follows the others.
     _check("CAMERA SYSTEMS", [], len(project.cameras), limits.cameras)
 
 
@@ -109,7 +109,7 @@ def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int
 
 
 def allowed_images(image_points: Indices, names: list[str], limits: Limits, messages: list[Message]) -> Bools:
-    """Return which images remain under the limit of photographs of a point (N4): the first ones.
+    """Return images below the limit N4 of photographs per point.
 
     `image_points` (m,) are indices of points, photo by photo; `messages` gets the warning of the guide.
     """

@@ -1,4 +1,4 @@
-"""A GIANT project: five files in a directory, read, written and converted to a block."""
+"""A GIANT project: five files, converted to a block and back."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Project(Contents):
-    """A GIANT project: the content of the five files, with conversion to a block and back."""
+    """The content of a GIANT project, with conversion to a block and back."""
 
     def _check(self, threads: int | None) -> Diagnosis:
         from photogram.giant.checking import check
@@ -34,7 +34,7 @@ class Project(Contents):
         return check(self, threads=threads)
 
     def to_block(self, limits: Limits | None = None) -> Block:
-        """Return the block of a project by the rules of the GIANT guide, sections II.B and III.
+        """Return the block of a project (GIANT guide, sections II.B and III).
 
         Remarks are added to `messages`, once each.
 
@@ -46,7 +46,7 @@ class Project(Contents):
         Raises
         ------
         InputError
-            If a frame has no images, a camera is undefined, there are no frames, or a limit is exceeded.
+            If images of a frame, a camera, or all frames are missing, or a limit is exceeded.
         """
         block, messages = assemble(self, limits)
         known = set(self.messages)
@@ -126,7 +126,7 @@ def project_files(project: Project, directory: Path, *, overwrite: bool = False)
 
 
 def write_project(project: Project, directory: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the five files to a directory, which is created if necessary; each file is complete or absent.
+    """Write the five files to a directory, each complete or absent.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The records of the GIANT files: their fields by columns (GIANT guide, section II.B)."""
+"""Records of GIANT files: fields by columns (GIANT guide, II.B)."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class Record(records.Record):
         return self.angle(9, 20), self.angle(21, 32), self.angle(33, 44)
 
     def deviations(self, *angles: bool) -> tuple[float, float, float]:
-        """Read the three standard deviations of columns 45-74; `angles` selects DMS fields."""
+        """Read standard deviations of columns 45-74; `angles`: DMS fields."""
         first, second, third = angles
         return (
             self.deviation(45, 54, angle=first),
@@ -151,10 +151,10 @@ class Record(records.Record):
 
 
 def error_at(record: Record | None, text: Phrase) -> InputError:
-    """Return an error about a record, or without a location if the data are not from a file."""
+    """Return an error about a record; without a record, no location."""
     return record.error(text) if record else InputError(text)
 
 
 def message_at(record: Record | None, text: Phrase) -> Message:
-    """Return a remark on a record, or without a location if the data are not from a file."""
+    """Return a remark on a record; without a record, no location."""
     return record.message(text) if record else Message(text)

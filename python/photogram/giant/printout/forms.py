@@ -1,4 +1,4 @@
-"""Forms of the printout: pages with carriage control, numbers in the formats of its FORMAT statements."""
+"""Forms of the printout: pages and numbers as in FORTRAN."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BANNER = "NOAA/NOS GIANT SYSTEM .... (4/85) : "
 
 
 def headed(title: str, *lines: str) -> Page:
-    """Return the heading of a page: a centred letter-spaced title, and further lines below it."""
+    """Return a page heading: a centred spaced title, and further lines."""
     spaced = "   ".join(" ".join(word) for word in title.split())
     return ["", spaced.center(WIDTH).rstrip(), "", *lines, ""]
 
@@ -70,7 +70,7 @@ Values = Iterable[float]
 
 
 def fixed(value: float, width: int, decimals: int) -> str:
-    """Write a number as Fw.d, wider if necessary; NaN is blank, zero has no sign."""
+    """Write a number as Fw.d, wider if necessary; NaN is blank, zero without sign."""
     text = "" if math.isnan(value) else f"{value:.{decimals}f}"
     return (text.removeprefix("-") if text.strip("-0.") == "" else text).rjust(width)
 
@@ -88,7 +88,7 @@ def exponential(value: float) -> str:
 
 
 def dms(angle: float, *, circle: bool = False) -> str:
-    """Write radians as sign, degrees, minutes, seconds (A1, I3, I3, F8.4); NaN is blank, zero has no sign.
+    """Write radians as sign, degrees, minutes, seconds (A1, I3, I3, F8.4).
 
     `circle` converts 360 degrees, a possible result of rounding, to zero.
     """
@@ -139,7 +139,7 @@ class Space:
         return ", ".join((angle, angle, self.linear_unit))
 
     def values(self, position: Values, decimals: int) -> list[str]:
-        """Write three coordinates, differences or standard deviations, with these decimals of lengths."""
+        """Write three coordinates, differences or standard deviations."""
         first, second, third = position
         planimetry = (
             [dms(first), dms(second)]
@@ -160,7 +160,7 @@ def matrix_rows(covariance: Floats | None) -> Sequence[str]:
 
 
 def counts_and_rms(values: Floats, counted: Bools) -> tuple[list[int], list[float]]:
-    """Return the number of counted values of each of three columns, and their root mean square or NaN."""
+    """Return counts of values in three columns, and root mean squares."""
     count = counted.sum(axis=0)
     squares = np.where(counted, values**2, 0.0).sum(axis=0)
     rms = np.sqrt(np.divide(squares, count, out=np.full(3, np.nan), where=count > 0))

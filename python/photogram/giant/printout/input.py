@@ -1,4 +1,4 @@
-"""The input of a job: options (sample, page 0), frames (page 1), control (page 21), warnings."""
+"""Input of a job: options, frames, control, warnings."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def options_page(
 ) -> Page:
     """Return the page of the options; the default unit variance is as in COMMON.
 
-    The sample shows one choice of most options; `docs/giant-listing.md` lists our lines. As published, a
-    rectangular job has no linear unit. `refraction` may exceed the request of COMMON.
+    The sample shows one choice of most options; `docs/giant-listing.md` lists our lines. As published, the
+    linear unit of a rectangular job is omitted. `refraction` may exceed the request of COMMON.
     """
     air = refraction is not None and refraction.air is not None
     water = refraction is not None and refraction.water is not None
@@ -82,7 +82,7 @@ def _residuals(limit: float) -> str:
 def control_pages(
     space: Space, ground: Iterable[GroundPoint], default_sd: tuple[float, float, float]
 ) -> list[Page]:
-    """Return the pages of the control: ten points each, including points without photographs.
+    """Return the pages of the control, ten points each.
 
     Unheld components are listed unchanged; `default_sd` replaces standard deviations of zero.
     """
@@ -101,7 +101,7 @@ ACROSS = 4  # Plate coordinates, or names of points, per line
 
 @dataclass(frozen=True)
 class Station:
-    """The input of a camera station, in the units of the block, with the standard deviations in force."""
+    """Input of a camera station in block units, with standard deviations."""
 
     position: Values
     attitude: Values
@@ -119,7 +119,7 @@ def frame_pages(
     parameters: bool = True,
     plates: bool = True,
 ) -> list[Page]:
-    """Return the requested pages of a frame: station (COMMON column 3), plate coordinates (column 4)."""
+    """Return the requested pages of a frame: station, plate coordinates."""
     x_sd, y_sd = (sd or IMAGE_SD for sd in images.sd)
     frame = ["", f"FRAME  {images.name}", ""]
     heading = [

@@ -119,7 +119,7 @@ def _result_pages(
     yield from residual_pages(
         _residuals(block, result), common.residual_limit, closing, as_published=as_published
     )
-    # A diverged adjustment may have no covariances.
+    # Covariances of a diverged adjustment may be missing.
     used = result.used_points
     propagated = common.error_propagation and bool(
         np.isfinite(result.photo_cofactors).all() and np.isfinite(result.point_cofactors[used]).all()
@@ -139,7 +139,7 @@ def _result_pages(
 
 
 def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
-    """Return the points in processing order (of the block), each with its images by frame."""
+    """Yield the points in order of the block, with images by frame."""
     order = np.argsort(block.image_points, kind="stable")
     bounds = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
     for point in np.flatnonzero(result.used_points).tolist():

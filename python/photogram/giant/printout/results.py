@@ -1,4 +1,4 @@
-"""Adjusted values: stations, ground points (sample, pages 30 to 34, 41 to 54), corrections (page 35)."""
+"""Adjusted stations, ground points and corrections (sample, pages 30-54)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def station_pages(
     attitudes: Floats,
     covariances: Floats | None,
 ) -> list[Page]:
-    """Return the pages of P stations, thirteen each, with their (P, 6, 6) covariances if available."""
+    """Return pages of P stations, with (P, 6, 6) covariances if available."""
     matrix = "" if covariances is None else f"{'COVARIANCE MATRIX':^{MATRIX}}"
     heading = headed(
         "TRIANGULATED CAMERA STATIONS",
@@ -64,7 +64,7 @@ IDENT = 18  # Columns of the name and the mark of control
 
 
 def point_pages(space: Space, names: Sequence[str], marks: Sequence[str], positions: Floats) -> list[Page]:
-    """Return the pages of n points without error propagation: one line per point, 52 per page.
+    """Return pages of n points without error propagation, 52 per page.
 
     Marks are `*code*` for control, otherwise empty.
     """
@@ -86,7 +86,7 @@ def propagated_point_pages(
     covariances: Floats,
     held: Bools,
 ) -> list[Page]:
-    """Return the pages with covariances (n, 3, 3): three lines per point, 13 points per page, and a summary.
+    """Return pages of points with covariances (n, 3, 3), and a summary.
 
     The summary contains unheld components (n, 3) only.
     """
@@ -136,7 +136,7 @@ ACROSS = 4  # Points per line
 def correction_pages(
     space: Space, names: Sequence[str], corrections: Floats, held: Bools, *, as_published: bool
 ) -> list[Page]:
-    """Return the pages of the corrections (n, 3), NaN if missing, with held components.
+    """Return pages of corrections (n, 3) with held components; NaN if missing.
 
     The published form has neither a definition of the corrections nor number and rms of unheld components.
     """
@@ -155,7 +155,7 @@ def correction_pages(
 
 
 def _cells(space: Space, name: str, values: Sequence[float], held: Sequence[bool]) -> list[str]:
-    """Return three lines of 33 columns: name, label, and 17 for the value with its parentheses."""
+    """Return three lines of 33 columns: name, label, value."""
     rows = zip(("", name, ""), space.names, space.values(values, 3), held, strict=True)
     return [
         f"{ident:<9}{axis}={f' {value} ' if is_held else f'({value})'}   "
