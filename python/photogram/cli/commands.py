@@ -1,4 +1,4 @@
-"""The commands of all programs. Each is loaded when it is called, so that other commands are quick."""
+"""The commands of all programs, each loaded at its first call."""
 
 from __future__ import annotations
 

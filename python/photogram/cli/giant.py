@@ -113,7 +113,7 @@ def giant(
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Return the output folder; reject the folder of another project without --overwrite."""
+    """Return the output folder; reject one of another project."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
@@ -183,7 +183,7 @@ def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
 def _adjusted_project(
     job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
 ) -> AdjustmentOutcome[Result]:
-    """Adjust or snoop the block as COMMON requires, and estimate the requested variance components."""
+    """Adjust or snoop the block as in COMMON, with requested components."""
     from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.errors import AdjustmentError
 

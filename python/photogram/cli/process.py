@@ -15,7 +15,7 @@ SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"  # Ends a status line: rich hides the cursor 
 
 
 def end_by_signals() -> None:
-    """End the process on SIGINT, SIGTERM and SIGHUP with exit code 128 + signal, unless ignored.
+    """End the process on SIGINT, SIGTERM and SIGHUP with 128 + signal.
 
     Exceptions are not used: one that is raised inside a destructor or a callback would be lost.
     """
@@ -26,7 +26,7 @@ def end_by_signals() -> None:
 
 
 def ignore_signals() -> None:
-    """Ignore signals after the end of a run: the interpreter would end with their exit code."""
+    """Ignore signals after the end of a run, which would change its exit code."""
     for name in _NAMES:
         number = getattr(signal, name, None)
         if number is not None:
@@ -50,7 +50,7 @@ STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EBADF)
 
 
 def open_streams() -> None:
-    """Make sure that the three descriptors are open, and that any text can be printed.
+    """Ensure that three descriptors are open, and that any text is printable.
 
     Without this a file might be opened as descriptor 1, and a file name that is not in the encoding of the
     terminal could not be printed; such characters are printed as escapes.
@@ -66,7 +66,7 @@ def open_streams() -> None:
 
 
 def stream_fault(error: OSError) -> int:
-    """Report an error of a standard stream, except a broken pipe; return the exit code."""
+    """Report an error of a standard stream; return the exit code."""
     if error.errno != errno.EPIPE:
         of = "standard output: " if error.errno in STREAM_FAULTS else ""
         with suppress(OSError):

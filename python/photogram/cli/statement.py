@@ -66,7 +66,7 @@ def _summary(found: Statement) -> list[TitledLines]:
 
 
 def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
-    """Return the plain project in the folder of a saved result, unless it has another block."""
+    """Return the plain project in the folder of a saved result, if it fits."""
     from photogram.formats import read
 
     settings = folder.resolve().with_name("project.toml")
