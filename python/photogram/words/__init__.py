@@ -7,8 +7,8 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * a list format: the largest number of parts (`{names:5}`), `;`, `&` (and) or `|` (or) as separator instead of
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
-* `'` for a quoted text of the input: escaped, and shortened if it is long. Numbers, lists and phrases have no
-  quotation marks.
+* `'` for a quoted text of the input: escaped, and shortened if it is long. Numbers, lists and phrases are not
+  quoted.
 
 `code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is the
 sentence on the command line: it names options, the other one functions of Python.
@@ -38,7 +38,7 @@ _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
 
 @dataclass(frozen=True, repr=False)
 class Phrase:
-    """A message, or the name of a thing in one: a code with fields, in English when it is printed.
+    """A message, or a name in one: a code with fields, printed in English.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Phrase:
 
 
 def quoted(text: str) -> str:
-    """Return a field of the input between quotation marks: escaped, and shortened if it is long."""
+    """Return a quoted field of the input, escaped and shortened."""
     rest = "" if len(text) <= MAX_QUOTED else f"... ({len(text)} characters)"
     return f"{text[:MAX_QUOTED]!r}{rest}"
 
@@ -80,7 +80,7 @@ def phrase(code: str, /, **fields: Any) -> Phrase:
 
 
 def option_sd(kind: str) -> Phrase:
-    """Return the option for standard deviations of `images`, `control`, `gnss` or another type."""
+    """Return the option for standard deviations of a type of data."""
     return Phrase("option.sd", {"kind": kind})
 
 
@@ -179,7 +179,7 @@ class Words:
         )
 
     def _variant(self, code: str, fields: Mapping[str, Any]) -> str:
-        """Return the code of the sentence for the reader and for the counts of the fields."""
+        """Return the code of the sentence for reader and counts."""
         if _on_command_line.get() and f"{code}.cli" in self._table:
             code = f"{code}.cli"
         ones = [name for name, value in fields.items() if isinstance(value, int) and value == 1]
