@@ -59,7 +59,7 @@ def adjust(
     """
     path = project_path(job, path)
     target = out or default_out(path, "-adjusted", example)
-    documents.place(target)  # refused before anything is read
+    documents.place(target)  # rejected before any input is read
     if not statement:
         wanted.check_alone()
     if snooping.snoop:

@@ -72,7 +72,7 @@ def plan(
 
 
 def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Block]:
-    """Simulate networks: their true positions, nothing measured."""
+    """Simulate networks with true positions and without observations."""
     from photogram.network.simulation import simulate
 
     patterns = {

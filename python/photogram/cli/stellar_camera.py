@@ -62,7 +62,7 @@ def stellar_camera(
     job.reads(*inputs)
     pictures = documents.plot_format if documents.plots else ""
     target = out or Path(f"{deck.stem}-calibrated")
-    documents.place(target)  # refused before anything is computed
+    documents.place(target)  # rejected before any computation
     written: dict[Path, bytes] = {}
     asked: dict[Path, bytes] = {}
     results = []

@@ -179,7 +179,7 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )
         except InputError as error:
-            # Checks of arrays and coordinate systems do not know the file.
+            # Checks of arrays and coordinate systems do not report the file.
             raise (error if error.file else InputError(message_of(error), file=path)) from None
         except PhotogramError:
             raise

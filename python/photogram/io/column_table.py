@@ -29,8 +29,7 @@ TRUE, FALSE = (
 class Names:
     """A column of names: different names in order, and the name of each row.
 
-    `distinct` is True if the reader knows that no name is empty, and that all differ by more than blanks and
-    case.
+    `distinct` is True if no name is empty, and all differ by more than blanks and case.
     """
 
     names: list[str]

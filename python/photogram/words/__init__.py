@@ -7,8 +7,7 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * a list format: the largest number of parts (`{names:5}`), `;`, `&` (and) or `|` (or) as separator instead of
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
-* `'` for a quoted text of the input: escaped, and shortened if it is long. Numbers, lists and phrases are not
-  quoted.
+* `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
 `code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is the
 sentence on the command line: it names options, the other one functions of Python.

@@ -1,7 +1,7 @@
 """Scans joined from two parts: two films with one pose.
 
 `seam_column` or `seam_row` of a photo is the seam. Readings beyond it, images and marks, belong to a second
-photo, `NAME half 2`, which is mounted on the first. Other modules do not know seams.
+photo, `NAME half 2`, which is mounted on the first. Other modules do not process seams.
 """
 
 from __future__ import annotations
