@@ -59,7 +59,7 @@ def adjust(
     """
     path = project_path(job, path)
     target = out or default_out(path, "-adjusted", example)
-    documents.place(target)  # refused before anything is read
+    documents.place(target)  # rejected before any input is read
     if not statement:
         wanted.check_alone()
     if snooping.snoop:
@@ -150,7 +150,7 @@ def _finish(
 
 
 def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
-    """Return tables and sections of a result in a chosen CRS, or in the CRS of the control."""
+    """Return tables and sections of a result in a CRS, or in the control CRS."""
     if not (crs or of_control):
         return {}, []
     from photogram import InputError
@@ -168,7 +168,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
-    """Return the block with poses for all its photos, and initial values if it required some."""
+    """Return the block with poses for all photos, and initial values if needed."""
     import numpy as np
 
     from photogram import first_values
@@ -190,7 +190,7 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
 ) -> Snooped:
-    """Remove gross errors of a block, without images that initial values have excluded."""
+    """Remove gross errors of a block without images excluded by initial values."""
     from photogram import Result, adjust, snoop
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
@@ -225,7 +225,7 @@ def _snooped(
 
 
 def _check_control(job: Job, project: Project, choices: Choices, result: Result) -> None:
-    """Reject a result without a datum of control if the user or the project requires one."""
+    """Reject a result without a required datum of control."""
     from photogram import InputError
 
     if choices.datum_of(project) == "control" and result.datum.is_chosen:
@@ -242,7 +242,7 @@ def adjusted_block(
     threads: int | None = None,
     division: Division | None = None,
 ) -> Result:
-    """Adjust a block by the settings of its project and the choices of the user, with its features."""
+    """Adjust a block by settings of its project and options of the user."""
     from photogram import FirstValues, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
@@ -301,7 +301,7 @@ def result_at(
 def _call(
     name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
 ) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts, whose photos have an order of their own."""
+    """Return the call that adjusts: in one process, or in parts."""
     datum = _datum(name)
     if division is None:
         from photogram import adjust
@@ -313,7 +313,7 @@ def _call(
 
 
 def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
-    """Return the datum of a name; None where control or observations give it."""
+    """Return the datum of a name; None if control or observations define it."""
     from photogram import InnerConstraints, MinimumConstraints
 
     if name == "inner":
@@ -343,7 +343,7 @@ def _files(project: Project, result: Result, report: str, sections: list[TitledL
 
 
 def _in_format(project: Project, name: str) -> dict[str, bytes]:
-    """Return the adjusted project in a format, if that can hold it."""
+    """Return the adjusted project in a format, if the format supports it."""
     from photogram import InputError
     from photogram.formats import FORMATS, to_files
 
