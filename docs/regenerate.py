@@ -8,7 +8,8 @@ Blocks between these marks and `<!-- end -->` are made anew, of all pages unless
 * `<!-- printed: COMMAND -->`: lines of what a command prints, as many as there are, or a table;
 * `<!-- quote: PATH -->`: a file of the repository;
 * `<!-- quote: PATH | LINE -->`: what begins with the line and ends with the next bracket that closes where it
-  is indented; of a page its first block of code in the language.
+  is indented;
+* `<!-- quote: PAGE | LANGUAGE -->`: the first block of code in this language.
 
 `<!-- measured: COMMAND -->` marks what takes hours or depends on the machine. It is not made anew; that the
 command is there, and that it knows the words of the block, is checked. docs/walk.py walks through tutorials.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Camera, InnerConstraints, Spheroid, adjust, read_result, simulate
+from photogram import Camera, InnerConstraints, Result, Spheroid, adjust, read_result, simulate
 from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.supplements import with_control
@@ -160,12 +160,11 @@ def test_a_datum_of_its_own_has_no_check():
     assert line.fields["reason"].startswith("the datum")
 
 
-def test_without_joint_covariances_each_is_tested():
+def test_without_joint_covariances_each_is_tested(monkeypatch):
     """As of a block in parts, whose normal equations are not kept together."""
     result = adjust(spoiled(block()))
-    found = check_points(
-        result, result.block, result.point_differences, result.point_kinds, second=np.inf, whole=False
-    )
+    monkeypatch.setattr(Result, "WHOLE", False)
+    found = check_points(result)
     assert found.agreement.together is None
     assert np.nanargmax(found.agreement.points.values) == 2
 

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from message_codes import nested_codes
 from photogram import InputError, adjust, simulate
 from photogram.results import drawn_patterns
 from photogram.statistics.patterns import durbin_watson, moran, moran_index
@@ -99,7 +100,9 @@ def test_probabilities_are_uniform_where_there_is_no_pattern():
 
 
 def test_what_cannot_be_tested():
-    with pytest.raises(InputError, match="without a loss"):
+    with pytest.raises(InputError) as error:
         drawn_patterns(adjust(BLOCK, loss="huber"))
-    with pytest.raises(InputError, match="one draw"):
+    assert error.value.code == "models.patterns"
+    with pytest.raises(InputError) as error:
         drawn_patterns(adjust(BLOCK), draws=0)
+    assert "error.positive" in nested_codes(error.value)

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, adjust
-from photogram.network.observations import Distance, Position
+from photogram import Block, Camera, Distance, Position, adjust
 
 GOLDEN = json.loads(gzip.decompress((Path(__file__).parent / "data/hypotheses/golden.json.gz").read_bytes()))
 SETS = {

@@ -15,7 +15,18 @@ try:
 except SystemExit as end:
     assert not end.code, end.code
 """
-HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
+HEAVY = (
+    "matplotlib",
+    "jinja2",
+    "pandas",
+    "pyarrow",
+    "pydantic",
+    "pyproj",
+    "geopandas",
+    "scipy",
+    "erfa",
+    "tetra3rs",
+)
 SHOWING = ("rich", "typer", "photogram.results.document", "photogram.show.html", "photogram.show.page")
 NUMERICAL = ("numpy", "orjson", "photogram._photocore")
 SELDOM = (

@@ -42,6 +42,7 @@ from photogram.network import (
 )
 from photogram.network.subset import kept_images
 from photogram.results.trajectories import trajectories_table
+from photogram.show.page import about
 
 
 @pytest.fixture(scope="module")
@@ -148,9 +149,9 @@ def test_the_report_names_and_counts(scan):
         ("strip 2", "rotation")
     )
     assert trajectories["Basis"][row] == "spline of degree 3"
-    assert "poses at their own times" in " ".join(report.split())
+    assert about("poses") in " ".join(report.split())
     page = scan.to_html().decode()
-    assert "poses at their own times" in page
+    assert about("poses") in page
     assert ">strip 1 position 3<" not in page
     table = scan.unknown_table()
     assert (table["unknown"] == "strip 1 position 3").sum() == 3

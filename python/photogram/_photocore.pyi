@@ -1399,9 +1399,8 @@ class NetworkTrial:
         `component`, `parameters`, `observations`, `plausible` (sizes), `rank`, `statistic` T, `probability`,
         `estimate`, its `cofactors`, `redundancy` r, `noncentrality`, `mdb`, `error`, `bias_to_noise`, and
         `effect`: points beyond the limit, the same without points of the group, the largest change in
-        standard
-        deviations, its point and coordinate, the largest change, and the changes of `checks`. Then the (s, s)
-        correlations of the scores of sets.
+        standard deviations, its point and coordinate, the largest change, and the changes of `checks`. Then
+        the (s, s) correlations of the scores of sets.
         """
 
     def predictions(

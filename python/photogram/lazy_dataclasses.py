@@ -14,11 +14,7 @@ from typing import TYPE_CHECKING, Any
 __all__ = ["asdict", "dataclass", "field", "fields", "replace"]
 
 MAKING = RLock()
-APART = {
-    "__repr__",
-    "__eq__",
-    "__hash__",
-}  # Methods that are made later than the others: few classes need them
+APART = {"__repr__", "__eq__", "__hash__"}  # Methods that few classes need: they are made by themselves
 
 
 class _Later:
@@ -32,10 +28,8 @@ class _Later:
             waiting = {name for name, own in vars(self.of).items() if isinstance(own, _Later)}
             if self.name in waiting & APART:
                 named = [(each.name, each.type, each) for each in dataclasses.fields(self.of)]
-                eq, unsafe_hash = self.options["eq"], self.options["frozen"]
-                other = dataclasses.make_dataclass(
-                    self.of.__name__, named, init=False, eq=eq, unsafe_hash=unsafe_hash
-                )
+                eq, frozen = self.options["eq"], self.options["frozen"]
+                other = dataclasses.make_dataclass("Other", named, init=False, eq=eq, unsafe_hash=frozen)
                 for name in waiting & APART:
                     setattr(self.of, name, vars(other)[name])
             elif self.name in waiting:

@@ -54,6 +54,14 @@ def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
     return Phrase("error.unknown", {"kind": kind, "name": name, "names": known})
 
 
+def by_name(things: Iterable[Any], name: str, kind: str) -> Any:
+    """Return the thing with a name; KeyError with the nearest name if there is none."""
+    known = {each.name: each for each in things}
+    if name not in known:
+        raise KeyError(str(unknown_name(kind, name, known)))
+    return known[name]
+
+
 def missing_columns(missing: Sequence[str], columns: Sequence[str]) -> Phrase:
     """Return the message that a table lacks some columns."""
     fields = {"n": len(missing), "names": list(missing), "columns": list(columns)}

@@ -62,6 +62,7 @@ def test_drawings_are_alike_where_they_have_the_same_marks():
 
 
 def test_the_first_page_leads_to_every_other():
-    first = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("index.md", "formats.md"))
+    hubs = ("index.md", "formats.md", "reference.md")
+    first = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in hubs)
     pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
     assert {page for page in pages if f"({page}" not in first} == {"index.md"}

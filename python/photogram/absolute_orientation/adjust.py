@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from photogram.absolute_orientation.hints import Fit, find, undecided, unit_of
 from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
+from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import names as names_of
-from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
@@ -111,12 +111,24 @@ def orient(
     KeyboardInterrupt
         If interrupted by Ctrl-C.
     """
-    one_of("method", method, get_args(Method))
     start = ("auto" if method == "rigorous" else "report") if start is None else start
     rejected = tuple(names_of("reject", reject))
-    _check_options(stations, method, start, rejected, unit_variance, max_iterations, tolerance, trace)
-    if scale is not None and not 0 < number("scale", scale) < math.inf:
-        raise InputError(phrase("orientation.positive", name="scale", value=scale))
+    positive = {
+        "max_iterations": max_iterations,
+        "tolerance": tolerance,
+        "scale": 1.0 if scale is None else scale,
+    }
+    for name, value in positive.items():
+        if not 0 < value < math.inf:
+            raise InputError(phrase("orientation.positive", name=name, value=value))
+    if trace and method == "rigorous":
+        raise InputError(phrase("orientation.trace"))
+    if unknown := [name for name in rejected if name not in stations.ids]:
+        raise InputError(phrase("orientation.no-station", station=unknown[0]))
+    if stations.model_sd is not None and method != "rigorous":
+        raise InputError(phrase("orientation.method-sd", method=method))
+    if stations.model_sd is None and unit_variance == "unity":
+        raise InputError(phrase("orientation.unity"))
     used = stations.held & ~np.isin(np.array(stations.ids, dtype=object), rejected)[:, np.newaxis]
     rows = np.flatnonzero(used.any(axis=1))
     control = np.where(used, stations.control, np.nan)[rows]
@@ -205,51 +217,10 @@ def _in_a_plane(model: Floats, rms: float, size: float) -> bool:
 
 
 def _parameters(former: Similarity | Orientation | None) -> _photocore.ParametersRow | None:
-    if former is None:
-        return None
     similarity = former.similarity if isinstance(former, Orientation) else former
-    if not isinstance(similarity, Similarity):
-        raise InputError(
-            phrase(
-                "orientation.type",
-                name="former",
-                kinds="Orientation or Similarity",
-                value=type(former).__name__,
-            )
-        )
+    if similarity is None:
+        return None
     return similarity.scale, similarity.rotation.tolist(), similarity.translation.tolist()
-
-
-def _check_options(
-    stations: Stations,
-    method: str,
-    start: str,
-    rejected: tuple[str, ...],
-    unit_variance: str,
-    max_iterations: int,
-    tolerance: float,
-    trace: bool,
-) -> None:
-    if not isinstance(stations, Stations):
-        raise InputError(
-            phrase("orientation.type", name="stations", kinds="Stations", value=type(stations).__name__)
-        )
-    one_of("start", start, get_args(Start))
-    one_of("unit_variance", unit_variance, get_args(UnitVariance))
-    if whole_number("max_iterations", max_iterations) < 1:
-        raise InputError(phrase("orientation.positive", name="max_iterations", value=max_iterations))
-    if not 0 < number("tolerance", tolerance) < math.inf:
-        raise InputError(phrase("orientation.positive", name="tolerance", value=tolerance))
-    truth_value("trace", trace)
-    if trace and method == "rigorous":
-        raise InputError(phrase("orientation.trace"))
-    unknown = [name for name in rejected if name not in stations.ids]
-    if unknown:
-        raise InputError(phrase("orientation.no-station", station=unknown[0]))
-    if stations.model_sd is not None and method != "rigorous":
-        raise InputError(phrase("orientation.method-sd", method=method))
-    if stations.model_sd is None and unit_variance == "unity":
-        raise InputError(phrase("orientation.unity"))
 
 
 def _orientation(
@@ -357,3 +328,6 @@ def _named(
     if kind == "scale":
         return AdjustmentError(phrase("orientation.scale"))
     return AdjustmentError(message)
+
+
+check_arguments(globals(), ["orient"])

@@ -77,7 +77,6 @@ def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
 
 
 def _scaled(observation: Observation, factor: float) -> Observation:
-    """Return an observation with its covariance matrix multiplied; of the same common unknowns."""
     found = copy.copy(observation)
     changes = {"precision": observation.precision * factor}
     for name, by in (("sd", np.sqrt(factor)), ("covariance", factor)):

@@ -49,7 +49,6 @@ def hardly_determined(status: str, weak: str, causes: Sequence[Phrase] = ()) -> 
 
 
 def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on weakly determined points and photos, which harm others."""
     messages = []
     # Hardly ever is there one: small blocks need not wait for this.
     seen = set(block.image_photos.tolist()) if solution.loose_photos else set()
@@ -139,7 +138,6 @@ def rounded(excess: float | None) -> list[Message]:
 
 
 def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Remark on image observations of points behind the camera."""
     images = solution.images_behind
     if not len(images):
         return []

@@ -298,7 +298,6 @@ def block_trial(
 def core_trial(
     block: Block, state: _photocore.BlockState | None, options: CoreOptions, threads: int | None
 ) -> _photocore.NetworkTrial:
-    """Return the same in the core."""
     options = dataclasses.replace(options, covariance=True, loss=None)
     return block_network(block, options).trial(state, threads=core_threads(threads))
 

@@ -53,7 +53,6 @@ class Setting:
 
 
 def setting_of(block: Block) -> Setting:
-    """Return the setting of a block at its initial values."""
     photos = len(block.photo_ids)
     control = bool(np.isfinite(block.point_sd).any())
     moving = on_shared(block) | scanners(block)

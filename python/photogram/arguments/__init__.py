@@ -1,4 +1,4 @@
-"""Arguments of public functions: checked, converted, and refused by name."""
+"""Validation and conversion of arguments of public functions."""
 
 from photogram.arguments.annotations import check_arguments, path
 

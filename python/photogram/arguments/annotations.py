@@ -1,12 +1,12 @@
-"""Arguments of public functions, checked against their annotations: a wrong one is an error that names it.
+"""Validation of arguments of public functions by their annotations.
 
-An argument of a wrong kind would otherwise fail somewhere inside, as whatever Python or NumPy makes of it.
+Invalid values raise an error that names the argument, instead of an error of Python or NumPy from deep
+inside.
 
-Packages that check annotations would do less here: beartype converts nothing (strings to paths, integers of
-NumPy to integers), raises errors of its own, and takes NaN, NUL and half a surrogate pair for good values;
-pydantic knows no arrays, and brings a compiled core to an install that is light; msgspec knows none either,
-names neither the words that may stand nor the nearest key, takes 1e400 for a number, and is imported in more
-time than this package.
+Why not a package: beartype does not convert values (strings to paths, NumPy integers to integers), raises its
+own errors, and accepts NaN, NUL and lone surrogates. pydantic does not support arrays and adds a compiled
+core to a light install. msgspec does not support arrays, does not list the allowed words or the nearest key,
+and accepts 1e400 as a number. Its import is slow.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from photogram.errors import InputError
 from photogram.words import phrase
 
 Check = Callable[[str, Any], Any]
-"""Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
+"""Function of argument name and value; returns the converted value or raises an error."""
 _MARK = "_checks_arguments"  # Attribute of functions that check their arguments
 _ARRAYS = {"NDArray": NDArray, "np": np, "Floats": Floats, "Indices": Indices, "Bools": Bools}
-"""What arrays are called in annotations, where the names are imported for type checking only."""
+"""Names of arrays in annotations, if the names are imported for type checking only."""
 
 
 def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
-    """Let the `public` functions and classes among the globals of a module check their arguments.
+    """Add argument checks to `public` functions and classes of a module.
 
     A function is replaced by a checking one; a class checks the arguments of its constructor.
     """
@@ -51,7 +51,7 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
 
 
 def check_members(kind: type, given: Mapping[str, Any]) -> None:
-    """Check the values of a class by parameter name as arguments are checked; nothing is converted."""
+    """Check values of a class by parameter name, without conversion."""
     checks = _checks_of_class(kind)
     for name, value in given.items():
         made = checks.get(name, _anything)(name, value)
@@ -66,7 +66,7 @@ def _checks_of_class(kind: type) -> dict[str, Check]:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path that a string or an object like a path stands for."""
+    """Return a path from a string or a path-like object."""
     try:
         text = os.fspath(value)  # type: ignore[call-overload]
     except TypeError:
@@ -103,7 +103,7 @@ def _checked(function: Callable[..., Any], name: str, names: dict[str, Any]) -> 
 
 
 class _Names(dict[str, Any]):
-    """Names of annotations, which are strings: those imported for type checking only are looked for."""
+    """Names in annotations; names imported for type checking only are resolved."""
 
     def __missing__(self, name: str) -> Any:
         modules = [vars(module) for key, module in list(sys.modules.items()) if key.startswith("photogram.")]
@@ -114,7 +114,7 @@ class _Names(dict[str, Any]):
 
 
 def _checks(function: Callable[..., Any], names: dict[str, Any]) -> dict[str, Check]:
-    """Return a check for each parameter whose annotation says enough."""
+    """Return a check for each parameter with a supported annotation."""
     checks: dict[str, Check] = {"": _anything}
     known = _Names(names)
     for name, annotation in inspect.get_annotations(function).items():
@@ -176,7 +176,7 @@ def _check_of_union(inner: tuple[Any, ...]) -> Check | None:
 
 
 def _several(hint: Any) -> Check | None:
-    """Return a check of a sequence: of each element, and of their number where the annotation tells it."""
+    """Return a check of each element of a sequence, and of its defined length."""
     origin, inner = get_origin(hint), get_args(hint)
     fixed = origin is tuple and (len(inner) < 2 or inner[1] is not Ellipsis)
     checks = [
@@ -193,7 +193,7 @@ def _several(hint: Any) -> Check | None:
         elements = list(value)
         if fixed and len(elements) != len(checks):
             raise _refused(name, value, f"a sequence of {len(checks)}")
-        if of_numbers and {*map(type, elements)} == {float}:  # as nearly all are: nothing to convert
+        if of_numbers and {*map(type, elements)} == {float}:  # Nearly all sequences: no conversion is needed
             return tuple(elements) if origin is tuple else elements
         all_checks = checks if fixed else checks * len(elements)
         found = [
@@ -206,7 +206,7 @@ def _several(hint: Any) -> Check | None:
 
 
 def _name(name: str, value: Any) -> Any:
-    """Reject what cannot be a name: text that is none, and what is neither text nor number."""
+    """Reject values that are neither text nor number, and invalid text."""
     if isinstance(value, str):
         return _text(name, value)
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
@@ -249,7 +249,7 @@ def _text(name: str, value: Any) -> str:
 
 
 def _array(name: str, value: Any) -> Any:
-    """Reject what is no array of real numbers, and arrays with masked ones."""
+    """Reject other values than real numbers, and arrays with masked elements."""
     if value is None:
         raise _refused(name, value, "an array of numbers")
     try:
@@ -269,12 +269,12 @@ def _array(name: str, value: Any) -> Any:
 
 
 def _array_or(*kinds: type) -> Check:
-    """Return a check of an array, or of an object of some classes."""
+    """Return a check of an array or an instance of the given classes."""
     return lambda name, value: value if isinstance(value, kinds) else _array(name, value)
 
 
 def _numpy(kind: type[np.generic]) -> Check:
-    """Return a check that makes an array of a type: floating-point, whole numbers or truth values."""
+    """Return a check that converts to an array of floats, integers or truth values."""
     needed, what = {
         "f": ("biuf", "numbers"),
         "i": ("iu", "whole numbers"),

@@ -1,9 +1,9 @@
-"""Arrays as arguments: numbers of a given shape, indices and names.
+"""Validation of array arguments: numbers of a given shape, indices and names.
 
-What is none of these is an :class:`~photogram.errors.InputError` that names the argument and shows its value.
+Invalid values raise an :class:`~photogram.errors.InputError` with the name of the argument and its value.
 
-What a caller gives is copied once into an array that cannot be written: later edits of the caller's array
-change nothing. An array that is such a copy already is shared.
+An argument is copied once into a read-only array, so that later changes of the caller's array do not affect
+it. A read-only array that owns its data is shared.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.errors import InputError
 from photogram.words import Phrase, phrase
 
-LARGEST_SD = math.sqrt(sys.float_info.max)  # Standard deviations beyond have no variance
-_SYMMETRIC = 1e-9  # What a covariance matrix may be unsymmetric by, relative to its diagonal
-_ROUNDING = 1e-6  # Of correlations that were written with all digits and read again, with room to spare
+LARGEST_SD = math.sqrt(sys.float_info.max)  # Larger standard deviations have an infinite variance
+_SYMMETRIC = 1e-9  # Largest asymmetry of a covariance matrix, relative to its diagonal
+_ROUNDING = 1e-6  # Tolerance for correlations that were written with all digits and read again
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -32,10 +32,10 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 def shaped(
     name: str, value: ArrayLike, shape: tuple[int, ...], *, missing: bool = False
 ) -> NDArray[np.float64]:
-    """Return an array of the given shape, which cannot be written; a single number stands for all of them.
+    """Return a read-only array of the given shape; a single number is broadcast.
 
-    Words, truth values and complex numbers are not numbers, even if NumPy would convert them. If values may
-    be `missing`, masked ones become NaN.
+    Words, truth values and complex numbers are rejected, even if NumPy would convert them. If `missing` is
+    True, masked values become NaN.
     """
     array = numbers(name, value, missing=missing)
     if array.ndim == 0:
@@ -46,7 +46,7 @@ def shaped(
 
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
-    """Return an array of any shape, perhaps that of the caller, as :func:`shaped` does."""
+    """Return an array of numbers of any shape, possibly the caller's array."""
     array = _plain(name, value, "numbers")
     kind = array.dtype.kind
     if kind == "O":
@@ -56,7 +56,7 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     elif kind not in "fiu":
         raise _no_array(name, "numbers", phrase("argument.type", type=str(array.dtype)))
     try:
-        with np.errstate(over="ignore"):  # infinite then, which is for the caller to judge
+        with np.errstate(over="ignore"):  # Infinite values are left to the caller
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise _no_array(name, "numbers", str(error)) from None
@@ -72,14 +72,14 @@ def _no_array(name: str, of: str, reason: str | Phrase) -> InputError:
 
 
 def _is_real(value: object) -> bool:
-    """Whether a value is a number, or None, which counts as one that is missing: NaN."""
+    """Return whether a value is a real number, or None, a missing value (NaN)."""
     return value is None or (isinstance(value, Real) and not isinstance(value, bool))
 
 
 def is_masked(value: object) -> bool:
     """Return whether a value is an array with masked elements.
 
-    Who has one has loaded numpy.ma, which takes long.
+    numpy.ma is slow to import. It is loaded if the value is a masked array.
     """
     masked = sys.modules.get("numpy.ma")
     return (
@@ -90,7 +90,7 @@ def is_masked(value: object) -> bool:
 
 
 def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
-    """Return what NumPy makes of an argument, whatever its type."""
+    """Convert an argument to a NumPy array of any type."""
     if value is None:
         raise _no_array(name, of, "it is None")
     try:
@@ -100,7 +100,7 @@ def _plain(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
 
 
 def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
-    """Return a contiguous array that nobody can write: the array itself where it is one already."""
+    """Return a contiguous read-only array: the array itself or a copy."""
     flags = array.flags
     if not (flags.owndata and flags.c_contiguous and not flags.writeable):
         array = np.array(array, order="C", subok=False)
@@ -109,7 +109,7 @@ def frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
 
 
 def freeze_fields(owner: Any) -> None:
-    """Let nobody write the arrays that the fields of a dataclass hold."""
+    """Make the array fields of a dataclass read-only."""
     for each in fields(owner):
         value = getattr(owner, each.name)
         if isinstance(value, np.ndarray):
@@ -117,19 +117,19 @@ def freeze_fields(owner: Any) -> None:
 
 
 def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return the rows whose pair of indices is in an earlier row, too; `second` are below `count`."""
+    """Return rows whose pair of indices repeats an earlier row; `second` < `count`."""
     pairs = np.asarray(first, dtype=np.int64) * max(count, 1)
     pairs += second
-    if (pairs[1:] > pairs[:-1]).all():  # sorted, as most blocks are
+    if (pairs[1:] > pairs[:-1]).all():  # Sorted, as in most blocks
         return np.zeros(0, dtype=np.int64)
-    ordered = np.sort(pairs, kind="stable")  # fast for images that are sorted by photo
+    ordered = np.sort(pairs, kind="stable")  # Fast for observations that are sorted by photo
     if (ordered[1:] != ordered[:-1]).all():
         return np.zeros(0, dtype=np.int64)
     return np.setdiff1d(np.arange(len(pairs)), np.unique(pairs, return_index=True)[1])
 
 
 def length(name: str, value: ArrayLike) -> int:
-    """Return the number of rows of an array; a single value has none."""
+    """Return the number of rows of an array; reject a single value."""
     array = _plain(name, value, "values")
     if array.ndim == 0:
         raise refused(name, value, "an array")
@@ -137,7 +137,7 @@ def length(name: str, value: ArrayLike) -> int:
 
 
 def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
-    """Return an array of `length` whole numbers from 0 to `count` - 1, which cannot be written."""
+    """Return a read-only array of `length` integers from 0 to `count` - 1."""
     array = _plain(name, value, f"{length} whole numbers")
     if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
         raise InputError(phrase("argument.indices", name=name, length=length))
@@ -152,10 +152,10 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
 
 
 def names(name: str, values: Iterable[object]) -> list[str]:
-    """Return names as strings; whole numbers are names too.
+    """Return names as strings; integers are valid names.
 
-    A name that is missing in a table is None or NaN there; a column of whole numbers with one missing has
-    become one of floating-point numbers, and 1.0 is not the name 1.
+    Tables contain None or NaN for a missing name. A column of integers with a missing value has become
+    floats, and 1.0 is not the name 1.
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):
@@ -180,7 +180,7 @@ def _name(name: str, row: int, value: object) -> str:
 
 
 def text(name: str, value: object) -> str:
-    """Return a line of text: all of its characters print; line ends and halves of surrogate pairs do not."""
+    """Return a line of printable text; line ends and lone surrogates are rejected."""
     if not isinstance(value, str):
         raise refused(name, value, "a string")
     if not value.isprintable():
@@ -189,8 +189,8 @@ def text(name: str, value: object) -> str:
 
 
 def number(name: str, value: object) -> float:
-    """Return a number, which may be infinite or NaN."""
-    if type(value) is float:  # nearly all are: it takes a tenth of what asking for a kind of number does
+    """Return a number, possibly infinite or NaN."""
+    if type(value) is float:  # Nearly all values; ten times faster than the check for a type of number
         return value
     if _is_real(value) and value is not None:
         try:
@@ -201,7 +201,7 @@ def number(name: str, value: object) -> float:
 
 
 def whole_number(name: str, value: object) -> int:
-    """Return a whole number of 64 bits."""
+    """Return an integer of 64 bits."""
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
         raise refused(name, value, "a whole number of 64 bits")
     return int(value)
@@ -215,36 +215,36 @@ def truth_value(name: str, value: object) -> bool:
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
-    """Reject what is not one of some words."""
+    """Reject values that are not among some words."""
     if not (isinstance(value, str) and value in choices):
         raise InputError(phrase("argument.choice", name=name, names=list(choices), value=shown(value)))
 
 
 def refused(name: str, value: object, what: str) -> InputError:
-    """Return the error of an argument that is of another kind."""
+    """Return the error of an argument of a wrong type."""
     return InputError(phrase("argument.kind", name=name, what=what, value=shown(value)))
 
 
 def value_field(value: object) -> str | float | Phrase:
-    """Return what a caller gave as the field of a message: text, a number, or a short description."""
+    """Return a value as a field of a message: text, number, or short description."""
     if isinstance(value, int) and value.bit_length() > 128:
         return phrase("error.long-integer", bits=value.bit_length())
     if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
         return value
     try:
         return phrase("error.value", value=" ".join(ascii(value).split())[:80])
-    except Exception:  # a foreign object may fail at anything, a deep one at its depth
+    except Exception:  # A foreign object may raise any error, a deeply nested one a RecursionError
         return phrase("error.object", type=type(value).__name__)
 
 
 def shown(value: object) -> str:
-    """Return what a caller gave for a message without fields."""
+    """Return a value as text for a message without fields."""
     field = value_field(value)
     return ascii(field)[:80] if isinstance(field, str) else str(field)
 
 
 def argument_error(name: str, code: str, /, **fields: object) -> InputError:
-    """Return the error of an argument: `code` is that of a message on values without `error.`."""
+    """Return the error of an argument; `code` is a message code without `error.`."""
     texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
     if "value" in fields and not isinstance(fields["value"], Phrase):
         texts["value"] = value_field(fields["value"])
@@ -252,16 +252,16 @@ def argument_error(name: str, code: str, /, **fields: object) -> InputError:
 
 
 def probability(name: str, value: float) -> float:
-    """Return a probability between 0 and 1; refuse other numbers."""
+    """Return a probability between 0 and 1; reject other numbers."""
     if not 0 < value < 1:
         raise argument_error(name, "range", low=0, high=1, value=value)
     return value
 
 
 def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:
-    """Whether a square matrix is one of covariances: symmetric, positive definite.
+    """Return whether a square matrix is symmetric and positive definite.
 
-    A singular one may have rows of zeros, and what is left of it may be indefinite by rounding.
+    A singular one may have rows of zeros, and the others may be indefinite by rounding.
     """
     variances = np.diag(matrix)
     known = variances > 0
@@ -271,25 +271,25 @@ def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> boo
     with np.errstate(over="ignore", invalid="ignore"):
         correlations = matrix[np.ix_(known, known)] / deviations / deviations[:, np.newaxis]
         asymmetry = np.abs(correlations - correlations.T).max(initial=0.0)
-    # A correlation that is not finite is no smaller than anything.
+    # A correlation that is not finite fails this comparison.
     if not asymmetry <= (_ROUNDING if singular else _SYMMETRIC):
         return False
     return bool(np.linalg.eigvalsh(correlations).min(initial=1.0) > (-_ROUNDING if singular else 0.0))
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:
-    """Return what takes the chosen rows of an array: as it is, without a copy, where that are all."""
+    """Return an index of the chosen rows: a slice, without copy, for all."""
     return slice(None) if which.all() else which
 
 
 def finite_rows(pairs: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which of (m, 2) rows are finite: column by column, which is several times faster."""
+    """Return which of (m, 2) rows are finite; faster column by column."""
     found: NDArray[np.bool_] = np.isfinite(pairs[:, 0]) & np.isfinite(pairs[:, 1])
     return found
 
 
 def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard deviations (n, k) of matrices of covariances (n, k, k)."""
+    """Return the standard deviations (n, k) of covariance matrices (n, k, k)."""
     deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return deviations
 
@@ -298,6 +298,6 @@ _DIGITS = re.compile("([0-9]+)")
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:
-    """Return the key by which people sort names: character by character, but runs of digits as numbers."""
+    """Return the key for natural sorting of names: digits sort as numbers."""
     parts = _DIGITS.split(name)
     return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]

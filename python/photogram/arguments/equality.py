@@ -1,4 +1,4 @@
-"""Equality of things that hold arrays: the same values, whether or not it is the same thing."""
+"""Equality of dataclasses that contain arrays, by value."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import numpy as np
 
 
 class Valued:
-    """A data class whose instances are equal where all their fields are; NaN counts as equal to NaN.
+    """A dataclass that compares all fields by value; NaN equals NaN.
 
-    It is declared with `eq=False`, which leaves `==` to this class. Its hash comes from what is cheap to
-    look at: names, kinds and sizes.
+    Declare it with `eq=False`, which leaves `==` to this class. The hash uses names, types and sizes only.
     """
 
     _BESIDE: ClassVar[frozenset[str]] = frozenset()
-    """Fields that do not count: how long something took, and by which way."""
+    """Fields that are not compared: computing time and method."""
 
     def __eq__(self, other: object) -> bool:
         if self is other:
@@ -43,7 +42,7 @@ class Valued:
 
 
 def alike(a: object, b: object) -> bool:
-    """Return whether two values are of one kind and equal, down to the elements of arrays in data classes."""
+    """Return whether two values have one type and equal contents."""
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -59,6 +58,6 @@ def alike(a: object, b: object) -> bool:
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
-        strings = all(type(each) is str for each in a)  # of which there may be many
+        strings = all(type(each) is str for each in a)  # May be many strings
         return len(a) == len(b) and (a == b if strings else all(map(alike, a, b)))
     return bool(a == b) or (isinstance(a, float) and a != a and b != b)

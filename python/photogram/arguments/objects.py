@@ -1,4 +1,4 @@
-"""Objects as arguments: of a class, lists of one class."""
+"""Validation of arguments that are objects, or lists of objects, of a class."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ _Kind = TypeVar("_Kind")
 
 
 def kind_error(name: str, kind: str, value: object) -> InputError:
-    """Return the error of an argument of another kind, such as `a Spheroid or None`."""
+    """Return the error of a wrong type; `kind` is, e.g., `a Spheroid or None`."""
     return argument_error(name, "kind", kind=kind, value=value)
 
 
 def require_kind(name: str, value: object, kind: type, *, optional: bool = False) -> None:
-    """Refuse an argument that is not an object of a class."""
+    """Reject an argument that is not an instance of a class."""
     if not (isinstance(value, kind) or (optional and value is None)):
         raise kind_error(name, f"{kind.__name__} or None" if optional else kind.__name__, value)
 
 
 def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]:
-    """Return a list of objects of a class."""
+    """Return a tuple of instances of a class."""
     if not isinstance(values, Sequence):
         raise argument_error(name, "list", value=values)
     for row, value in enumerate(values):
@@ -33,6 +33,6 @@ def instances(name: str, values: object, kind: type[_Kind]) -> tuple[_Kind, ...]
 
 
 def require(condition: object, name: str, code: str, /, **fields: object) -> None:
-    """Refuse an argument unless a condition holds; `code` and fields as in `argument_error`."""
+    """Reject an argument if a condition is false; see `argument_error`."""
     if not condition:
         raise argument_error(name, code, **fields)

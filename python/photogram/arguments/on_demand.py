@@ -1,4 +1,4 @@
-"""Names of packages that are loaded when they are first asked for, and then check their arguments."""
+"""Lazy loading of package members, with argument checks."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from photogram.arguments.annotations import check_arguments
 def attach_checked(
     package: str, file: str, given: Collection[str] = ()
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """Return `__getattr__`, `__dir__` and `__all__` of a package, as `lazy_loader.attach_stub` does.
+    """Return `__getattr__`, `__dir__` and `__all__` of a lazily loaded package.
 
-    Functions check their arguments, and so do the classes `given`, which users make. Functions make the
-    others.
+    Functions check their arguments. Classes in `given`, which users instantiate, check them too.
     """
     load, listed, public = lazy_loader.attach_stub(package, file)
 

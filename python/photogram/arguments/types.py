@@ -1,4 +1,4 @@
-"""The arrays that everything is made of, as annotations name them."""
+"""Array types for annotations."""
 
 from __future__ import annotations
 

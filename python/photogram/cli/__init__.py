@@ -33,11 +33,11 @@ def main() -> None:
     except SystemExit as end:
         code = end.code
     except OSError as error:
-        # Commands name their own files: what is left are the standard streams, to which help goes.
+        # Commands report errors of their own files. Other errors concern the standard streams, used for help.
         code = stream_fault(error)
     code = finish(code)
     ignore_signals()
-    gc.freeze()  # The interpreter looks for garbage at its end: 60 ms for 1,000 photos
+    gc.freeze()  # The final garbage collection would take 60 ms for 1,000 photos
     sys.exit(code)
 
 

@@ -212,7 +212,6 @@ def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_
 
 
 def _restart(path: Path, deck: Deck) -> Similarity | None:
-    """Read a former result in either of its forms."""
     from photogram.absolute_orientation import read_similarity
     from photogram.absolute_orientation.cards import read_restart
 
@@ -249,7 +248,6 @@ def _stream(
     point_sd: float,
     decimals: int | None,
 ) -> None:
-    """Transform a file of points, into the JSON document too."""
     from photogram.absolute_orientation.document import point_rows, without_points
     from photogram.absolute_orientation.stream import Document, decimals_for, transform_file
 

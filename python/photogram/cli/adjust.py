@@ -59,7 +59,7 @@ def adjust(
     """
     path = project_path(job, path)
     target = out or default_out(path, "-adjusted", example)
-    documents.place(target)  # refused before anything is read
+    documents.place(target)  # rejected before any input is read
     if not statement:
         wanted.check_alone()
     if snooping.snoop:
@@ -121,24 +121,17 @@ def _finish(
     strict: bool,
 ) -> None:
     """Write the results, print a summary, and end by the verdict."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    from photogram.formats.adjusted import excel_file, table_files
+    from photogram.formats.adjusted import excel_file
     from photogram.show.forms import text
 
     told = removed or result
     in_crs, more = _in_system(result, documents.crs, project.control_crs)
     document = told.document().with_sections(*more)
-    read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
-    report = f"{text(document)}\n{read}\n"
-    with ThreadPoolExecutor(1) as pool:
-        tables = pool.submit(table_files, result)  # while the page is drawn
-        own = _project_files(project, result)
-        page = documents.page(job, "adjust", target, lambda: document)
-        files = {"report.txt": report.encode(), **tables.result(), **own, **in_crs}
+    files = _files(project, result, text(document), sections) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
+    page = documents.page(job, "adjust", target, lambda: document)
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
     sizes = project.sizes if project.block.image_unit == "px" else ()
     code = result.verdict.exit_code(strict=strict)
@@ -157,7 +150,7 @@ def _finish(
 
 
 def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
-    """Return tables and sections of a result in a chosen CRS, or in the CRS of the control."""
+    """Return tables and sections of a result in a CRS, or in the control CRS."""
     if not (crs or of_control):
         return {}, []
     from photogram import InputError
@@ -175,7 +168,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:
-    """Return the block with poses for all its photos, and initial values if it required some."""
+    """Return the block with poses for all photos, and initial values if needed."""
     import numpy as np
 
     from photogram import first_values
@@ -197,7 +190,7 @@ def _snooped(
     threads: int | None,
     snooping: Snooping,
 ) -> Snooped:
-    """Remove gross errors of a block, without images that initial values have excluded."""
+    """Remove gross errors of a block without images excluded by initial values."""
     from photogram import Result, adjust, snoop
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
@@ -232,7 +225,7 @@ def _snooped(
 
 
 def _check_control(job: Job, project: Project, choices: Choices, result: Result) -> None:
-    """Reject a result without a datum of control if the user or the project requires one."""
+    """Reject a result without a required datum of control."""
     from photogram import InputError
 
     if choices.datum_of(project) == "control" and result.datum.is_chosen:
@@ -249,7 +242,7 @@ def adjusted_block(
     threads: int | None = None,
     division: Division | None = None,
 ) -> Result:
-    """Adjust a block by the settings of its project and the choices of the user, with its features."""
+    """Adjust a block by settings of its project and options of the user."""
     from photogram import FirstValues, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
@@ -308,7 +301,7 @@ def result_at(
 def _call(
     name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
 ) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts, whose photos have an order of their own."""
+    """Return the call that adjusts: in one process, or in parts."""
     datum = _datum(name)
     if division is None:
         from photogram import adjust
@@ -320,7 +313,7 @@ def _call(
 
 
 def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
-    """Return the datum of a name; None where control or observations give it."""
+    """Return the datum of a name; None if control or observations define it."""
     from photogram import InnerConstraints, MinimumConstraints
 
     if name == "inner":
@@ -328,17 +321,19 @@ def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
     return MinimumConstraints() if name == "minimum" else None
 
 
-def _project_files(project: Project, result: Result) -> dict[str, bytes]:
-    """Return the files of the adjusted project: tables, and the format of the project."""
+def _files(project: Project, result: Result, report: str, sections: list[TitledLines]) -> dict[str, bytes]:
+    """Return all files of the output folder."""
     from photogram.formats import FORMATS, to_files
-    from photogram.formats.adjusted import adjusted
+    from photogram.formats.adjusted import adjusted, table_files
     from photogram.network.film_reduction import is_scanned
 
+    read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
+    files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}
     after = adjusted(project, result)
     own = next((name for name, each in FORMATS.items() if each.title == project.title), None)
     whole = own in (None, "plain") and not is_scanned(after.block)
     plain = to_files(after, "plain") if whole else _in_format(after, "plain")
-    files = {f"adjusted/{name}": content for name, content in plain.items()}
+    files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if own not in (None, "plain"):
         files |= {f"adjusted-{own}/{name}": content for name, content in _in_format(after, str(own)).items()}
         beside = FORMATS[str(own)].results
@@ -348,7 +343,7 @@ def _project_files(project: Project, result: Result) -> dict[str, bytes]:
 
 
 def _in_format(project: Project, name: str) -> dict[str, bytes]:
-    """Return the adjusted project in a format, if that can hold it."""
+    """Return the adjusted project in a format, if the format supports it."""
     from photogram import InputError
     from photogram.formats import FORMATS, to_files
 

@@ -125,7 +125,7 @@ class Planned:
 
 
 def _board(seen: CalibrationInput) -> Board:
-    """Return the board of `--board`, as a file or in numbers."""
+    """Return the board of `--board`."""
     from photogram.targets.board_files import read_board
 
     given = seen.given_board()
@@ -203,7 +203,7 @@ def calibrate(
 def _adjusted(
     job: Job, calibration: Calibration, how: dict[str, Any], threads: int | None, snooping: Snooping
 ) -> Calibrated:
-    """Adjust a calibration, without gross errors if the user wants that."""
+    """Adjust a calibration, without gross errors on request."""
     if snooping.snoop:
         check_alone(job, "--snoop", ("--loss", "--outliers"))
     with adjustment_status(job) as progress:
@@ -234,7 +234,7 @@ def _files(found: Calibrated, report: str) -> dict[str, bytes]:
 
 
 def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[str, bytes]:
-    """Make the files of the cameras in the formats of other programs, and their joint covariance."""
+    """Make the camera files for other programs, and their joint covariance."""
     from photogram.targets import camera_files
     from photogram.targets.output.formats import FILE, cameras_covariance
 
@@ -249,7 +249,7 @@ def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[
 def _weights(
     job: Job, found: Calibrated, bases: list[CornerBasisName], threads: int | None
 ) -> VarianceComponents | None:
-    """Estimate the variance components that are asked for."""
+    """Estimate the requested variance components."""
     if not bases:
         return None
     from photogram.targets import corner_components

@@ -69,7 +69,7 @@ class CalibrationInput:
         return None if self.knots is None else pair(self.knots, "--knots")
 
     def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
-        """Read corners or photographs of a path; `progress` receives the current photograph."""
+        """Read corners or photos of a path; `progress` receives the current photo."""
         from photogram.targets import read
 
         if (path / "project.toml").exists():
@@ -153,7 +153,7 @@ def _deviations(text: str) -> tuple[float, float]:
 
 
 def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
-    """Return offsets of clocks with their standard deviations by cameras, from words as `right=0,0.01`."""
+    """Return clock offsets with standard deviations from `right=0,0.01`."""
     found = {}
     for each in given:
         camera, _, numbers = each.rpartition("=")
@@ -213,7 +213,7 @@ class Uncertainty:
         return int(self.cross_validate)
 
     def told(self, job: Job, found: Calibrated, calibrated: Callable[[Path], Calibrated]) -> Calibrated:
-        """Return an adjusted calibration with its uncertainty; `calibrated` reads and adjusts another one."""
+        """Return an adjusted calibration with its uncertainty."""
         from photogram.targets.appraisal import appraise
         from photogram.targets.findings import judged
         from photogram.targets.uncertainty import difference

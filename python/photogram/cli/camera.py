@@ -80,7 +80,7 @@ def compare_certificates(
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:
-    """Read certificates, and cameras of other programs with the days that are given for them."""
+    """Read certificates, and cameras of other programs with their days."""
     from photogram.errors import InputError
     from photogram.film import Certificate
     from photogram.film.years import DatedCamera

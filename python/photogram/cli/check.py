@@ -39,7 +39,7 @@ def check_project(
 
     path = project_path(job, path)
     out = out or default_out(path, "-checked", example)
-    documents.place(out)  # refused before anything is read
+    documents.place(out)  # rejected before any input is read
     project = read_project(job, path, added)
     if not quiet:
         print_sections(described(project), "`photogram info`")

@@ -34,13 +34,13 @@ class Choices:
         return self.datum or project.options.datum
 
     def loss_of(self, project: Project) -> Loss | None:
-        """Return the robust loss of the option, else of the project; None for least squares."""
+        """Return the robust loss of the option or the project; None: least squares."""
         if self.loss is None:
             return project.options.loss
         return None if self.loss == "none" else self.loss
 
     def source(self, job: Job, project: Project, name: str) -> str:
-        """Return where `datum` or `loss` is set: an option, or the key and the line of a file."""
+        """Return the source of `datum` or `loss`: option, or key and line of a file."""
         if getattr(self, name) is not None:
             return f"--{name} {getattr(self, name)}"
         key = f"adjust.{name}"
@@ -55,7 +55,7 @@ class Choices:
         return f"{settings}, record {record}: {name} in [adjust]"
 
     def of(self, project: Project) -> Project:
-        """Return the project with the chosen cameras, coordinates, variance of unit weight and iterations."""
+        """Return the project with the chosen options."""
         from photogram.formats.supplements import held_points, self_calibrated
 
         wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []

@@ -79,7 +79,7 @@ def collection(
     photos = photos.replace(image_sd=fit.sd)
     if snooping.snoop:
         check_alone(job, "--snoop", ("--loss", "--scale"))
-    # Nothing vouches for --sd: the default is not that of blocks.
+    # The value of --sd is not verified, so the default differs from blocks.
     snooping = replace(snooping, unit_weight=unit_weight)
     result = _adjusted(job, photos, fit, snooping, components, ordering, threads)
     result = result.estimated(job, photos, components, threads)
@@ -114,7 +114,7 @@ def _adjusted(
     ordering: OrderingName,
     threads: int | None,
 ) -> AdjustmentOutcome[AdjustedCollection]:
-    """Adjust a collection, or take gross errors out of it, with the progress on standard error."""
+    """Adjust a collection, with removal of gross errors on request."""
     from photogram.collection import AdjustedCollection, adjust
 
     with adjustment_status(job, name="cost", factor=0.5) as progress:

@@ -1,4 +1,4 @@
-"""Commands and groups of them: options in panels, the same ones for all; a group with a main command."""
+"""Commands and command groups: common options in panels; a main command."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from photogram.words import phrase
 
 @cache
 def declarations() -> dict[str, tuple[str, str | None, str]]:
-    """Return panel, placeholder and help text of options and arguments by name; see `options.toml`."""
+    """Return panel, placeholder and help of options by name; see `options.toml`."""
     panel, table = "", {}
     for line in Path(__file__).with_name("options.toml").read_text(encoding="utf-8").splitlines():
         if line.startswith("["):
@@ -33,12 +33,12 @@ def declarations() -> dict[str, tuple[str, str | None, str]]:
 
 
 def misuse(option: str, code: str, /, **fields: Any) -> typer.BadParameter:
-    """Return the error of an option or argument: a code of the family `usage` with fields."""
+    """Return the error of an option: a code of the family `usage` with fields."""
     return typer.BadParameter(str(phrase(f"usage.{code}", **fields)), param_hint=option)
 
 
 def declared(parameter: Parameter, owner: str) -> Parameter:
-    """Return an option or argument of a command, or a class of options, with its declaration."""
+    """Return an option, argument or class of options with its declaration."""
     annotated = get_origin(parameter.annotation) is Annotated
     kind, *marks = get_args(parameter.annotation) if annotated else (parameter.annotation,)
     table, name = declarations(), parameter.name
@@ -55,7 +55,7 @@ def declared(parameter: Parameter, owner: str) -> Parameter:
 
 
 class _Params:
-    """Options and arguments; typer converts only values that need it: it would import pydantic (80 ms)."""
+    """Options and arguments without conversion, which would import pydantic (80 ms)."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters; :func:`_processed` processes their values."""
@@ -67,7 +67,7 @@ class _Params:
 
 
 def _processed(parameter: Any, ctx: Any, value: Any) -> Any:
-    """Return the value of an option or argument; defaults and accessible paths need no conversion."""
+    """Return the value of an option or argument, converted if necessary."""
     is_path = parameter.type_descriptor.is_path and value is not None
     if is_path and (os.access(value, os.R_OK) or not os.path.exists(value)):
         value = Path(value)
@@ -131,7 +131,7 @@ class GroupWithMain(Group):
         return list(super().parse_args(ctx, args))
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Return completions: the side commands and those words that complete the main command."""
+        """Return completions: side commands and words of the main command."""
         main = self.commands[self._main]
         with main.make_context(self._main, [], parent=ctx, resilient_parsing=True) as own:
             return [*super().shell_complete(ctx, incomplete), *main.shell_complete(own, incomplete)]

@@ -1,4 +1,4 @@
-"""The commands of all programs. Each is loaded when it is called, so that other commands are quick."""
+"""The commands of all programs, each loaded at its first call."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _not_loaded() -> None:
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version as version_of  # takes long to import
+        from importlib.metadata import version as version_of  # Import is slow
 
         output.print(f"photogram {version_of('photogram')}")
         raise typer.Exit

@@ -88,7 +88,7 @@ def comparator(
 
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
-    """Return the files for the correction of measurements: corrections and corrected grids."""
+    """Return the files for corrections: corrections and corrected grids."""
     from photogram.comparator.calibration import adjusted_grid, corrected_grid
 
     made = {place / "correction.json": calibration.correction.to_json()}

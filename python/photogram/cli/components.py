@@ -1,4 +1,4 @@
-"""Variance components on the command line, and the basis of the variance of unit weight."""
+"""Variance components of commands, and the basis of the unit variance."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def snooped(
 
 @dataclass(frozen=True)
 class AdjustmentOutcome(Generic[Network]):
-    """The outcome of an adjustment: result, removed observations, variance components."""
+    """Outcome of an adjustment: result, removed observations, components."""
 
     result: Network
     log: Snooped | None = None
     cleaned: Cleaned | None = None  # Weights and removed observations of an alternating estimation
-    components: VarianceComponents | None = None  # Of the given weights, which the result retains
+    components: VarianceComponents | None = None  # For the given weights, which the result retains
 
     @property
     def subject(self) -> Snooped | Network:

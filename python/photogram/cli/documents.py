@@ -44,7 +44,7 @@ class Documents:
     ply_origin: tuple[float, float, float] | None = None
 
     def place(self, out: Path | None) -> Path | None:
-        """Return the path of the browser report for a folder of results; None without a report."""
+        """Return the path of the browser report; None without a report."""
         if self.no_html:
             if self.html is not None:
                 raise misuse("--no-html", "conflict", options="--html")
@@ -52,7 +52,7 @@ class Documents:
         return self.html or (out / HTML if out is not None else None)
 
     def announce(self, job: Job, out: Path | None, *names: str, picture: str = "") -> list[Path]:
-        """Declare outputs: files in a folder of results, browser report and one plot; return its path."""
+        """Declare outputs: files, browser report and one plot; return its path."""
         drawn = []
         if picture and self.plots:
             if out is None:
@@ -65,7 +65,7 @@ class Documents:
     def page(
         self, job: Job, command: str, out: Path | None, make: Callable[[], Document], mark: str = ""
     ) -> dict[Path, bytes]:
-        """Return the browser report with a mark in its name; none, with a remark, if a package is missing."""
+        """Return the browser report; none, with a remark, without its packages."""
         place = self.place(out)
         if place is None:
             return {}
@@ -92,10 +92,10 @@ class Documents:
         if out is None:
             raise misuse("--plots", "requires", options="--out DIR")
         from photogram.plots.accessor import PLOTS
-        from photogram.show.style import need_matplotlib
+        from photogram.show.style import MATPLOTLIB, need
 
         if self.plot_format != "svg":
-            need_matplotlib()
+            need(*MATPLOTLIB)
         job.writes(*(out / f"{name}.{self.plot_format}" for name in PLOTS))
 
     def plots_of(self, result: AdjustedNetwork, out: Path | None) -> dict[Path, bytes]:
@@ -162,7 +162,7 @@ class Documents:
         tables: Sequence[str] = (),
         code: int | None = None,
     ) -> None:
-        """Write a result and further files, print its report (or `tables`), and end by its verdict."""
+        """Write a result and further files, print its report, exit by its verdict."""
         from photogram.show.forms import summary
 
         def summarize() -> None:

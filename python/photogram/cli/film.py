@@ -53,7 +53,7 @@ def film(
 
 
 def _adjusted(job: Job, path: Path, added: Additions, interior: str, threads: int | None) -> Result:
-    """Return the block with its films as they are asked for."""
+    """Adjust the block with the requested interior orientation of films."""
     from photogram import InputError
 
     settings = [*(added.settings or []), f"film.interior={interior}"]

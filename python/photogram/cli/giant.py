@@ -113,7 +113,7 @@ def giant(
 
 
 def _output_directory(directory: Path, out: Path | None, overwrite: bool) -> Path:
-    """Return the output folder; reject the folder of another project without --overwrite."""
+    """Return the output folder; reject one of another project."""
     from photogram.errors import InputError
     from photogram.giant.files import present_files
 
@@ -183,7 +183,7 @@ def _refracted(block: Block, common: Common, how: GiantOptions) -> Block:
 def _adjusted_project(
     job: Job, project: Project, block: Block, how: GiantOptions, threads: int | None, snooping: Snooping
 ) -> AdjustmentOutcome[Result]:
-    """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
+    """Adjust or snoop the block as in COMMON, with requested components."""
     from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.errors import AdjustmentError
 
@@ -195,7 +195,7 @@ def _adjusted_project(
                 else _adjusted(project, block, how, threads, progress)
             )
     except AdjustmentError:
-        # What was remarked on while reading is often the reason.
+        # Remarks on the input are often the reason.
         for message in project.messages[:SHOWN]:
             errors.print(escape(str(message)))
         raise
@@ -212,7 +212,7 @@ def _snooped(
     snooping: Snooping,
     progress: Callable[[Progress], None] | None,
 ) -> AdjustmentOutcome[Result]:
-    """Take gross errors out of the block, with its weights where components are asked for."""
+    """Remove gross errors, and estimate variance components if requested."""
     from photogram import Result
     from photogram.diagnosis.after_adjustment import diagnosed
 

@@ -1,4 +1,4 @@
-"""`photogram adjust` in parts: the options, and projects that are read batch by batch, never whole."""
+"""`photogram adjust` in parts, without loading the whole project."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TAKEN = frozenset(
         *(*DIVIDING, "--iterations", "--plan"),
     )
 )
-"""Options that a project on disk takes. Any other is refused: nothing is left out without a word."""
+"""Options for a project on disk; any other option is rejected."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def print_plan(plan: PartsPlan) -> None:
 def adjusted_on_disk(
     job: Job, path: Path, target: Path, divided: Parts, choices: Choices, threads: int | None
 ) -> bool:
-    """Plan or adjust a project batch by batch; return False if it must be read completely."""
+    """Plan or adjust a project batch by batch; False if this is impossible."""
     division = divided.division
     if division is None:
         return False

@@ -1,4 +1,4 @@
-"""The common part of all commands: protect inputs, write outputs, print a summary, end with an exit code."""
+"""Common part of all commands: inputs, outputs, summary, exit code."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 
 
 class Job:
-    """The inputs and outputs of a run of a command; a context manager around its work.
+    """Inputs and outputs of a run of a command; a context manager.
 
     On entry it rejects outputs that would damage an input or another output, and prints remarks on inputs of
     an interrupted run. Methods :meth:`reads` and :meth:`writes` add inputs and outputs later. Errors become
@@ -269,7 +269,7 @@ def adjustment_status(
 
 @contextmanager
 def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
-    """Show how many adjustments the estimation of variance components has taken."""
+    """Show the number of completed adjustments of a variance component estimation."""
     with job.status("variance components") as status:
 
         def show(number: int, _: object) -> None:
@@ -280,7 +280,7 @@ def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
 
 
 def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:
-    """Return a function that shows phase and last iteration; the sum has this name and factor."""
+    """Return a function that shows phase and last iteration."""
     last = ""
 
     def show(progress: Progress) -> None:
@@ -305,7 +305,7 @@ def _check_name(path: Path) -> None:
 
 
 class Without:
-    """Mark in an annotation: a command has a class of options without the options of these names."""
+    """Mark of an annotation: class of options without these names."""
 
     def __init__(self, *names: str) -> None:
         self.names = names
@@ -329,7 +329,7 @@ def _holds_path(kind: object) -> bool:
 
 
 def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[str]]]]:
-    """Return options and arguments of a command, and its parameters that are classes of options."""
+    """Return options and arguments of a command, and its option classes."""
     options: list[Parameter] = []
     grouped: dict[str, tuple[type, list[str]]] = {}
     for parameter in signature(command, eval_str=True).parameters.values():
@@ -346,7 +346,7 @@ def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tu
 
 
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
-    """Run a command inside a :class:`Job` with its inputs and outputs; the job is its parameter `job`.
+    """Run a command inside a :class:`Job`, its parameter `job`.
 
     The fields of a parameter that is a dataclass are options, except fields in a mark :class:`Without`. The
     option `--example`, or `--plan` of views, replaces the first argument.
@@ -386,7 +386,7 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[str, str]:
-    """Return options and arguments that are not their defaults, as a user writes them."""
+    """Return options and arguments without defaults, as a user writes them."""
     found = {}
     for parameter in parameters:
         value = values.get(parameter.name, parameter.default)
@@ -402,7 +402,7 @@ def _given(parameters: Iterable[Parameter], values: Mapping[str, Any]) -> dict[s
 
 
 def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
-    """Assign values to arguments; an option of STANDS replaces the first argument."""
+    """Assign values to arguments; an option may replace the first argument."""
     arguments = {
         parameter.name: mark.metavar
         for parameter in parameters
@@ -425,7 +425,7 @@ def _option(parameter: Parameter) -> str:
     """Return the name of an option on the command line."""
     for mark in get_args(parameter.annotation)[1:]:
         if isinstance(mark, OptionInfo):
-            # Where it is annotated, the first of its names stands in the place of a default.
+            # In an annotation, the default of the mark is the first option name.
             names = [each for each in (mark.default, *(mark.param_decls or ())) if isinstance(each, str)]
             if names:
                 return next((each for each in names if each.startswith("--")), names[0])

@@ -34,7 +34,7 @@ class Snooping:
 
     @property
     def options(self) -> dict[str, Any]:
-        """As :func:`photogram.snoop` takes them."""
+        """Arguments of :func:`photogram.snoop`."""
         return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight}
 
 
@@ -45,7 +45,7 @@ def check_alone(job: Job, option: str, others: Collection[str]) -> None:
 
 
 def default_out(source: Path, ending: str, is_example: bool = False) -> Path:
-    """Return the default folder for results: the name of the input, or `example`, with an ending.
+    """Return the default output folder: name of the input with an ending.
 
     It is in the folder of the input, or in the current folder if that is read-only or the input is packaged.
     """

@@ -72,7 +72,7 @@ def plan(
 
 
 def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Block]:
-    """Simulate networks: their true positions, nothing measured."""
+    """Simulate networks with true positions and without observations."""
     from photogram.network.simulation import simulate
 
     patterns = {
@@ -84,7 +84,7 @@ def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Blo
 
 
 def _name(network: NetworkOptions) -> str:
-    """Return a name of a pattern from the properties in which two patterns can differ."""
+    """Return a name of a pattern from its distinctive properties."""
     spacing = network.control_spacing
     names = {
         "perimeter": f"perimeter, {spacing} base{'s' * (spacing != 1)}",
@@ -123,7 +123,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
 
 
 def _names(projects: list[Path]) -> dict[str, Path]:
-    """Name projects by the last part of their paths, or the whole where two have the same."""
+    """Name projects by the last part of their paths, if these differ."""
     places = [Path(os.path.realpath(directory)) for directory in projects]
     if len(set(places)) < len(places):
         raise misuse("DIR", "project-repeated")

@@ -15,9 +15,9 @@ SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"  # Ends a status line: rich hides the cursor 
 
 
 def end_by_signals() -> None:
-    """Let SIGINT, SIGTERM and SIGHUP end the process with 128 and their number, unless they are ignored.
+    """End the process on SIGINT, SIGTERM and SIGHUP with 128 + signal.
 
-    Not by an exception: one that is raised inside a destructor or a callback would be lost.
+    Exceptions are not used: one that is raised inside a destructor or a callback would be lost.
     """
     for name in _NAMES:
         number = getattr(signal, name, None)
@@ -26,7 +26,7 @@ def end_by_signals() -> None:
 
 
 def ignore_signals() -> None:
-    """Let signals no longer change the end of a run that is through: the interpreter would die of them."""
+    """Ignore signals after the end of a run, which would change its exit code."""
     for name in _NAMES:
         number = getattr(signal, name, None)
         if number is not None:
@@ -34,7 +34,7 @@ def ignore_signals() -> None:
 
 
 def _end(number: int, _frame: FrameType | None) -> None:
-    # If the writer is not loaded yet, it has begun nothing.
+    # If the writer is not loaded yet, no output has been started.
     abandon_all = getattr(sys.modules.get("photogram.io.writing.outputs"), "abandon_all", None)
     if abandon_all is not None:
         abandon_all()
@@ -50,7 +50,7 @@ STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EBADF)
 
 
 def open_streams() -> None:
-    """Make sure that the three descriptors are open, and that any text can be printed.
+    """Ensure that three descriptors are open, and that any text is printable.
 
     Without this a file might be opened as descriptor 1, and a file name that is not in the encoding of the
     terminal could not be printed; such characters are printed as escapes.
@@ -66,7 +66,7 @@ def open_streams() -> None:
 
 
 def stream_fault(error: OSError) -> int:
-    """Report an error of a standard stream, except a broken pipe; return the exit code."""
+    """Report an error of a standard stream; return the exit code."""
     if error.errno != errno.EPIPE:
         of = "standard output: " if error.errno in STREAM_FAULTS else ""
         with suppress(OSError):
@@ -82,7 +82,7 @@ def finish(code: int | str | None) -> int | str | None:
                 stream.flush()
         except OSError as error:
             code = code or stream_fault(error)
-            # The interpreter writes it out once more at its end: now to where it always can.
+            # The interpreter flushes the stream again at exit: redirect it to the null device.
             with suppress(OSError):
                 nowhere = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nowhere, descriptor)

@@ -44,7 +44,6 @@ def info(
 
 
 def _asked(project: Project) -> list[TitledLines]:
-    """Return a line on the requested accuracy statement, if any."""
     if not project.statement:
         return []
     from photogram.results.statement.request import Asked

@@ -1,4 +1,4 @@
-"""Common parts of commands on projects of any format: options, reading, description."""
+"""Common parts of commands on projects: options, reading, description."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
 
 
 def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
-    """Return the position of an antenna and its standard deviation from `X,Y,Z` or `X,Y,Z,SD`."""
+    """Return antenna position and standard deviation of `X,Y,Z` or `X,Y,Z,SD`."""
     if text is None:
         return None
     try:
@@ -189,7 +189,7 @@ def described(project: Project) -> list[TitledLines]:
 
 
 def _control_line(block: Block, rays: Indices) -> str:
-    """Return the numbers of control and check points with observations, and names of the others."""
+    """Return numbers of control and check points, and names of unobserved ones."""
     import numpy as np
 
     from photogram.network.observations import Control
@@ -208,7 +208,7 @@ _MANY = 10
 
 
 def _ray_counts(rays: Indices) -> list[tuple[int, int]]:
-    """Return how many points have one, two, ... rays."""
+    """Return pairs of a number of rays and the number of points with it."""
     import numpy as np
 
     counts = np.bincount(np.minimum(rays[rays > 0], _MANY), minlength=_MANY + 1)

@@ -31,7 +31,7 @@ Control = Literal["perimeter", "corners", "none"]
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """The network of a simulated block, with names and defaults of :func:`photogram.simulate`."""
+    """The network of a simulated block; see :func:`photogram.simulate`."""
 
     strips: int = 4
     photos_per_strip: int = 10
@@ -84,7 +84,7 @@ class NetworkOptions:
 
 @dataclass(frozen=True)
 class MotionOptions:
-    """The motion of cameras, with names and defaults of :class:`RollingShutter` and :class:`LineScanner`."""
+    """Motion of cameras; see :class:`RollingShutter` and :class:`LineScanner`."""
 
     readout: float | None = None
     readout_sd: float | None = None
@@ -186,7 +186,7 @@ def simulate(
 
 
 def _filed(block: Block, position_error: float, attitude_error: float) -> tuple[Block, Common]:
-    """Return a simulated block as files can state it, and the job: no initial value is free in them."""
+    """Return a simulated block in the form of GIANT files, and its job."""
     import numpy as np
 
     from photogram.giant.common import Common
@@ -225,7 +225,6 @@ def _tables(simulation: Simulation, out: Path, *, overwrite: bool) -> dict[Path,
 
 
 def _truth(simulation: Simulation) -> bytes:
-    """Return the JSON document of the truth of a simulated block."""
     import numpy as np
 
     from photogram.io import json
@@ -271,7 +270,7 @@ def _truth(simulation: Simulation) -> bytes:
 
 
 def _true_motion(truth: Block) -> dict[str, object]:
-    """Return readout times, motions and trajectories of a simulated block, if it moves."""
+    """Return times, motions and trajectories of a moving simulated block."""
     import numpy as np
 
     from photogram.network.motion import given_poses

@@ -1,4 +1,4 @@
-"""`photogram statement`: an accuracy statement that one may hand over."""
+"""`photogram statement`: an accuracy statement for a client."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ def _summary(found: Statement) -> list[TitledLines]:
 
 
 def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
-    """Return the plain project in the folder of a saved result, unless it has another block."""
+    """Return the plain project in the folder of a saved result, if it fits."""
     from photogram.formats import read
 
     settings = folder.resolve().with_name("project.toml")
     if not settings.is_file():
         return None
-    # Of its files only this one says something of the statement: the figures are those of the result.
+    # Only the settings concern the statement: all figures are from the result.
     job.reads(settings)
     project = read(settings.parent, "plain")
     own, block = result.block, project.block

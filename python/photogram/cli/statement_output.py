@@ -1,4 +1,4 @@
-"""Statements as commands make and write them."""
+"""Creation and output of accuracy statements."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class StatementOptions:
     date: str | None = None
 
     def check_alone(self) -> None:
-        """Refuse these options of a command that makes no statement."""
+        """Reject these options for a command without a statement."""
         given = [each.name for each in fields(self) if getattr(self, each.name) is not None]
         if given:
             raise misuse(f"--{given[0].replace('_', '-')}", "requires", options="--statement")
 
     def asked(self, project: Project | None, added: Additions, unit: str) -> dict[str, Any]:
-        """Return checked settings of a statement from these options, else from the project."""
+        """Return checked settings of a statement from options or project."""
         from photogram.formats.supplements import deviations
         from photogram.results.statement.request import Asked
 
@@ -65,7 +65,7 @@ class StatementOptions:
         return asked
 
     def options(self, unit: str) -> dict[str, Any]:
-        """Return the arguments of :meth:`photogram.Result.statement` for a unit of length."""
+        """Return arguments of :meth:`photogram.Result.statement` for a unit."""
         from photogram.formats.plain.statement_settings import read_sentences
         from photogram.results.statement.request import length_of
 
@@ -113,7 +113,7 @@ def stated(
     strict: bool = False,
     assumed: Sequence[Phrase | str] = (),
 ) -> Statement:
-    """Return the statement of a result with its input files and a date (default: today)."""
+    """Return the statement of a result with input files and date."""
     from datetime import date
 
     from photogram import statement as made

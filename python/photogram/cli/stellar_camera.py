@@ -62,7 +62,7 @@ def stellar_camera(
     job.reads(*inputs)
     pictures = documents.plot_format if documents.plots else ""
     target = out or Path(f"{deck.stem}-calibrated")
-    documents.place(target)  # refused before anything is computed
+    documents.place(target)  # rejected before any computation
     written: dict[Path, bytes] = {}
     asked: dict[Path, bytes] = {}
     results = []
@@ -198,7 +198,7 @@ def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict
 
 
 def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
-    """Make everything that is written for one problem."""
+    """Create all files of one problem."""
     from photogram.stellar.plots import sketches
     from photogram.stellar.printout import plate_list, printout
 
@@ -216,7 +216,7 @@ def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, by
 
 
 def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
-    """Make everything that is written for a night."""
+    """Create all files of a night."""
     from photogram.stellar.camera_yaml import WITH_YAML, to_yaml
     from photogram.stellar.night_plots import sketches
 

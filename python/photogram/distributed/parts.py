@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +17,10 @@ from photogram.io.seals import Seals, check_seal, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
-from photogram.network.films import Film, Pattern, Readings, Reseau, Scan
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
-from photogram.network.observations import Observation
-from photogram.network.passages import Passage
-from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
+from photogram.network.films import Scan
 from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
-from photogram.results.block_files import CLASSES, STANDS
+from photogram.results.block_files import STANDS, saved_classes
 from photogram.words import phrase
 
 TABLES: dict[str, tuple[str, ...]] = {
@@ -245,9 +238,7 @@ def read_part(folder: Path, sealed: str) -> Part:
     for table in TABLES:
         check_seal(folder / f"{table}.parquet", document["tables"][table], SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
-    single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
-    classes = [*single, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
-    decoder = Decoder(classes, folder / SETTINGS)
+    decoder = Decoder(saved_classes(), folder / SETTINGS)
     given: dict[str, Any] = decoder.fields(document["block"], Block)
     common = tuple(decoder.value(document["common"]))
     for table, fields in TABLES.items():
@@ -266,10 +257,3 @@ def read_part(folder: Path, sealed: str) -> Part:
         np.array(document["unknowns"], dtype=np.int64),
         common,
     )
-
-
-def _below(base: type) -> Iterator[type]:
-    subclasses: list[type] = base.__subclasses__()
-    for each in subclasses:
-        yield each
-        yield from _below(each)

@@ -1,4 +1,4 @@
-"""Projects in the files that people have: read, write, convert (docs/formats.md)."""
+"""Projects in many file formats: read, write, convert (docs/formats.md)."""
 
 import lazy_loader
 

@@ -33,13 +33,13 @@ _TABLES = {
 
 
 def adjusted(project: Project, result: Result) -> Project:
-    """Return a project with what was found where it was unknown: what was observed stays as it was given."""
+    """Return a project with adjusted parameters; observations are unchanged."""
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
     return project.replace(block=result.restarted(), starts=starts, lacks=())
 
 
 def table_files(result: Result) -> Mapping[str, bytes]:
-    """Return the tables of a result as text of commas, by the names of files; none without rows."""
+    """Return the tables of a result as CSV by file name, without empty tables."""
     files = {}
     for file, kind in _TABLES.items():
         table = TABLES[kind](result)
@@ -61,13 +61,13 @@ def table_files(result: Result) -> Mapping[str, bytes]:
 
 
 def feature_files(features: Features) -> Mapping[str, bytes]:
-    """Return the tables of features as text of commas, by the names of files."""
+    """Return the tables of features as CSV by file name."""
     tables = {"features.csv": features.columns(), "feature_deviations.csv": features.deviation_columns()}
     return {name: csv_text(columns) for name, columns in tables.items() if columns["feature"]}
 
 
 def excel_file(result: Result) -> bytes:
-    """Return the tables of a result as a workbook: a sheet each, units in a last one, `notes`."""
+    """Return the tables of a result as a workbook, with units in `notes`."""
     tables = {file: TABLES[kind](result) for file, kind in _TABLES.items()}
     sheets = {file: frame(table) for file, table in tables.items()}
     filled = {file: columns for file, columns in sheets.items() if len(next(iter(columns.values())))}
@@ -76,7 +76,7 @@ def excel_file(result: Result) -> bytes:
 
 
 def _refined(result: Result) -> bytes:
-    """Return images of films in the frame of their cameras, as programs take them that know no films."""
+    """Return film observations in the camera frame, for programs without film models."""
     (xy, sd), block = result.refined, result.block
     known = np.flatnonzero(np.isfinite(xy).all(axis=1))
     return csv_text(
@@ -96,7 +96,7 @@ def _refined(result: Result) -> bytes:
 def _packed(
     kind: str, names: list[str], covariances: Floats, order: tuple[str, ...], result: Result
 ) -> bytes:
-    """Return lower triangles, row by row, one a line."""
+    """Return lower triangles row by row, one matrix per line."""
     pairs = [(i, j) for i in range(len(order)) for j in range(i + 1)]
     columns: dict[str, Any] = {kind: names}
     columns |= {f"c_{order[i]}_{order[j]}": covariances[:, i, j] for i, j in pairs}

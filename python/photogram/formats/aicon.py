@@ -1,7 +1,7 @@
-"""AICON: photo coordinates, interior and exterior orientation, object coordinates and scale bars as text.
+"""AICON: photo and object coordinates, orientation and scale bars as text.
 
-Columns as the open reader of such files tells them (applied-geodesy/bundle-adjustment, JAiCov): words between
-blanks, a line for each thing, `#` before comments; millimetres and radians.
+Columns as in the open reader of such files (applied-geodesy/bundle-adjustment, JAiCov): words between
+blanks, one record per line, `#` before comments; millimetres and radians.
 
     .phc    photo, point, x, y, their standard deviations, residuals, method, active, -
     .ior    camera, -, -c, xh, yh, A1, A2, R0; then lines A3; B1 B2; C1 C2; width, height (mm), pixels of both
@@ -38,7 +38,7 @@ _NOT_ORIENTED = 1
 
 @dataclass
 class _Found:
-    """What the files hold, by the names of photos and points."""
+    """The contents of the files, by names of photos and points."""
 
     cameras: dict[str, Camera] = field(default_factory=dict)
     sizes: dict[str, tuple[Size, float]] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class _Found:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the photo coordinates, and what lies beside them: the cameras must."""
+    """Read photo coordinates and the other files; cameras are required."""
     folder = path if path.is_dir() else path.parent
     images = one_file(folder, IMAGES) if path.is_dir() else path
     if images is None:
@@ -104,7 +104,7 @@ def _cameras(path: Path, found: _Found) -> None:
 
 
 def _once(card: Card, names: Collection[str], what: str) -> str:
-    """Return the name that a line begins with, which no line before had."""
+    """Return the first word of a line, a name that must be unique."""
     name = card.words[0]
     if name in names:
         raise card.place.error(phrase("format.repeated", what=what, name=name))
@@ -168,7 +168,7 @@ def _images(path: Path, found: _Found) -> None:
 def _bars(path: Path, found: _Found) -> None:
     seen = {point for _, point in found.images}
     for card in _lines(path):
-        # Names of bars may have blanks: what counts stands behind the quotation marks.
+        # Names of bars may contain blanks: the columns follow the last quotation mark.
         own = Card(card.place)
         own.words = (card.place.text or "").rpartition('"')[2].split()
         length, sd = own.numbers(2, "length sd").tolist()

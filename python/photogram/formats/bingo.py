@@ -1,4 +1,4 @@
-"""BINGO: `image.dat` in millimetres, lines `ORIA`; principal distances come from a table of cameras."""
+"""BINGO: `image.dat` in millimetres, with lines `ORIA`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read `image.dat`, and the orientation beside it; angles are in gon unless said otherwise."""
+    """Read `image.dat` and the orientation; the default angle unit is gon."""
     folder = path if path.is_dir() else path.parent
     images = folder / IMAGES if path.is_dir() else path
     table = wishes.cameras or folder / CAMERAS
@@ -117,7 +117,7 @@ def _words(project: Project) -> dict[str, str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return images, orientation, the table of cameras that reading them needs, and one of control."""
+    """Return images, orientation, and tables of cameras and of control."""
     block, reduced, words = project.block, reduced_images(project), _words(project)
     lines: list[str] = []
     owners = [words[reduced.names[row]] for row in reduced.cameras.tolist()]

@@ -1,4 +1,4 @@
-"""What writers ask of a block: photos with a pose, correlated control, what moves, what has no place."""
+"""Contents of a block for writers: poses, control, trajectories."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from photogram.network.observations import Control
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.words import phrase
 
-MOST_TOLD = 12  # Trajectories that are told one by one
+MOST_TOLD = 12  # Largest number of trajectories that are described one by one
 
 
 def posed(block: Block) -> Bools:
@@ -28,12 +28,12 @@ def posed(block: Block) -> Bools:
 
 
 def correlated_control(block: Block) -> dict[str, Control]:
-    """Return control that is observed with correlations, by the names of its points."""
+    """Return control with correlated coordinates by point name."""
     return {each.point: each for each in block.observations if isinstance(each, Control)}
 
 
 def check_images(block: Block, title: str) -> None:
-    """Refuse to write what a file would have for images in the frame of a camera, and is something else."""
+    """Reject image coordinates of films or line scanners."""
     scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
     if scanned:
         raise InputError(phrase("format.film", title=title, photo=scanned[0]))
@@ -43,7 +43,7 @@ def check_images(block: Block, title: str) -> None:
 
 
 def motions(project: Project) -> list[str]:
-    """Return what of a project is on trajectories, a line each; nothing where nothing is."""
+    """Describe the trajectories of a project, one per line."""
     block = project.block
     shared = shared_trajectories(block)
     if not block.timed and not shared:
@@ -69,7 +69,7 @@ def motions(project: Project) -> list[str]:
 
 
 def _told(trajectory: Trajectory, block: Block) -> str:
-    """Return what a trajectory is, and what is on it."""
+    """Describe a trajectory and its photos and observations."""
     table = trajectory.table
     photos = sum(each.trajectory is trajectory for each in block.timed)
     kinds = Counter(
@@ -94,7 +94,7 @@ def _told(trajectory: Trajectory, block: Block) -> str:
 
 
 def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
-    """Return what corrections are, and what is known of their coefficients."""
+    """Describe the corrections of a trajectory."""
     if basis is None:
         return "as given"
     kind = "polynomial" if isinstance(basis, Polynomial) else "spline"

@@ -1,4 +1,4 @@
-"""Text files of words in lines, as PATB and BINGO have them."""
+"""Text files with words in lines, as in PATB and BINGO."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.words import phrase
 
-END = "-99"  # What ends a photo, or a file
+END = "-99"  # Word that ends a photo or a file
 _UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
 
 
 class Card:
-    """The words of a line, and where it stands."""
+    """The words and the location of a line."""
 
     def __init__(self, place: Place) -> None:
         self.place = place
@@ -37,7 +37,7 @@ class Card:
 
     @property
     def ends(self) -> bool:
-        """Whether the line is the mark of an end: -99, alone or with zeros."""
+        """Whether the line is an end mark: -99, alone or with zeros."""
         return (
             bool(self.words)
             and self.words[0] == END
@@ -53,7 +53,7 @@ def filled_lines(path: Path) -> Iterator[Place]:
 
 
 def cards(path: Path) -> Iterator[Card]:
-    """Yield the lines of a file that are no comments (`C ...`), blank ones too."""
+    """Yield the lines of a file except comments (`C ...`)."""
     for record, line in enumerate(read_lines(path), 1):
         words = line.split()
         if words and words[0] in ("C", "#"):
@@ -62,7 +62,7 @@ def cards(path: Path) -> Iterator[Card]:
 
 
 def names_beside(path: Path) -> dict[str, str]:
-    """Return the names of numbers of a table `number, name`; none where it is not there."""
+    """Return names by number from a table `number, name`; empty without file."""
     if not path.is_file():
         return {}
     table = read_columns(path, known=("number", "name"))
@@ -77,12 +77,12 @@ def names_beside(path: Path) -> dict[str, str]:
 
 
 def has_suffix(suffix: str, path: Path) -> bool:
-    """Whether a file has an ending, in any case, or a folder a file that has it."""
+    """Return whether a file, or a file in a folder, has a suffix in any case."""
     return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
 
 
 def one_file(path: Path, suffix: str) -> Path | None:
-    """Return the file of an ending in a folder, in any case; None without."""
+    """Return the only file of a suffix in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
     if len(found) > 1:
         raise InputError(
@@ -92,7 +92,7 @@ def one_file(path: Path, suffix: str) -> Path | None:
 
 
 def angle_unit(wished: str | None, default: str | None, path: Path) -> str:
-    """Return the unit of angles: as wished, as the format has it, or an error where neither says."""
+    """Return the unit of angles: requested or of the format, else an error."""
     unit = wished or default
     if unit is None:
         raise InputError(phrase("format.angle-unit"), file=path)

@@ -1,7 +1,7 @@
 """Collections of photos, each with a camera f, k1, k2, as projects.
 
-Bundler has `bundle.out`, with the names of photos in `list.txt` beside it; problems of "Bundle Adjustment in
-the Large" have numbers for names.
+Bundler has `bundle.out`, and photo names in `list.txt` of the same folder. Problems of "Bundle Adjustment in
+the Large" use numbers as names.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ PROBLEM = "problem.txt"
 _FIRST = re.compile(
     rb"[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[0-9]+[ \t\r]*\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+\S+[ \t]+\S+"
 )
-"""How a problem begins: three counts, and the first image."""
+"""Start of a problem: three counts, and the first image."""
 
 
 def _begin(path: Path) -> bytes:
-    """Return how a file begins, unpacked; nothing of what is no file, or cannot be read."""
+    """Return the unpacked start of a file; empty if it is not a readable file."""
     try:
         return next(pieces(path), b"") if path.is_file() else b""
     except InputError:
@@ -53,7 +53,7 @@ def _place(path: Path) -> Path:
 
 
 def _read_bundler(path: Path, wishes: Wishes) -> Project:
-    """Read a Bundle file of version 0.3, and the list of photos beside it."""
+    """Read a Bundle file of version 0.3, and the list of photos in its folder."""
     from photogram.collection.formats import bundler
 
     del wishes
@@ -81,7 +81,7 @@ def _write_bundler(project: Project) -> Mapping[str, bytes]:
 
 
 def _read_bal(path: Path, wishes: Wishes) -> Project:
-    """Read a problem, packed by bzip2 or gzip or not; photos and points are called by their numbers."""
+    """Read a problem, optionally packed; photos and points have numbers."""
     from photogram.collection.formats import bal
 
     del wishes
@@ -90,14 +90,13 @@ def _read_bal(path: Path, wishes: Wishes) -> Project:
 
 
 def _write_bal(project: Project) -> Mapping[str, bytes]:
-    """Return the file of a problem."""
     from photogram.collection.formats import bal
 
     return {PROBLEM: bal.FORMAT.to_bytes(collection_of(project)[0])}
 
 
 def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) -> Project:
-    """Return the project of a collection; photos of which nothing is known (f is 0) are left out."""
+    """Return the project of a collection without unregistered photos (f is 0)."""
     registered = found.photo_parameters[:, 6] != 0
     rows = np.flatnonzero(registered)
     remarks = []
@@ -140,7 +139,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | None:
-    """Return f, k1, k2 of a camera that has no more than that; None for all others."""
+    """Return f, k1, k2 of a camera without other parameters; None for all others."""
     values = camera.parameters
     if camera.model == "bal":
         return values["f"], values["k1"], values["k2"]
@@ -197,7 +196,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
 def _moved(
     project: Project, cameras: list[Camera], sizes: Sequence[Size | None], of_images: Indices
 ) -> Floats:
-    """Return (m, 2) image coordinates from the middle, y up: moved where a camera has more than f, k1, k2."""
+    """Return (m, 2) image coordinates from the centre, reduced to f, k1, k2."""
     block = project.block
     found = block.image_xy.copy()
     directions = image_directions(block)

@@ -1,7 +1,7 @@
-"""What columns of coordinates are called, language by language, and the words for control and check points.
+"""Column headings of coordinates, and words for control and check points.
 
-One table for all that reads points with coordinates. Words are without accents and marks (`hohe` is Höhe);
-a heading is known where it is one of them, or where all its words mean the same (`X/Easting`, `Punkt-Nr.`).
+All readers of points with coordinates use this table. Words are without accents and marks (`hohe` is Höhe). A
+heading is known if it is one of the words, or if all its words have one meaning (`X/Easting`, `Punkt-Nr.`).
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from collections.abc import Collection, Mapping
 PHOTO_WORDS = frozenset(
     {"photo", "image", "image name", "imagename", "filename", "file name", "file", "picture"}
 )
-"""Headings of the column of photos, in tables that have one."""
+"""Headings of the column of photos."""
 PIXEL_WORDS: Mapping[str, str] = {
     **dict.fromkeys(("x", "u", "col"), "column"),
     **dict.fromkeys(("y", "v"), "row"),
 }
-"""Headings of image coordinates, in tables that have columns and rows."""
-ROLE = "use"  # The column that says who is check and who is control
+"""Headings of image coordinates, in columns and rows."""
+ROLE = "use"  # Column of the roles: control or check
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "point": {
         "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"
@@ -78,7 +78,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "check": {"en": "check, checkpoint, check point, is check", "de": "kontrollpunkt, prufpunkt"},
     "enabled": {"en": "enable, enabled"},
     "": {
-        # What says nothing that an adjustment needs, though it may be numbers.
+        # Columns that an adjustment does not need, even if they contain numbers.
         "en": "code, description, desc, comment, comments, remark, remarks, note, notes, d, feature, order,"
         " group, date, time, epoch, age, fix, satellites, sats, pdop, hdop, vdop, gdop, antenna,"
         " antenna height, instrument, operator, photo, image, images, projections, zone, crs, epsg,"
@@ -109,7 +109,7 @@ _ROLES: Mapping[str, Mapping[str, str]] = {
         "de": "aus, gesperrt",
         "fr": "ignore",
     },
-    # Control to some and check to others: what it is not beside the other one.
+    # Control or check, depending on the program; the other role has another word.
     "?": {"en": "cp", "fr": "controle, point de controle, pc", "es/pt/it": "controllo, punto de control"},
 }
 _METRES: Mapping[float, str] = {
@@ -151,7 +151,7 @@ _FILLERS = frozenset(_SMALL.split())
 _BRACKETS = re.compile(r"[(\[{]([^)\]}]*)[)\]}]")
 _COVERAGE = re.compile(r"\bk\s*=\s*(\d+(?:[.,]\d*)?)")
 _EXPANDED = re.compile(r"u(xyz|xy|[xyzenh])?")
-"""U, the expanded uncertainty, of which the heading names the coverage factor."""
+"""U, the expanded uncertainty; the heading contains the coverage factor."""
 
 
 def _looked_up(table: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
@@ -167,14 +167,14 @@ _KNOWN, _KNOWN_ROLES = _looked_up(_COLUMNS), _looked_up(_ROLES)
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a heading or cell: small letters without accents, marks and what is in brackets."""
+    """Return the words of a heading in small letters, without accents."""
     bare = unicodedata.normalize("NFKD", _BRACKETS.sub(" ", text).casefold().replace("σ", " sigma "))
     plain = "".join(each for each in bare if not unicodedata.combining(each))
     return re.sub(r"[^0-9a-z]+", " ", plain).split()
 
 
 def _meaning(words: list[str]) -> str | None:
-    """Return what words mean together: as they stand, or all of them that are no fillers the same."""
+    """Return the common meaning of words, ignoring fillers."""
     if (whole := _KNOWN.get(" ".join(words))) is not None:
         return whole
     found = {
@@ -194,7 +194,7 @@ _TOGETHER = {word: column for column, words in _OF_SEVERAL.items() for word in w
 
 
 def column_of(heading: str) -> str | None:
-    """Return our column that a heading means; nothing for one that needs no reading, None if unknown."""
+    """Return the column of a heading; empty if it is not needed, None if unknown."""
     words = words_of(_COVERAGE.sub(" ", heading.casefold()))
     if len(words) > 1 and words[-1] in UNITS:
         words.pop()
@@ -221,12 +221,12 @@ def column_of(heading: str) -> str | None:
 
 
 def is_angular(heading: str) -> bool:
-    """Whether a heading names a longitude or latitude."""
+    """Return whether a heading names a longitude or latitude."""
     return any(_KNOWN.get(word) in ANGULAR for word in words_of(heading))
 
 
 def units_of(heading: str) -> list[str]:
-    """Return the words in brackets of a heading without k=2, else its unit of length at the end."""
+    """Return the units in a heading: in brackets, otherwise at the end."""
     inside = [_COVERAGE.sub(" ", each) for each in _BRACKETS.findall(heading.casefold())]
     found = [" ".join(each.replace("_", " ").split()).strip(" ,;") for each in inside]
     words = re.sub(r"[^0-9a-zμ-]+", " ", heading.casefold()).split()
@@ -234,13 +234,13 @@ def units_of(heading: str) -> list[str]:
 
 
 def coverage_of(heading: str) -> float | None:
-    """Return the coverage factor that a heading names as k=2; None without."""
+    """Return the coverage factor in a heading such as k=2; None without."""
     match = _COVERAGE.search(heading.casefold())
     return None if match is None else float(match[1].replace(",", "."))
 
 
 def bare_name(heading: str, known: Collection[str]) -> str | None:
-    """Return the known column that a heading names beside its unit and coverage factor; None for another."""
+    """Return the known column of a heading, ignoring unit and coverage factor."""
     if not all(any(word in units for units in KINDS_OF_UNITS.values()) for word in units_of(heading)):
         return None
     words = _COVERAGE.sub(" ", _BRACKETS.sub(" ", heading.casefold())).replace("_", " ").split()
@@ -251,5 +251,5 @@ def bare_name(heading: str, known: Collection[str]) -> str | None:
 
 
 def role_of(text: str) -> str | None:
-    """Return `control`, `check`, `off`, or `?` for a word that is one of the first two; None for another."""
+    """Return `control`, `check`, `off` or `?` (ambiguous); None for other words."""
     return _KNOWN_ROLES.get(" ".join(words_of(text)))

@@ -1,4 +1,4 @@
-"""Headings that people give to tables of points, and their roles, as the tables of a project have them."""
+"""Standardised headings and roles for tables of points from other sources."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ OURS = (
     *("point", "photo", "x", "y", "z", "sd", "sd_x", "sd_y", "sd_z"),
     *("cov_xy", "cov_xz", "cov_yz", "use", "time", "group"),
 )
-"""Columns that a user may name."""
-STRICT = ("control", "gnss")  # Tables of which no number may go unread
+"""Columns that a user may assign."""
+STRICT = ("control", "gnss")  # Tables in which every number must be read
 SHORT = {"p": "point", "n": "y", "e": "x", "z": "z", "d": "d", "x": "x", "y": "y", "h": "z"}
-"""Letters of orders of columns, as PNEZD."""
+"""Letters for the order of columns, as in PNEZD."""
 _PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})
-"""Headings of roles and nothing else; a type or a status may be of something else."""
+"""Headings used for roles only; a type or a status may describe something else."""
 _FLAGS = {"check": "check", "enabled": "enabled"}
 _WITH_NOTES = ("x", "y", "z", "sd", "sd_x", "sd_y", "sd_z", "sd_xy")
-"""Columns whose headings may have other words in brackets than units: X (UTM32)."""
+"""Columns whose headings may have other words than units in brackets: X (UTM32)."""
 Units = Mapping[str, tuple[str, float]]
-"""Kind of the unit of each column, a key of `KINDS_OF_UNITS` or empty, and the size of our unit."""
+"""Type of unit of each column, a key of `KINDS_OF_UNITS` or empty, and the size of the internal unit."""
 _MARKED = frozenset({"x", "xx", "ja", "oui", "si", "sim"})
 _DMS = re.compile(
     r"([NSEW]?)\s*([+-]?)(\d+(?:[.,]\d*)?)"
@@ -56,11 +56,11 @@ _DMS = re.compile(
 
 
 def degrees(text: str) -> float:
-    """Return degrees from `47.37`, `47 22 12.3`, `47°22.205'`, `8°32'24.5" W` or `S 8:32:24.5`."""
+    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`."""
     match = _DMS.fullmatch(text.strip())
     before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
     values = [float(part.replace(",", ".")) for part in parts if part]
-    # What is followed by smaller units is whole.
+    # A value with smaller units after it is an integer.
     if not match or (before and behind) or not all(each.is_integer() for each in values[:-1]):
         raise ValueError(f"{quoted(text)} must be an angle in degrees, minutes and seconds")
     if any(each >= 60 for each in values[1:]):
@@ -71,19 +71,18 @@ def degrees(text: str) -> float:
 
 @dataclass(frozen=True)
 class Columns:
-    """What a user says of the columns of a table."""
+    """User-defined meaning of the columns of a table."""
 
-    # Which heading each column of ours has; `-` before it: with the other sign, `[ft]` behind it: the
-    # unit
+    # Heading of each internal column; a leading `-` reverses the sign, a trailing `[ft]` is the unit
     headings: Mapping[str, str] = field(default_factory=dict)
-    # Our columns in the order of the table, for one without a header; `-` is not read
+    # Internal columns in the order of a table without header; `-` is not read
     order: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()  # Headings that are not read
-    # What words of the column `use` mean: control, check, off
+    # Meaning of words of the column `use`: control, check, off
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
-        """Return the names of all columns of a table, that knows some, from what the file calls them."""
+        """Return the internal names of all columns from the headings of a file."""
         names = [""] * len(own)
         for column, heading in self.headings.items():
             for place in _places(heading, own):
@@ -98,7 +97,7 @@ class Columns:
             if names[k] or not heading:
                 continue
             if heading in known:
-                # Where a user says that another is this column, this is none.
+                # The user has assigned another column, so this one is not used.
                 names[k] = "" if heading in self.headings else heading
                 continue
             meaning = bare_name(heading, known) or column_of(heading) or ""
@@ -120,12 +119,12 @@ PLAIN = Columns()
 
 
 def is_photo(heading: str) -> bool:
-    """Whether a heading is the column of photos."""
+    """Return whether a heading is the column of photos."""
     return " ".join(words_of(heading)) in PHOTO_WORDS
 
 
 def _places(heading: str, own: Sequence[str]) -> list[int]:
-    """Return the place of a column that a user names: as it is written, else by its words; none, or one."""
+    """Return the index of the column of a user's heading; at most one."""
     plain = heading.strip().lower()
     for given in (plain, plain.removeprefix("-").strip(), plain.removeprefix("-").partition("[")[0].strip()):
         found = [k for k, each in enumerate(own) if each == given] or [
@@ -137,7 +136,7 @@ def _places(heading: str, own: Sequence[str]) -> list[int]:
 
 
 def columns_given(columns: str | None, roles: str | None) -> Columns:
-    """Return what `point=Name,x=Rechtswert`, `point,x,y,z,-` or `PNEZD` say, and `KP=check` of roles."""
+    """Return columns of `point=Name,x=Rechtswert` or `PNEZD`, and roles."""
     headings, ignored, order = dict[str, str](), list[str](), list[str]()
     words = [each.strip() for each in (columns or "").split(",") if each.strip()]
     if len(words) == 1 and set(words[0].lower()) <= set(SHORT) and len(words[0]) > 2:
@@ -176,7 +175,7 @@ def settled(
     name: str,
     messages: list[Message],
 ) -> ColumnTable:
-    """Return a table of points with its columns in our units, and roles in our words."""
+    """Return a table of points with standard column names, units and role words."""
     missing = [
         each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
     ]
@@ -220,7 +219,7 @@ def in_units(
     messages: list[Message],
     headings: Mapping[str, str] = MappingProxyType({}),
 ) -> ColumnTable:
-    """Return a table with its numbers in our units, by the units and coverage factors of its headings."""
+    """Return a table in internal units, by units and factors of its headings."""
     ready, remarks = dict(table.ready), list[Phrase]()
     for column, own in table.headings:
         heading = headings.get(column, own)
@@ -259,7 +258,7 @@ def in_units(
 
 
 def _has_notes(column: str, own: str, word: str) -> bool:
-    """Whether a word in brackets of a heading may be a note: X (UTM32), or degrees of longitudes."""
+    """Return whether a word in brackets may be a note, as in X (UTM32)."""
     angle = word in KINDS_OF_UNITS["angle"]
     units = any(word in known for known in KINDS_OF_UNITS.values())
     if column.startswith("sd") and "%" in word:
@@ -268,12 +267,12 @@ def _has_notes(column: str, own: str, word: str) -> bool:
 
 
 def is_geographic(table: ColumnTable) -> bool:
-    """Whether the columns x and y of a table are longitudes and latitudes."""
+    """Return whether the columns x and y of a table are longitudes and latitudes."""
     return all(axis in table and is_angular(heading_of(table, axis)) for axis in ("x", "y"))
 
 
 def heading_of(table: ColumnTable, column: str) -> str:
-    """Return what a table calls one of our columns."""
+    """Return the heading of an internal column in a table."""
     return dict(table.headings).get(column) or column
 
 
@@ -284,7 +283,7 @@ def _on_axis(other: str, text: str) -> float:
 
 
 def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
-    """Take the column with the names that have images, where several could have the names."""
+    """Select the column of names with the most observed points."""
     found = [
         column for column, own in table.headings if column in ("point", NAMELESS) or column_of(own) == "point"
     ]
@@ -302,7 +301,7 @@ def _with_points(table: ColumnTable, names: Collection[str], messages: list[Mess
 
 
 def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -> ColumnTable:
-    """Return a table whose column `use` says control, check and off, whatever says it there."""
+    """Return a table with control, check and off in its column `use`."""
     headings = dict(table.headings)
     words = {
         column: [_role(cell, columns) for cell in table.texts(column)]
@@ -314,7 +313,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         if meaning in _FLAGS and not any(words[column]):
             words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
         elif not sure and not any(words[column]):
-            del words[column]  # types of something else
+            del words[column]  # Types of something else
     if len(words) > 1:
         several = [headings[column] for column in words]
         raise table.head.error(phrase("columns.several-roles", names=several))
@@ -330,7 +329,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
 
 
 def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
-    """Return columns of roles: by their names, else those of texts that are the words for check points."""
+    """Return columns of roles, by heading, otherwise by their words."""
     found = [
         column
         for column, own in table.headings
@@ -380,7 +379,7 @@ def _settled_roles(table: ColumnTable, column: str, found: Sequence[str | None])
 def check_unread(
     table: ColumnTable, columns: Columns, known: Collection[str], name: str, messages: list[Message]
 ) -> None:
-    """Reject unknown columns of numbers of strict tables; report other unknown columns."""
+    """Reject unknown numeric columns of strict tables; report other ones."""
     others = _unread(table, known)
     numbers = [
         own
@@ -399,7 +398,7 @@ def check_unread(
 
 
 def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]:
-    """Return columns that nobody reads, by their names here and in the file."""
+    """Return unread columns, by internal name and heading."""
     return [
         (column, own or column)
         for column, own in table.headings
@@ -423,7 +422,7 @@ def _is_number(cell: str) -> bool:
 
 
 def guess(table: ColumnTable, known: Collection[str]) -> str:
-    """Return the option that says what columns are, guessed from their cells."""
+    """Return a `--columns` option guessed from the cells."""
     free = [own for column, own in _unread(table, known) if column_of(own) != ""]
     numeric = [own for column, own in _unread(table, known) if own in free and _is_numeric(table, column)]
     found = []
@@ -438,7 +437,7 @@ def guess(table: ColumnTable, known: Collection[str]) -> str:
 
 
 def nameless(cells: Sequence[str]) -> Phrase:
-    """Return what is wrong with a record that should name columns, and names none that is known."""
+    """Return the error of a header record without a known column name."""
     numbers = [k for k, cell in enumerate(cells) if _is_number(cell)]
     if len(numbers) < 2:
         guesses = zip(("point", "x", "y", "z"), cells, strict=False)

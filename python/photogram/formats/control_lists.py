@@ -1,4 +1,4 @@
-"""Control with its measurements in files of OpenSfM: `gcp_list.txt`, `ground_control_points.json`."""
+"""Control lists of OpenSfM: `gcp_list.txt`, `ground_control_points.json`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 WGS84 = "EPSG:4979"
-SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")  # How the first line of a list begins, in capital letters
+SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")  # First words of a list, in capital letters
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
 _IMAGES = ("photo", "point", "column", "row")
@@ -26,16 +26,16 @@ _IMAGES = ("photo", "point", "column", "row")
 
 @dataclass(frozen=True)
 class ControlList:
-    """Control points in a system of coordinates, and where they were measured."""
+    """Control points in a coordinate system, and their image observations."""
 
     control: ColumnTable  # A table `point, x, y, z`
     images: ColumnTable  # A table `photo, point, column, row`, pixels from the corner
-    crs: str  # Of the control
+    crs: str  # System of the control
     messages: list[Message]  # Remarks
 
 
 def read_control_list(path: Path, project: Project) -> ControlList | None:
-    """Read a list of control points with their measurements; None where a file is a table."""
+    """Read a list of control points with image observations; return None for a table."""
     if path.suffix.lower() == ".json":
         return _of_json(path, project)
     first = next((line.strip() for line in read_lines(path) if line.strip()), "")
@@ -45,7 +45,7 @@ def read_control_list(path: Path, project: Project) -> ControlList | None:
 
 
 def system_of(line: str, place: Place) -> str:
-    """Return the system of the first line of a list: `WGS84`, `WGS84 UTM 32N`, `EPSG:n`, `+proj=...`."""
+    """Return the system in the first line of a list, e.g. `WGS84 UTM 32N`."""
     if line.upper() == "WGS84":
         return WGS84
     if line.upper().startswith(("EPSG:", "+PROJ=")):
@@ -79,7 +79,7 @@ def _of_text(path: Path) -> ControlList:
         if points.setdefault(name, position) != position and _apart(points[name], position):
             raise place.error(phrase("control-list.position", point=name, record=places[name]))
         places.setdefault(name, place.record or 0)
-        # Pixels count from the middle of the first pixel.
+        # Pixels count from the centre of the first pixel.
         corner = (repr(finite_number(word) + 0.5) for word in words[3:5])
         images.append((words[5], name, *corner))
         records.append(place.record or 0)

@@ -1,7 +1,7 @@
-"""Control in another system than the photos: named before the adjustment, with the option that mends it.
+"""Detection of control in another system than the photos, before the adjustment.
 
-What people exchange is tried: east and north, signs, feet, millimetres, zones before eastings, no system
-named. It is named where control then fits the photos ten times as well.
+Common mistakes are tested: east and north, signs, feet, millimetres, zones before eastings, missing systems.
+A mistake is reported with its remedy if its correction improves the fit ten times.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.words import Phrase, phrase
 
-BETTER = 10.0  # How much better control must fit after an exchange for it to be named
-FITS = 0.2  # Part of the extent of control: what misfits by less is in its place, as far as first values tell
-FAR = 100.0  # Extents of photos and control that their middles are apart where they are in different systems
+BETTER = 10.0  # Ratio of misfits that a correction must reach to be reported
+FITS = 0.2  # Misfit, relative to the extent of control, below which control agrees with initial values
+FAR = 100.0  # Distance of photos from control, in extents, that indicates different systems
 ZONE = 1e6
 
 Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]
@@ -36,12 +36,12 @@ Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]
 def check_systems(
     project: Project, settings: Settings, table: ColumnTable, points: Indices, values: Floats, *, free: bool
 ) -> list[Message]:
-    """Refuse control that fits the photos only after an exchange, or lies far from them all.
+    """Reject control that fits only after a correction, or is far away.
 
-    `points`: (k,) points of the project; `values`: (k, 3) their coordinates as the table has them;
-    `free`: whether the model of the project may be carried onto control by a similarity.
+    `points`: (k,) points of the project; `values`: (k, 3) their coordinates in the table;
+    `free`: whether a similarity may transform the model of the project onto control.
 
-    Returns a remark if photos look at flat control from below, since control does not determine its side.
+    Returns a remark if photos are below flat control, since control does not determine the side.
     """
     known = np.isfinite(values).all(axis=1)
     points, values = points[known], values[known]
@@ -58,7 +58,7 @@ def check_systems(
         return []
 
     def misfit(own: Settings, xyz: Floats) -> tuple[float, float]:
-        """Return by how much control misfits, and its extent; infinite where it has no place."""
+        """Return misfit and extent of control; infinite without transformation."""
         try:
             placed, _ = Transform(own, []).positions("control", xyz, None, table)
         except InputError:
@@ -115,14 +115,14 @@ def _swapped(xyz: Floats) -> Floats:
 
 
 def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
-    """Whether stations come to stand below control by the similarity that carries their model onto it."""
+    """Return whether control is above the transformed stations."""
     scale, turn, shift, misfit = similarity(model, placed)
     heights = (scale * stations @ turn.T + shift)[:, 2]
     return bool(np.isfinite(misfit) and (heights < placed[:, 2].min()).all())
 
 
 def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Exchange]:
-    """Yield mistakes of control with their remedies; a similarity cannot see scales and signs."""
+    """Yield corrections of control with their remedies."""
     x, y, z = (heading_of(table, axis) for axis in "xyz")
     yield phrase("control-system.swapped"), _swap(table), _swapped
     feet = phrase("control-system.unit", name=z, unit="ft")
@@ -143,7 +143,7 @@ def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Ex
 
 
 def _systems(project: Project, settings: Settings) -> Iterator[tuple[str, Settings]]:
-    """Yield systems that control without one may have where the project has a place on the earth."""
+    """Yield possible systems of control without one, if the project is georeferenced."""
     if settings.crs.get("control") or project.frame.kind != "topocentric" or project.frame.origin is None:
         return
     latitude, longitude, _ = project.frame.origin

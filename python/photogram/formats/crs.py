@@ -1,7 +1,7 @@
-"""Coordinate reference systems: in from any that PROJ knows to a cartesian frame, and back.
+"""Coordinate reference systems: from any system of PROJ to a frame, and back.
 
-x is the longitude or easting, y the latitude or northing, z the height, whatever order an authority has.
-A topocentric frame has its axes to the east, north and up of the ellipsoid of WGS 84 at its origin.
+x is longitude or easting, y latitude or northing, z height, in any axis order of the authority. The axes of a
+topocentric frame are east, north and up of the ellipsoid of WGS 84 at its origin.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import pyproj
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
-ORIGIN_DECIMALS = 4  # Of the degrees of a chosen origin; its height is rounded to a metre
+ORIGIN_DECIMALS = 4  # Decimals of degrees of a chosen origin; its height is rounded to a metre
 _ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
 _GEOID = re.compile(r"\+geoid=([-+]?\d+(?:\.\d*)?)\s*$", re.IGNORECASE)
-"""Behind a system: the height of the geoid above the ellipsoid, one for all."""
-STEP = 1.0  # Metres, for the directions of the axes of a system at a point
+"""Suffix of a system: the height of the geoid above the ellipsoid, one for all points."""
+STEP = 1.0  # Step in metres for the axis directions of a system at a point
 
 
 @cache
@@ -36,7 +36,7 @@ def _system(crs: str) -> pyproj.CRS:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)  # of spellings that PROJ would like to drop
+            warnings.simplefilter("ignore", FutureWarning)  # About spellings that PROJ deprecates
             return pyproj.CRS.from_user_input(without_geoid(crs))
     except pyproj.exceptions.CRSError as error:
         raise InputError(phrase("crs.unknown", crs=crs, reason=str(error))) from None
@@ -44,7 +44,7 @@ def _system(crs: str) -> pyproj.CRS:
 
 @cache
 def _transformer(source: str, target: str) -> Any:
-    """Return a transformation that never passes heights through for want of a grid."""
+    """Return a transformation that fails if a grid of heights is missing."""
     import pyproj
 
     first, second = _system(source), _system(target)
@@ -86,26 +86,26 @@ def geocentric(crs: str, xyz: Floats) -> Floats:
         return _geocentric_of(local) + xyz @ east_north_up(local)
     system = _system(crs)
     if len(system.axis_info) == 2:
-        # Heights pass through a system of two dimensions; the ellipsoidal one that belongs to it says so.
+        # A two-dimensional system receives ellipsoidal heights of its three-dimensional counterpart.
         return _transformed(_with_heights(crs), GEOCENTRIC, xyz + _geoid(crs))
     return _transformed(crs, GEOCENTRIC, xyz + _geoid(crs))
 
 
 def _geoid(crs: str) -> Floats:
-    """Return (3,) what carries heights above the geoid, whose height is written behind a system, up."""
+    """Return the (3,) correction from heights above the geoid."""
     match = _GEOID.search(crs)
     return np.array([0.0, 0.0, 0.0 if match is None else float(match[1])])
 
 
 def has_geoid_heights(crs: str) -> bool:
-    """Whether the heights of a system are above the geoid (or sea level), and not above the ellipsoid."""
+    """Return whether heights refer to the geoid instead of the ellipsoid."""
     if enu_origin(crs) is not None:
         return False
     return _GEOID.search(crs) is not None or bool(_system(crs).is_compound)
 
 
 def without_geoid(crs: str) -> str:
-    """Return a system without the height of the geoid behind it, as other programs know it."""
+    """Return a system without its geoid height, for other programs."""
     return _GEOID.sub("", crs)
 
 
@@ -115,7 +115,7 @@ def _with_heights(crs: str) -> str:
 
 
 def enu_origin(crs: str) -> tuple[float, float, float] | None:
-    """Return latitude, longitude and height of a system that is written as `ENU:lat,lon[,h]`."""
+    """Return latitude, longitude and height of a system `ENU:lat,lon[,h]`."""
     match = _ENU.fullmatch(crs)
     if match is None:
         return None
@@ -123,7 +123,7 @@ def enu_origin(crs: str) -> tuple[float, float, float] | None:
 
 
 def east_north_up(origin: tuple[float, float, float]) -> Floats:
-    """Return (3, 3) E: rows are the directions east, north and up at a place, in geocentric axes."""
+    """Return (3, 3) rows: east, north and up at a position, geocentric."""
     lat, lon = np.radians(origin[:2])
     return np.array(
         [
@@ -141,7 +141,7 @@ def _geocentric_of(origin: tuple[float, float, float]) -> Floats:
 
 
 def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
-    """Return latitude, longitude and height amid positions, rounded."""
+    """Return the rounded latitude, longitude and height of the mean of positions."""
     middle = _transformed(GEOCENTRIC, GEOGRAPHIC, geocentric(crs, xyz).mean(axis=0)[np.newaxis])[0]
     return (
         round(float(middle[1]), ORIGIN_DECIMALS),
@@ -151,12 +151,12 @@ def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
 
 
 def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
-    """Carry positions into the frame of a project.
+    """Transform positions into the frame of a project.
 
     Parameters
     ----------
     crs
-        The system of the positions.
+        System of the positions.
     xyz
         (n, 3) longitude or easting, latitude or northing, height.
     covariances
@@ -166,12 +166,12 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
 
     Returns
     -------
-    (n, 3) positions and (n, 3, 3) covariances in the frame, and what is to be said about it.
+    (n, 3) positions and (n, 3, 3) covariances in the frame, and remarks.
 
     Raises
     ------
     InputError
-        As for :func:`geocentric`.
+        If a system is unknown or a position cannot be transformed.
     """
     remarks = _remarks(crs)
     earth = geocentric(crs, xyz)
@@ -191,31 +191,33 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
 
 
 def turned_covariances(turns: Floats, covariances: Floats) -> Floats:
-    """Return (n, 3, 3) covariances along turned axes; one variance of all axes stays to the last bit."""
+    """Return (n, 3, 3) covariances along rotated axes; isotropic ones exactly."""
     alike = covariances[:, :1, :1] * np.eye(3)
     return alike + turns @ (covariances - alike) @ turns.swapaxes(-1, -2)
 
 
 def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats]:
-    """Carry positions of a frame into a system, with covariances along its own east, north and up, metres.
+    """Transform positions and covariances of a frame into a system.
+
+    Covariances refer to east, north and up of the system, square metres.
 
     Raises
     ------
     InputError
-        As :func:`to_system`.
+        If the position of the frame on the earth is unknown, or a position cannot be transformed.
     """
     found, turns = to_system(crs, xyz, frame)
     return found, turned_covariances(turns, covariances)
 
 
 def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
-    """Carry positions of a frame into a system.
+    """Transform positions of a frame into a system.
 
     `xyz`: (n, 3) in the frame; of a geographic one longitude and latitude in radians.
 
-    Returns (n, 3) positions: longitude or easting, latitude or northing, height; and (n, 3, 3) what turns
-    vectors along the axes of the frame (of a geographic one east, north and up at each position) into
-    vectors along those of the system.
+    Returns (n, 3) positions: longitude or easting, latitude or northing, height; and (n, 3, 3) rotations of
+    vectors from the axes of the frame to the axes of the system. Axes of a geographic frame are east, north
+    and up at each position.
     """
     if frame.kind in ("cartesian", "geographic") and frame.crs == crs and crs:
         own = (
@@ -233,16 +235,16 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 
 def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
-    """Whether a system has longitudes and latitudes on an ellipsoid of these semi-axes, metres."""
+    """Return whether a system is geographic on this ellipsoid (semi-axes, m)."""
     if enu_origin(crs) is not None or not _system(crs).is_geographic:
         return False
     own = _system(crs).ellipsoid
     axes = (own.semi_major_metre, own.semi_minor_metre) if own is not None else (0.0, 0.0)
-    return bool(np.allclose(axes, ellipsoid, rtol=0, atol=0.01))  # the axes of cards have two decimals
+    return bool(np.allclose(axes, ellipsoid, rtol=0, atol=0.01))  # Semi-axes in cards have two decimals
 
 
 def has_place(frame: Frame) -> bool:
-    """Whether it is known where on the earth a frame is."""
+    """Return whether the position of a frame on the earth is known."""
     return (
         (frame.kind == "topocentric" and frame.origin is not None)
         or frame.kind == "geocentric"
@@ -252,14 +254,14 @@ def has_place(frame: Frame) -> bool:
 
 
 def _geographic(frame: Frame) -> str:
-    """Return the system of a geographic frame; nothing where its ellipsoid alone is known."""
+    """Return the system of a geographic frame; empty if only its ellipsoid is known."""
     if frame.crs:
         return frame.crs
     return GEOGRAPHIC if np.allclose(frame.ellipsoid, Frame().ellipsoid, rtol=0, atol=1e-3) else ""
 
 
 def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
-    """Return geocentric positions, and (n, 3, 3) rows: the axes of the frame there in geocentric axes."""
+    """Return geocentric positions, and (n, 3, 3) local axes of the frame as rows."""
     if not has_place(frame):
         raise InputError(phrase("crs.place", frame=frame.phrase))
     if frame.kind == "topocentric" and frame.origin is not None:
@@ -275,7 +277,7 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 
 def is_projected(crs: str) -> bool:
-    """Whether a system is a plane: positions in it are eastings and northings of a projection."""
+    """Return whether a system has eastings and northings of a projection."""
     if enu_origin(crs) is not None:
         return False
     system = _system(crs)
@@ -283,7 +285,7 @@ def is_projected(crs: str) -> bool:
 
 
 def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
-    """Return the names and units of the three coordinates of a system: angles in degrees."""
+    """Return names and units of the three coordinates; angles in degrees."""
     if enu_origin(crs) is not None:
         return ("east", "north", "up"), ("m", "m", "m")
     system = _system(crs)
@@ -295,9 +297,9 @@ def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
 
 
 def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
-    """Return (n, 3, 3) rows: the directions of a system's axes at points, in geocentric axes.
+    """Return (n, 3, 3) rows: axes of a system at points, geocentric.
 
-    Of a projected system they are those of its grid, so that the convergence of meridians is in them.
+    The axes of a projected system are grid axes, so they include the convergence of meridians.
     """
     if (local := enu_origin(crs)) is not None:
         return np.broadcast_to(east_north_up(local), (len(xyz), 3, 3)).copy()
@@ -335,7 +337,7 @@ def _remarks(crs: str) -> list[Phrase]:
 
 
 def turn_to_frame(crs: str, xyz: Floats, frame: Frame) -> Floats:
-    """Return (n, 3, 3) what carries attitudes relative to the local axes of a system into a frame."""
+    """Return (n, 3, 3) rotations of local attitudes of a system into a frame."""
     if frame.kind != "topocentric" or frame.origin is None:
         raise InputError(phrase("crs.attitudes", crs=crs, frame=frame.phrase))
     found: Floats = east_north_up(frame.origin) @ _axes(crs, xyz, geocentric(crs, xyz)).transpose(0, 2, 1)

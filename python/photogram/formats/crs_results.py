@@ -1,4 +1,4 @@
-"""Results in a coordinate reference system: positions, covariances in metres east, north, up, attitudes."""
+"""Results in a coordinate reference system: positions, covariances, attitudes."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ __all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
-DEGREE = 180.0 / np.pi  # Of a radian
-MOST = 500  # Points that are listed; the tables have all
+DEGREE = 180.0 / np.pi  # Degrees per radian
+MOST = 500  # Largest number of listed points; tables contain all
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A result in a system.
+    """A result in a coordinate reference system.
 
     Attributes
     ----------
     result
         The result.
     crs
-        The system, as it was asked for.
+        The requested system.
     names, units
-        Of the three coordinates.
+        Names and units of the three coordinates.
     rows
-        (k,) the points that took part.
+        (k,) points used in the adjustment.
     photos, points
         (P, 3) and (k, 3) positions: longitude or easting, latitude or northing, height; angles in degrees.
     photo_covariances, point_covariances
-        (P, 3, 3) and (k, 3, 3), along east, north and up of the system (of a projected one along its grid),
-        square metres.
+        (P, 3, 3) and (k, 3, 3), along east, north and up of the system (grid axes of a projected one), square
+        metres.
     photo_turns, point_turns
-        (P, 3, 3) and (k, 3, 3) what turns vectors of the block's own axes into these.
+        (P, 3, 3) and (k, 3, 3) rotations of vectors from the axes of the block to these axes.
     attitudes
-        Of the photos, relative to these axes at each photo.
+        Attitudes of the photos relative to these axes at each photo.
     """
 
     result: Result
@@ -72,9 +72,9 @@ class Placed:
     attitudes: Attitudes
 
     def angles(self) -> tuple[Floats, Floats]:
-        """Return (P, 3) omega, phi, kappa relative to the system's axes, and their standard deviations: rad.
+        """Return (P, 3) omega, phi, kappa and standard deviations, radians.
 
-        Their sense is that of the block.
+        The sense of the angles is the one of the block.
         """
         kind = _representation(self.result.block)
         if self.attitudes.step_covariances is None:
@@ -82,11 +82,11 @@ class Placed:
         return self.attitudes.values(kind), self.attitudes.standard_deviations(kind)
 
     def carried(self, xyz: Floats) -> Floats:
-        """Return (n, 3) other positions of the block in the system."""
+        """Transform (n, 3) positions of the block into the system."""
         return _carried(self.result.block, self.crs, check_place(self.result.block, self.crs), xyz)[0]
 
     def moved(self, places: Floats, steps: Floats) -> Floats:
-        """Return (n, 3) places of the system moved by (n, 3) steps to the east, north and up, metres."""
+        """Shift (n, 3) positions of the system by (n, 3) metres east, north, up."""
         if self.names[0] != "longitude":
             return places + steps
         known = np.column_stack([np.radians(places[:, :2]), places[:, 2]])
@@ -94,10 +94,10 @@ class Placed:
         return places + steps / lengths * [DEGREE, DEGREE, 1.0]
 
     def control_differences(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) differences of control, adjusted minus given: metres.
+        """Return rows and (c, 3) differences adjusted minus given of control, metres.
 
-        They are along east, north and up; components that are not held are 0 before they are turned. Control
-        that is observed with a covariance matrix is behind the other control.
+        Rows are among all points. Differences are along east, north and up. Differences of free components
+        are 0 before the rotation. Control observed with a covariance matrix follows the other control.
         """
         control = self.result.control
         names, observed = _observed_differences(self.result)
@@ -109,7 +109,7 @@ class Placed:
         return rows, _turned(own, differences)
 
     def differences(self) -> tuple[Indices, Floats]:
-        """Return rows among all points, and (c, 3) adjusted minus given of check points, likewise."""
+        """Return rows and (c, 3) adjusted minus given of check points, metres."""
         result = self.result
         own = result.point_kinds[self.rows] == "check"
         rows = self.rows[own]
@@ -117,10 +117,9 @@ class Placed:
 
 
 def check_place(block: Block, crs: str) -> Frame:
-    """Return the frame of a block whose results are to be brought to a system; nothing asks for none.
+    """Return the frame of a block for results in a system.
 
-    Longitudes and latitudes of which only the ellipsoid is known are those of a system on this ellipsoid that
-    is asked for: the block has no other datum.
+    If only the ellipsoid of longitudes and latitudes is known, the requested system defines their datum.
     """
     frame = frame_of(block)
     if not crs:
@@ -138,21 +137,21 @@ def check_place(block: Block, crs: str) -> Frame:
 
 
 def placed(result: Result, crs: str = "") -> Placed:
-    """Return a result in a system.
+    """Transform a result into a coordinate reference system.
 
     Parameters
     ----------
     result
-        The result of a block in a frame whose place on the earth is known.
+        Result of a block in a frame with a known position on the earth.
     crs
-        The system: `EPSG:25832`, `EPSG:4979`, `ENU:lat,lon[,h]` ... Heights of one without heights are
-        ellipsoidal. None (empty): the block's own axes.
+        The system: `EPSG:25832`, `EPSG:4979`, `ENU:lat,lon[,h]` ... Heights are ellipsoidal if the system has
+        none. Empty: the axes of the block.
 
     Raises
     ------
     InputError
-        A frame without a place, lengths that are not metres, or a system that does not go: one that PROJ does
-        not know, heights for which a grid is missing, positions beyond it.
+        If the position of the frame on the earth is unknown, or lengths are not metres. If PROJ does not know
+        the system, lacks a grid for heights, or cannot transform a position.
     """
     block = result.block
     rows = np.flatnonzero(result.used_points)
@@ -187,7 +186,7 @@ def placed(result: Result, crs: str = "") -> Placed:
 
 
 def placed_files(found: Placed) -> dict[str, bytes]:
-    """Return the tables of a result in a system as text of commas: photos, points, control, check points."""
+    """Return CSV tables of a result in a system."""
     block = found.result.block
     ids = np.array(block.point_ids, dtype=object)
     angles, deviations = (np.degrees(each) for each in found.angles())
@@ -223,7 +222,7 @@ def placed_files(found: Placed) -> dict[str, bytes]:
 
 
 def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats, Floats]:
-    """Return positions of a block in a system, and what turns vectors; without one they stay as they are."""
+    """Return positions in a system, and rotations of vectors."""
     if crs:
         return to_system(crs, xyz, frame)
     degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
@@ -252,13 +251,13 @@ def _own_attitudes(result: Result) -> Attitudes:
 
 
 def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
-    """Return differences of positions of points in the linear unit; 0 where there are none."""
+    """Return position differences in linear units; 0 for missing values."""
     lengths = lengths_of_units(result.point_positions[rows], result.block.spheroid)
     return np.where(np.isnan(differences), 0.0, differences * lengths)
 
 
 def _observed_differences(result: Result) -> tuple[list[str], Floats]:
-    """Return names and (c, 3) adjusted minus observed positions of control with a covariance matrix."""
+    """Return names and (c, 3) differences of control with covariances."""
     kind = result.kinds.get(Control.KIND)
     if kind is None:
         return [], np.zeros((0, 3))
@@ -272,10 +271,9 @@ def _turned(turns: Floats, vectors: Floats) -> Floats:
 
 
 def placed_section(found: Placed) -> Section:
-    """Return adjusted control and check points in the system of a client, with standard deviations.
+    """Return the section of adjusted control and check points in a system.
 
-    Standard deviations and differences from given positions are along east, north and up of the system, in
-    metres.
+    Standard deviations and differences from given positions are in metres along east, north and up.
     """
     names, kinds = found.result.block.point_ids, found.result.point_kinds
     own = [k for k, row in enumerate(found.rows.tolist()) if kinds[row] != "pass"]
@@ -310,6 +308,6 @@ def placed_section(found: Placed) -> Section:
 
 
 def _listed_differences(found: Placed) -> dict[int, list[float]]:
-    """Return adjusted minus given of control and check points, by their rows among all points."""
+    """Return differences of control and check points by row of points."""
     pairs = (found.differences(), found.control_differences())
     return {row: own for rows, d in pairs for row, own in zip(rows.tolist(), d.tolist(), strict=True)}

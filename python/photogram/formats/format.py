@@ -1,4 +1,4 @@
-"""What a format is: how its files are known, and how projects are read from them and written to them."""
+"""Definition of a format: recognition, reader and writer of its files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Format", "GnssFile", "PhotoFiles", "Wishes", "later"]
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a call of a function whose module is loaded when it is called: most projects have one format."""
+    """Return a function that imports its module at the first call."""
 
     def call(*arguments: Any) -> Any:
         return getattr(import_module(module), name)(*arguments)
@@ -27,16 +27,16 @@ def later(module: str, name: str) -> Callable[..., Any]:
 
 @dataclass(frozen=True)
 class PhotoFiles:
-    """A folder of photographs, and what a user says of the positions that its files carry.
+    """A folder of photographs, and user settings for the positions in its files.
 
     Attributes
     ----------
     directory
         The folder.
     crs
-        The system of positions whose source does not say it, or not what heights are above (EXIF).
+        System of positions if their source does not name it or the reference of its heights (EXIF).
     mrk_antenna
-        Whether positions of .MRK files are those of the antenna.
+        Whether positions of .MRK files are antenna positions.
     """
 
     directory: Path
@@ -46,12 +46,12 @@ class PhotoFiles:
 
 @dataclass(frozen=True)
 class GnssFile:
-    """A file with positions of photos, and what a user specifies about them.
+    """A file with positions of photos, and user settings for them.
 
     Attributes
     ----------
     path
-        A table of photo, x, y, z, a geolocation file of Pix4D, a reference of Metashape, `geo.txt` of
+        A table of photo, x, y, z. Or a geolocation file of Pix4D, a reference of Metashape, `geo.txt` of
         OpenDroneMap, an .MRK file of DJI, or events of RTKLIB (`*_events.pos`).
     crs
         The system of positions if the file does not name it; None: the frame of the project.
@@ -78,32 +78,32 @@ class GnssFile:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a user says of files that do not say it themselves.
+    """User settings that complete the contents of files.
 
     Attributes
     ----------
     cameras
-        A table of cameras (that of the plain project) for formats without; None: those of the files.
+        Camera table (as in the plain project) for formats without cameras; None: cameras of the files.
     pixel_origin
-        `corner` or `center` of the first pixel is 0, 0, in tables of pixels; None: as the format has it.
+        `corner` or `center` of the first pixel is 0, 0 in tables of pixels; None: as defined by the format.
     model
-        Which of several models of one file, counted from 0; None: the largest.
+        Index of the model in a file with several, from 0; None: the largest.
     angles
-        `deg`, `gon` or `rad` where a file has angles and does not say which.
+        `deg`, `gon` or `rad`, for files that do not specify the unit of their angles.
     sd
-        Standard deviations by table where files have none: one number or three.
+        Standard deviations by table for files without them: one number or three.
     columns
-        What the columns of the control of a plain project are.
+        Meaning of the columns of the control table of a plain project.
     photos
-        Where its photographs lie, whose files carry positions; None: as the project says.
+        Folder of its photographs with positions; None: as in the project.
     gnss
         A file with positions of photos, which become observations; None: without.
     cubes
         The list of cubes or ISDs of a control network.
     jigsaw
-        How a control network is adjusted: settings by the names of jigsaw, or the path of a file with them.
+        Adjustment settings of a control network by names of jigsaw, or the path of a file with them.
     settings
-        What the settings of a plain project say otherwise: `section.key=value`.
+        Settings that replace settings of a plain project: `section.key=value`.
     """
 
     cameras: Path | None = None
@@ -126,31 +126,33 @@ class Format:
     Attributes
     ----------
     name
-        As commands and functions take it.
+        Name in commands and functions.
     title
-        As people are told what lies there.
+        Name in text for users.
     recognises
-        Whether what lies at a path is meant for one; it reads no more than the beginning of a file.
+        Function of a path: whether it contains a project of the format. Reads only the start of a file.
     read
-        A project. Raises `InputError` that names file, record and what stands there, and nothing else.
+        Function that returns a project. Its only error is `InputError`, with file, record and text.
     write
-        The files of a project, by their names below a directory; None where the format is only read.
+        Function that returns the files of a project by name relative to a directory; None if the format is
+        read-only.
     cannot_hold
-        Parts of a project that the format cannot contain.
+        Function that returns the parts of a project that the format cannot contain.
     results
-        Files with what an adjustment found that go beside an adjusted project in the format; None: none.
+        Function that returns files with adjustment results for the directory of an adjusted project; None:
+        none.
     files
-        The file that is written, the first of them where there are several, and patterns of the names by
-        which a user may say the format; empty for a format that is a folder.
+        The (first) file that is written, and patterns of names by which a user may select the format; empty
+        for a format that is a folder.
     pixels
-        Whether its images are pixels: what is written is in pixels, whatever the project has.
+        Whether image coordinates are in pixels; coordinates in other units are converted.
     geographic
-        Whether it holds longitudes and latitudes; what is written in others is in a topocentric frame.
+        Whether the format contains longitudes and latitudes; others receive a topocentric frame.
     folders
-        Names of folders that say the format, beside its own name.
+        Names of folders that select the format, in addition to its name.
     adjusting
-        Makes of a call that adjusts a block once, with options by name, what adjusts the block of a project
-        in the format as that asks for; None: once is all.
+        Function that converts a call that adjusts a block once, with options by name, to a call that adjusts
+        a project as its format requires; None: the block is adjusted once.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Projects in the coordinates that a format holds: pixels for millimetres, topocentric for geographic."""
+"""Conversion of projects to coordinates of a format: pixels, topocentric."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from photogram.network.geometry import (
 from photogram.network.motion import scanners
 from photogram.words import Phrase, phrase
 
-NOMINAL_MM = 0.01  # Side of a pixel where nothing says how large they are: rays are the same
-ROUND = 100  # Pixels: to whole ones of these go widths and heights that nothing says
+NOMINAL_MM = 0.01  # Side of a pixel (mm) of unknown size; it does not affect the rays
+ROUND = 100  # Pixels: rounding of unknown widths and heights
 ROUND_ORIGIN = 1e-4  # Degrees to which the origin is rounded; its height is 0
 
 
 def in_pixels(project: Project) -> Project:
-    """Return a project with the same rays whose cameras are given, and count pixels.
+    """Return a project with the same rays and image coordinates in pixels.
 
-    Millimetres are divided by the size of a pixel, or a nominal one; negative planes are turned by 180
-    degrees into positive ones. Pictures whose size is not known get one that holds all images, where
-    coordinates do not count from their corners. Rolling shutters, whose rows count as images did, stay
-    behind.
+    Millimetres are divided by the size of a pixel, or a nominal one. Negative planes are rotated by 180
+    degrees into positive ones. Cameras without image size get one that contains all observations, if
+    coordinates do not count from corners. Rolling shutters are omitted, as their rows count in the old
+    coordinates.
     """
     block = project.block
     if (strips := np.flatnonzero(scanners(block))).size:
@@ -80,14 +80,14 @@ def nominal_pixels(project: Project) -> list[Phrase]:
 
 
 def _unsized(project: Project) -> bool:
-    """Return whether pictures have no known size, and any will do."""
+    """Return whether a camera without image size does not need one."""
     cameras, _ = known_cameras(project.block)
     sizes = project.sizes or (None,) * len(cameras)
     return any(size is None and _is_free(each) for each, size in zip(cameras, sizes, strict=True))
 
 
 def _is_free(camera: Camera) -> bool:
-    """Return whether no coordinate depends on the size of a picture: they count from the middle or are mm."""
+    """Return whether coordinates do not depend on the image size."""
     return camera.image_y == "up" or camera.unit == "mm"
 
 
@@ -109,18 +109,18 @@ def _camera(camera: Camera, scale: float, negative: bool) -> Camera:
 
 
 def _size(camera: Camera, xy: Floats) -> Size:
-    """Return width and height of a picture that holds all images, about its middle where y goes up."""
+    """Return an image size that contains all observations."""
     reach = np.abs(xy).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
     width, height = (ROUND * math.ceil(each / ROUND) for each in reach.tolist())
     return width, height
 
 
 def in_topocentric(project: Project) -> Project:
-    """Return a geographic project in the axes east, north and up of a place amid its photos.
+    """Return a geographic project in a topocentric frame at its median photo.
 
-    The rays are the same. Standard deviations stay along the local axes, which differ from those of the
-    frame by the angle between the verticals; where a point is known in part, it is where its rays meet with
-    the components that are known. Observations beside images stay behind.
+    The rays are the same. Standard deviations refer to local axes, which differ from the axes of the frame by
+    the angle between the verticals. The unknown components of partly known points are intersected from their
+    rays. Other observations than image observations are omitted.
     """
     block = project.block
     if block.spheroid is None:
@@ -181,7 +181,7 @@ def in_topocentric(project: Project) -> Project:
 
 
 def topocentric_remarks(project: Project) -> list[Phrase | str]:
-    """Return remarks on a geographic project that is written in rectangular coordinates."""
+    """Return remarks on a geographic project in rectangular coordinates."""
     block = project.block
     if block.spheroid is None:
         return []
@@ -196,6 +196,6 @@ def topocentric_remarks(project: Project) -> list[Phrase | str]:
 
 
 def _origin(block: Block) -> Floats:
-    """Return (1, 3) the place amid the photos, on the ellipsoid."""
+    """Return (1, 3) the median position of the photos, on the ellipsoid."""
     middle = np.degrees(np.median(block.photo_positions[:, :2], axis=0))
     return np.array([[*np.radians(np.round(middle / ROUND_ORIGIN) * ROUND_ORIGIN), 0.0]])

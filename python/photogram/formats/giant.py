@@ -24,12 +24,12 @@ def _recognises(path: Path) -> bool:
     if not path.is_dir():
         return False
     present = present_files(path)
-    # Many folders hold files that are called cameras and images; only these have COMMON.
+    # Many folders contain files named cameras and images; only GIANT projects have COMMON.
     return bool(present["COMMON"] and present["IMAGES"])
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a project, with the refraction that its COMMON asks for."""
+    """Read a project, with the refraction of its COMMON."""
     del wishes
     found = read_project(path)
     block = found.to_block()

@@ -1,6 +1,6 @@
-"""Image coordinates of files and of cameras: pixels from the corner, or what a model counts in.
+"""Conversion of image coordinates between files and cameras.
 
-What needs the size of the pictures of a camera, and does not know it, is an :class:`photogram.InputError`.
+A missing image size is an :class:`photogram.InputError` if the conversion needs it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from photogram.words import phrase
 
 
 def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Floats]) -> Floats:
-    """Return (m, 2) image coordinates of which those of each camera are converted by themselves.
+    """Convert (m, 2) image coordinates camera by camera.
 
-    `xy`: (m, 2) image coordinates; `which`: (m,) the camera of each, by its row; -1: it stays as it is.
+    `xy`: (m, 2) image coordinates; `which`: (m,) row of the camera of each; coordinates with -1 are not
+    changed.
     """
     found = xy.copy()
     for row in np.unique(which[which >= 0]).tolist():
@@ -33,9 +34,9 @@ def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Float
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
-    """Return (m, 2) image coordinates of a camera in pixels from columns and rows from the upper-left corner.
+    """Convert columns and rows (m, 2) to image coordinates of a camera, pixels.
 
-    Models that count y upwards count from the middle of the picture.
+    Models with y up count from the image centre.
     """
     if camera.image_y == "down":
         return corner
@@ -45,7 +46,7 @@ def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
 
 
 def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Return (m, 2) columns and rows from the upper-left corner, of image coordinates in pixels."""
+    """Convert image coordinates in pixels to (m, 2) columns and rows."""
     if camera.image_y == "down":
         return xy
     width, height = known_size(camera, size)
@@ -53,7 +54,7 @@ def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
 
 
 def to_corner(project: Project) -> Floats:
-    """Return (m, 2) columns and rows from the upper-left corner, pixels; images in millimetres have none."""
+    """Return (m, 2) columns and rows from the upper-left corner, pixels."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
         raise InputError(phrase("format.pixels"))
@@ -64,28 +65,28 @@ def to_corner(project: Project) -> Floats:
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:
-    """Return the size of the pictures of a camera."""
+    """Return the image size of a camera; raise an error if it is unknown."""
     if size is None:
         raise InputError(phrase("format.image-size", camera=camera.title))
     return size
 
 
 def sizes_of(project: Project) -> Sequence[Size]:
-    """Return width and height of the pictures of each camera."""
+    """Return width and height of the images of each camera."""
     return [known_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]
 
 
 def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
-    """Return (m, 2) image coordinates in the unit of cameras; pixels count from the corner of the first.
+    """Return (m, 2) image coordinates in camera units, from the first corner.
 
-    `pixels` says that they are pixels: columns and rows, or samples and lines of scanners.
+    `pixels` is True for columns and rows, or samples and lines of scanners.
     """
     found = scaled(xy, 1e-3) if settings.image == "um" and not pixels else xy
     return found + 0.5 if pixels and settings.pixel_origin == "center" else found
 
 
 def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Return (m, 2) image coordinates along the axes of a camera, from those that tables have in its unit."""
+    """Convert image coordinates of tables to the axes of a camera."""
     if settings.image == "px" and settings.image_y == "down":
         return from_corner(camera, size, xy)
     if settings.image == "px" and camera.image_y == "down":
@@ -95,25 +96,25 @@ def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Float
 
 
 def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Return (m, 2) image coordinates as tables have them whose `[axes] image_y` this is."""
+    """Convert (m, 2) image coordinates of a camera to the axes of tables."""
     if camera.unit == "px" and image_y == "down":
         return in_corner(camera, size, xy)
     return xy if camera.image_y == image_y else xy * [1.0, -1.0]
 
 
 Y_DOWN: Floats = np.diag([1.0, -1.0, -1.0])
-"""Carries vectors between axes x right, y up, z back and axes x right, y down, z forward."""
+"""Transformation between axes x right, y up, z back and axes x right, y down, z forward."""
 
 
 def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
-    """Whether a (3, 3) matrix is orthonormal, up to the digits that a file has, and not mirrored."""
+    """Return whether a (3, 3) matrix is a rotation within the precision of a file."""
     with np.errstate(over="ignore", invalid="ignore"):
         apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
     return bool(apart < tolerance and np.linalg.det(matrix) > 0)
 
 
 def checked_rotation(place: Failing, matrix: Floats) -> Floats:
-    """Return a rotation matrix of a file, orthonormal to the last bits."""
+    """Return a rotation matrix of a file, orthonormalised; reject other matrices."""
     if not is_rotation(matrix):
         raise place.error(phrase("format.rotation"))
     found: Floats = matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2
@@ -122,7 +123,7 @@ def checked_rotation(place: Failing, matrix: Floats) -> Floats:
 
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
-"""Models that count from the middle of the picture, y up."""
+"""Models that count from the image centre, y up."""
 _FAMILY = _MIDDLE | {
     *("radial", "simple_radial", "simple_pinhole", "pinhole"),
     *("opencv", "full_opencv", "opencv_pinhole", "agisoft_frame"),
@@ -131,7 +132,7 @@ _FAMILY = _MIDDLE | {
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera in pixels whose lens is that of OpenCV, y down; p1 belongs to r^2 + 2 y^2 in y."""
+    """A camera in pixels with an OpenCV lens, y down (p1 of r^2 + 2 y^2 in y)."""
 
     fx: float  # Principal distances
     fy: float
@@ -152,14 +153,14 @@ class Lens:
         return tuple(getattr(self, name) for name in _TERMS)
 
     def is_plain(self, *names: str) -> bool:
-        """Whether nothing but the named terms is there."""
+        """Return whether all other terms than the named ones are 0."""
         return not any(getattr(self, name) for name in _TERMS if name not in names)
 
 
 def lens_of(camera: Camera, size: Size | None) -> Lens | None:
-    """Return a camera as one of the family, to the last digit; None where it is none.
+    """Return an exactly equivalent camera of the family; None without.
 
-    A camera that counts from the middle of the picture needs its size.
+    A camera that counts from the image centre needs its size.
     """
     values = camera.parameters
     if camera.unit != "px" or camera.model not in _FAMILY:
@@ -188,7 +189,7 @@ def _about_middle(camera: Camera, size: Size, terms: Mapping[str, float]) -> Len
     if f < 0 or any(values[name] for name in lost.get(camera.model, ())):
         return None
     if camera.model == "brown_forward":
-        # With y down B2 has the other sign.
+        # If y is down, B2 has the other sign.
         terms = {"p1": -values["B2"] * f, "p2": values["B1"] * f}
         terms |= {f"k{n}": values[f"A{n}"] * f ** (2 * n) for n in (1, 2, 3)}
     middle = size[0] / 2 + values.get("xp", 0.0), size[1] / 2 - values.get("yp", 0.0)

@@ -1,4 +1,4 @@
-"""A project on disk adjusted in parts, without ever being in memory as a whole."""
+"""Adjustment of a project on disk in parts, without loading it completely."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OnDisk:
-    """What the adjustment of a project on disk has come to."""
+    """The result of the adjustment of a project on disk."""
 
     outcome: Outcome  # History, sums and variance
-    manifest: Manifest  # The tree, and how much is in each node
-    # What was found, one folder a node: :func:`photogram.read_result` reads each by itself. Photos of
-    # nodes above stand in several, with the same values and covariances
+    manifest: Manifest  # The tree, and the size of each node
+    # One result folder per node, for :func:`photogram.read_result`; photos of higher nodes are repeated in
+    # several, with equal values and covariances
     folders: list[Path]
 
     def lines(self) -> list[str]:
@@ -71,11 +71,11 @@ def adjusted_on_disk(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
-    """Adjust a project whose images lie in Parquet; everything goes to a folder, in parts.
+    """Adjust a project with images in Parquet, in parts, in a folder.
 
-    `unit_variance`, `loss`: what the variance of unit weight is based on; None: as the project says. The
-    loss of the project: by default what it says; `max_iterations`: largest number of iterations. When
-    None, the number of the project, else 50; 200 with a loss.
+    `unit_variance`: basis of the variance of unit weight; None: of the project. `loss`: returns the loss for
+    the project, by default its own. `max_iterations`: largest number of iterations. None: the number of the
+    project, otherwise 50, or 200 with a loss.
     """
     chosen = (unit_variance, loss, max_iterations)
     with _run(path, wishes, folder, division, chosen, threads) as run:
@@ -94,7 +94,7 @@ def planned_on_disk(
     loss: Callable[[Project], Loss | None] = _as_said,
     max_iterations: int | None = None,
 ) -> PartsPlan:
-    """Plan the same: its parts are written, and wait in the folder for the adjustment."""
+    """Plan an adjustment and write its parts to the folder."""
     with _run(path, wishes, folder, division, (unit_variance, loss, max_iterations), None) as run:
         return run.plan()
 

@@ -44,7 +44,7 @@ _COUNTS: Mapping[str, Count] = {
     "trajectories": lambda project: len(project.block.timed),
     "moments": lambda project: sum(each.moment is not None for each in project.block.observations),
 }
-"""How many parts of a kind a project has; kinds that are not here apply to every project."""
+"""Functions that count parts of a project by type; other types apply to every project."""
 
 
 def _held(project: Project) -> int:
@@ -52,7 +52,7 @@ def _held(project: Project) -> int:
 
 
 def losses(project: Project, *kinds: str) -> list[Phrase]:
-    """Return the kinds (`lost.KIND` of the words) that a project has, with their counts."""
+    """Return the types of parts of a project, with counts."""
     counts = {kind: int(_COUNTS[kind](project)) if kind in _COUNTS else 1 for kind in kinds}
     fields = {"frame": project.frame.phrase, "held": _held(project), "checks": len(project.checks)}
     return [phrase(f"lost.{kind}", n=count, **fields) for kind, count in counts.items() if count]

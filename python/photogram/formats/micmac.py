@@ -1,4 +1,4 @@
-"""Fiducial marks of MicMac: `MeasuresCamera.xml` (mm), `MeasuresIm-NAME.xml` (pixels), `id_fiducial.txt`."""
+"""Fiducial marks of MicMac: camera (mm), images (pixels), names."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from photogram.words import phrase
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
-AMID = 0.1  # Marks whose mean is farther from the origin, in parts of the format, are counted from a corner
+AMID = 0.1  # Distance of the mean of marks from the origin, relative to the format, for a corner origin
 
 
 @dataclass(frozen=True, eq=False)
 class MicmacMarks:
-    """Fiducial marks of a camera, and what was read of them."""
+    """Fiducial marks of a camera and their readings."""
 
-    places: Mapping[str, Floats]  # By mark (x, y), mm, y up, counted from amid the marks
+    places: Mapping[str, Floats]  # (x, y) by mark, mm, y up, relative to their mean
     readings: Mapping[str, Mapping[str, Floats]]  # By photo and mark (column, row)
-    turned: bool  # Whether y of the file counts down, so that it was turned
-    remarks: tuple[str, ...]  # What was decided while it was read
+    turned: bool  # Whether y of the file counts down and was reversed
+    remarks: tuple[str, ...]  # Assumptions of the reader
 
     def tables(self, camera: str) -> dict[str, dict[str, Any]]:
-        """Return the tables `fiducials` and `fiducial_images` of a plain project, whose camera this is."""
+        """Return the tables `fiducials` and `fiducial_images` of a camera."""
         rows = [(photo, mark, xy) for photo, own in self.readings.items() for mark, xy in own.items()]
         places, read = (
             np.array(list(each)).reshape(-1, 2) for each in (self.places.values(), [r[2] for r in rows])
@@ -58,35 +58,35 @@ class MicmacMarks:
 
 
 def has_marks(folder: Path) -> bool:
-    """Whether a folder has readings of marks by MicMac."""
+    """Return whether a folder contains MicMac readings of marks."""
     return bool(_of_images(folder)[1])
 
 
 def _of_images(folder: Path) -> tuple[Path, list[Path]]:
-    """Return where the readings of marks are, and the files of the images."""
+    """Return the folder of the readings of marks, and the files of the images."""
     scans = folder / SCANS if (folder / SCANS).is_dir() else folder
     return scans, sorted(scans.glob("MeasuresIm-*.xml"))
 
 
 def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
-    """Read the marks of a folder of MicMac.
+    """Read fiducial marks and their readings from a MicMac folder.
 
-    Whether y of `MeasuresCamera.xml` counts up or down is not said there: it is taken as most scans have it.
-    Where it counts from a corner, as is usual, places are brought to the mean of the marks. `id_fiducial.txt`
-    has their names, where it is there; a mark that no scan shows is told.
+    `MeasuresCamera.xml` does not specify the direction of y. The direction in which most scans are not
+    mirrored is used. Positions relative to a corner, which are usual, are reduced to the mean of the marks.
+    `id_fiducial.txt` contains their names, if present. A remark reports marks without readings.
 
     Parameters
     ----------
     folder
-        With `Ori-InterneScan`, or that itself.
+        Folder that contains `Ori-InterneScan`, or this folder itself.
     camera
-        The file of the camera; None: `MeasuresCamera.xml` in `Ori-InterneScan`, or beside it.
+        The file of the camera; None: `MeasuresCamera.xml` in `Ori-InterneScan`, or in the folders around it.
 
     Raises
     ------
     InputError
-        Files that are missing, cannot be read, or are of something else; a mark that is there twice, that the
-        camera has not, or that `id_fiducial.txt` names and the camera has not, or the other way round.
+        If a file is missing, unreadable or of another type. If a mark is repeated or missing in the camera,
+        or the names in `id_fiducial.txt` differ from the marks of the camera.
     """
     scans, files = _of_images(folder)
     if not files:
@@ -127,7 +127,7 @@ def _named(
     places: Mapping[str, Floats],
     readings: Mapping[str, Mapping[str, Floats]],
 ) -> list[str]:
-    """Compare the list of names with the marks of the camera; say which of them no scan shows."""
+    """Compare names with marks of the camera; report marks without readings."""
     read = {mark for own in readings.values() for mark in own}
     missing = [mark for mark in places if mark not in read]
     remarks = [f"no scan has the {'marks' if missing[1:] else 'mark'} {listed(missing)}"] if missing else []
@@ -149,7 +149,7 @@ def _named(
 
 
 def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Floats]]) -> tuple[bool, str]:
-    """Return whether y of a camera counts down, as rows do, by most photos; and what is said of it."""
+    """Return whether y counts down (as rows) in most photos, and a remark."""
     sides = [is_mirrored([places[mark] for mark in own], list(own.values())) for own in readings.values()]
     down, up = sides.count(False), sides.count(True)
     if not down and not up:
@@ -163,7 +163,7 @@ def _turned(places: Mapping[str, Floats], readings: Mapping[str, Mapping[str, Fl
 
 
 def _measures(path: Path) -> dict[str, dict[str, Floats]]:
-    """Return what a file has by image and name; the root is a set, or one image."""
+    """Return coordinates by image and name; the root is a set, or one image."""
     found: dict[str, dict[str, Floats]] = {}
 
     def take(element: Element) -> None:
@@ -180,12 +180,12 @@ def _measures(path: Path) -> dict[str, dict[str, Floats]]:
 
 
 def write_marks(project: Project) -> dict[str, bytes]:
-    """Return the files of the marks of a project with scanned films: pixels, and mm with y down.
+    """Return MicMac files of the marks of scanned films: pixels, and mm (y down).
 
     Raises
     ------
     InputError
-        There are none, readings that are no pixels, or marks of several cameras.
+        If readings in pixels are missing, or marks belong to several cameras.
     """
     cameras, which = known_cameras(project.block)
     films = WrittenFilms(project, [cameras[row].name for row in which])

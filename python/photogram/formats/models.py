@@ -1,4 +1,4 @@
-"""The model that poses of a project make: where its rays meet, and how it is carried to another place."""
+"""Model of a project: intersection of rays, transformation."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
 from photogram.network.subset import kept_images
 
-STEEPEST = 1e12  # Condition of the normal equations of a point beyond which its rays are parallel
+STEEPEST = 1e12  # Largest condition number of the normal equations of a point; larger ones mean parallel rays
 
 
 def intersected(project: Project, points: Indices) -> Floats:
-    """Return (k, 3) where the rays of points come nearest; NaN where they do not meet."""
+    """Return (k, 3) intersections of the rays of points; NaN without."""
     block = project.block
     found = np.full((len(points), 3), np.nan)
     if not len(points) or block.geographic:
         return found
     places = np.full(len(block.point_ids), -1, dtype=np.int64)
     places[points] = np.arange(len(points))
-    # On a trajectory the pose of a photo only tells where it is about.
+    # The pose of a photo on a trajectory is only approximate.
     placed = ~on_shared(block)[block.image_photos]
     rows = np.flatnonzero((places[block.image_points] >= 0) & placed)
     own = kept_images(block, rows)
@@ -45,7 +45,7 @@ def intersected(project: Project, points: Indices) -> Floats:
 
 
 def complete_positions(project: Project) -> Floats:
-    """Return (n, 3) the best that is known of points, intersected where a file says nothing; else NaN."""
+    """Return (n, 3) known, approximate or intersected positions, else NaN."""
     found = project.positions()
     missing = np.flatnonzero(~np.isfinite(found).all(axis=1))
     found[missing] = intersected(project, missing)
@@ -53,16 +53,16 @@ def complete_positions(project: Project) -> Floats:
 
 
 def is_free(project: Project) -> bool:
-    """Whether nothing but its first values says where the model of a project is.
+    """Return whether only initial values define the datum of a project.
 
-    Trajectories say it: what is known of them beforehand is in the axes of the project.
+    Trajectories define it: their prior values refer to the frame of the project.
     """
     block = project.block
     return not (block.observations or block.timed or np.isfinite(block.photo_position_sd).any())
 
 
 def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, message: Message) -> Project:
-    """Return a project whose model is carried into a frame by scale, (3, 3) rotation and (3,) shift."""
+    """Return a project transformed by scale, (3, 3) rotation, (3,) translation."""
     block = project.block
     scale, turn, shift = by
     matrices = attitude_matrices(block)

@@ -1,4 +1,4 @@
-"""Names of points beside formats that number them (`names.csv`: `point` and `name`), and their colours."""
+"""Point names (`names.csv`) for formats with numbers, and colours."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LARGEST = 2**53
 
 
 def with_names(project: Project, path: Path) -> Project:
-    """Return a project with points under other names: a table with the columns `point` and `name`."""
+    """Return a project with point names from a table `point`, `name`."""
     table = read_columns(path, known=("point", "name"))
     table.require("point", "name")
     places = {name: row for row, name in enumerate(project.block.point_ids)}
@@ -41,7 +41,7 @@ def with_names(project: Project, path: Path) -> Project:
 
 
 def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
-    """Return a project with new names of points, by their names until now; all names differ."""
+    """Return a project with new point names, by previous name; all names must differ."""
     old = project.block.point_ids
     ids = [new.get(name, name) for name in old]
     colours, numbers = (project.details.get(key, {}) for key in ("colours", "point numbers"))
@@ -66,12 +66,12 @@ def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
 
 
 def renamed(project: Project, path: Path) -> Project:
-    """Return a project with the names of a table, where it lies there."""
+    """Return a project with the point names of a table, if the file exists."""
     return with_names(project, path) if path.is_file() else project
 
 
 def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None) -> dict[str, int]:
-    """Return a number for each name: those known, its own where all are numbers, else 1, 2, ..."""
+    """Return a number for each name: known, its own, otherwise 1, 2, ..."""
     given = known or {}
     if all(name in given for name in names):
         return {name: int(given[name]) for name in names}
@@ -83,7 +83,7 @@ def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None)
 
 
 def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
-    """Return the table of names, if there are others than the numbers themselves."""
+    """Return the table of names, unless all names are their numbers."""
     if all(str(number) == name for name, number in numbers.items()):
         return {}
     return {NAMES: csv_text({"point": list(numbers.values()), "name": list(numbers)})}

@@ -1,4 +1,4 @@
-"""OpenSfM and OpenDroneMap: `reconstruction.json` with `tracks.csv`, written with `gcp_list.txt`."""
+"""OpenSfM and OpenDroneMap: `reconstruction.json` with `tracks.csv`."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from photogram.words import Phrase, phrase
 
 TITLE = "OpenSfM reconstruction"
 MODEL, TRACKS = "reconstruction.json", "tracks.csv"
-UNKNOWN_DOP = 15.0  # Metres: what the package takes where nothing is said
-NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are no observations
+UNKNOWN_DOP = 15.0  # Metres: default of OpenSfM
+NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are not observed
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
 _NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
 
 
 def place_of(path: Path) -> Path | None:
-    """Return the folder with the files: a path, or `opensfm` in it; of a file that it lies in."""
+    """Return the folder of a path, of `opensfm` in it, or of a model file."""
     if path.is_file():
         return path.parent if path.name == MODEL else None
     return next((each for each in (path, path / "opensfm") if (each / MODEL).is_file()), None)
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the largest model of a file, or the one that is asked for, with its tracks."""
+    """Read the largest or the requested model of a file, with its tracks."""
     folder = place_of(path)
     if folder is None:
         raise InputError(phrase("format.files", name=MODEL), file=path)
@@ -208,7 +208,7 @@ def _frame(model: Tree) -> Frame:
 def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
 ) -> tuple[Indices, Indices, Floats]:
-    """Return photo, point and (m, 2) normalised coordinates of the observations that the model has."""
+    """Return photo, point and (m, 2) normalised coordinates of observations."""
     lines = read_lines(path)
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
@@ -258,7 +258,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the two files, and the list of control of a block that has a place on the earth."""
+    """Return the two files, and the list of control of a georeferenced block."""
     block = project.block
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
@@ -305,14 +305,14 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def _placed_frame(project: Project) -> bool:
-    """Return whether the frame has a place on the earth."""
+    """Return whether the frame is georeferenced."""
     return project.frame.kind == "topocentric" and project.frame.origin is not None
 
 
 def _control(project: Project) -> bytes:
-    """Return the list of control with its measurements; none of a block without a place on the earth.
+    """Return the list of control with image observations; empty without georeference.
 
-    Points of which some coordinates are not known have no place in it.
+    Points with unknown coordinates are omitted.
     """
     block = project.block
     positions = block.point_positions.copy()
@@ -328,7 +328,7 @@ def _control(project: Project) -> bytes:
     found[own], _ = from_frame(GEOGRAPHIC, positions[own], np.zeros((len(own), 3, 3)), project.frame)
     known = set(own.tolist())
     lines = ["WGS84"]
-    # Pixels count from the middle of the first one there, and names end at blanks.
+    # OpenSfM counts pixels from the centre of the first one and ends names at blanks.
     pixels = (to_corner(project) - 0.5).tolist()
     for photo, point, pixel in zip(
         block.image_photos.tolist(), block.image_points.tolist(), pixels, strict=True

@@ -42,11 +42,11 @@ from photogram.words import Phrase, phrase
 TITLE = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
-DIGITS = 6  # Of principal distances in millimetres: files have three of the micrometre
+DIGITS = 6  # Digits of principal distances in millimetres; files have three of micrometres
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the image file, with orientation, control and names where they lie beside it."""
+    """Read the image file, and orientation, control and names if present."""
     folder = path if path.is_dir() else path.parent
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
@@ -114,7 +114,7 @@ def _orientation(path: Path, names: dict[str, str], found: Reduced, wishes: Wish
 
 
 def _rotation(card: Card, elements: list[float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Return A, photo to object; twelve digits are not orthonormal to the last bit."""
+    """Return A, photo to object, orthonormalised from twelve digits."""
     if len(elements) != 9:
         raise card.place.error(phrase("format.count", n=len(elements), required=9))
     matrix = np.array(elements).reshape(3, 3)
@@ -134,7 +134,7 @@ def _control(path: Path, names: dict[str, str], found: Reduced) -> None:
         codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
         if name in found.control:
             raise card.place.error(phrase("format.repeated", what="point", name=name))
-        # One code is that of all coordinates, two are of position and height.
+        # A single code applies to all coordinates, two to position and height.
         level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
         found.control[name] = position, np.array([level, level, height])
 
@@ -148,7 +148,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return image file, orientation, control, and names where they are no numbers."""
+    """Return image file, orientation, control, and names if they are not numbers."""
     block, reduced = project.block, reduced_images(project, DIGITS)
     numbers = numbered([*block.photo_ids, *block.point_ids])
     images: list[str] = []

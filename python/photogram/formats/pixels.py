@@ -1,4 +1,4 @@
-"""Tables of measured pixels: photo, point, column, row; cameras come from a table of their own."""
+"""Tables of measured pixels: photo, point, column, row."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _KNOWN = (*_NEEDED, "sd", "sd_column", "sd_row", "camera", "use")
 
 
 def pixel_table(path: Path, messages: list[Message] | None = None) -> ColumnTable:
-    """Read a table of image measurements under all usual names of its columns; `messages` gets remarks."""
+    """Read a table of image observations with any usual headings."""
     table = read_columns(path, known=_NEEDED, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
     table.require(*_NEEDED)
     return in_units(table, column_units("images"), "images", [] if messages is None else messages)
@@ -72,7 +72,7 @@ def _headings(begin: str) -> list[str]:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a table; photos have the only camera of `--camera FILE`, or that of a column `camera`."""
+    """Read a table; cameras are in `--camera FILE`, selected by a column `camera`."""
     if wishes.cameras is None:
         raise InputError(phrase("format.cameras"), file=path)
     messages: list[Message] = []
@@ -143,7 +143,7 @@ def _cameras_of(table: ColumnTable, names: list[str]) -> np.ndarray[tuple[int], 
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the table, and that of the cameras."""
+    """Return the table of observations, and the table of cameras."""
     block = project.block
     cameras, which = known_cameras(block)
     names = np.array([cameras[row].name for row in which], dtype=object)

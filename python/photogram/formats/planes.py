@@ -1,4 +1,4 @@
-"""By how much the plane of a projection bends a block that is adjusted in it as if it were cartesian."""
+"""Effect of a map projection on a block that is adjusted in it."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
 from photogram.words import Phrase, phrase
 
-RADIUS = 6_371_000.0  # Of the earth, metres
-LIKE_A_PLANE = 1e5  # Metres: coordinates that are both larger are those of a map, not of axes of one's own
-STEP = 100.0  # Metres, over which scales are measured
+RADIUS = 6_371_000.0  # Radius of the earth, metres
+LIKE_A_PLANE = 1e5  # Metres: if both coordinates are larger, they are map coordinates, not local ones
+STEP = 100.0  # Metres, for the computation of scales
 
 
 @dataclass(frozen=True)
 class Bend:
-    """What a plane does to a block."""
+    """Effect of a map projection on a block."""
 
-    extent: float  # From the middle of the block to its edge, metres
+    extent: float  # From the centre of the block to its edge, metres
     curvature: float  # Height of the plane above a level surface at the edge, d^2 / 2R, metres
-    # By how much horizontal lengths in the plane exceed those in space, as a part, in the middle and at
-    # the edges: least and largest; heights have scale 1. None where the projection is not known
+    # Smallest and largest relative excess of horizontal lengths in the plane over lengths in space; heights
+    # have scale 1. None if the projection is unknown
     scale: tuple[float, float] | None
 
     @property
@@ -39,7 +39,7 @@ class Bend:
 
 
 def bend(xyz: Floats, crs: str = "") -> Bend:
-    """Return what a plane does to a block with these (n, 3) positions, metres; `crs` names it."""
+    """Return the effect of a map projection on (n, 3) positions, metres."""
     middle = (xyz.min(axis=0) + xyz.max(axis=0)) / 2
     extent = float(np.hypot(*(xyz - middle)[:, :2].T).max())
     scale = None
@@ -55,9 +55,9 @@ def bend(xyz: Floats, crs: str = "") -> Bend:
 
 
 def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> list[Message]:
-    """Say by how much the plane bends where a block is adjusted in one, or looks as if it were.
+    """Return remarks on the effect if a block seems to be in a map projection.
 
-    `starts`: (n, 3) where its points are about, if that is known; NaN where not.
+    `starts`: (n, 3) approximate positions of its points; NaN if unknown.
     """
     frame = block.frame
     if frame.kind != "cartesian" or block.geographic:

@@ -1,4 +1,4 @@
-"""Points of readers: first positions, control and check points, as blocks have them."""
+"""Points of readers: initial positions, control and check points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from photogram.network.observations import Control, Observation
 
 
 class PointTable:
-    """Points without positions, into which a reader puts positions, control and check points."""
+    """A table of points to which a reader adds positions, control and check points."""
 
     def __init__(self, names: list[str]) -> None:
         self.names = names
@@ -20,7 +20,7 @@ class PointTable:
         self.observations: list[Observation] = []
 
     def control(self, row: int, xyz: Floats, covariance: Floats) -> None:
-        """Add control; with correlations it is an observation of the point."""
+        """Add control; with correlations it becomes an observation of the point."""
         self.starts[row] = xyz
         variances = np.diag(covariance)
         if (covariance == np.diag(variances)).all():

@@ -1,4 +1,4 @@
-"""A project: a block with what files say of it beyond, and how it came out of them."""
+"""A project: a block with additional contents of its files."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from photogram.words import Phrase, option_sd, phrase
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
 
 DatumName = Literal["control", "minimum", "inner"]
-Size = tuple[int, int]  # Width and height of the pictures of a camera, pixels
+Size = tuple[int, int]  # Image width and height of a camera, pixels
 
-ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Of image coordinates where nothing says how good they are
+ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Default for image coordinates
 
 
 def frame_of(block: Block) -> Frame:
-    """Return the frame of a block, also where it is geographic and nobody has said so."""
+    """Return the frame of a block; of kind geographic if the block has a spheroid."""
     if block.spheroid is not None and block.frame.kind == "cartesian":
         return replace(block.frame, kind="geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
     return block.frame
@@ -48,12 +48,12 @@ def frame_of(block: Block) -> Frame:
 
 @dataclass(frozen=True)
 class Options:
-    """How a project asks to be adjusted; None: it does not say.
+    """Adjustment settings of a project; None: not specified.
 
     Attributes
     ----------
     datum, loss, unit_variance, max_iterations
-        As of :func:`photogram.adjust`.
+        As in :func:`photogram.adjust`.
     """
 
     datum: DatumName | None = None
@@ -64,9 +64,9 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """Second images of points on photos, of which a block has one each."""
+    """Repeated observations of points in photos; the block contains the first ones."""
 
-    photos: tuple[str, ...] = ()  # Their k names
+    photos: tuple[str, ...] = ()  # k names of each
     points: tuple[str, ...] = ()
     # (k, 2) image coordinates, in the unit of the block
     xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
@@ -74,7 +74,7 @@ class Repeated:
 
 @dataclass(frozen=True, eq=False)
 class Unused(Repeated):
-    """Images of a board that were left out (`use` = `off`), which stay with the project."""
+    """Omitted image observations of a board (`use` = `off`)."""
 
     # (k, 2) standard deviations of image coordinates, in the unit of the block
     sd: Floats = field(default_factory=lambda: np.zeros((0, 2)))
@@ -82,45 +82,45 @@ class Unused(Repeated):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Project(Brief):
-    """A block with what files say of it beyond.
+    """A block with the additional contents of its files.
 
     Attributes
     ----------
     block
-        What is adjusted. Points that are neither control nor check points have no position in it.
+        The block to adjust. Points that are neither control nor check points do not have a position in it.
     path
-        Where it was read.
+        File or folder of the project.
     title
-        The format, as people are told.
+        The format, for users.
     sizes
-        Width and height of the pictures of each camera of the block, pixels; None where not known.
+        Image width and height of each camera of the block, pixels; None if unknown.
     pixel_mm
-        The side of a pixel of each camera in millimetres; None where not known.
+        The side of a pixel of each camera in millimetres; None if unknown.
     starts
-        (n, 3) positions that the file gives for points of the block; NaN without.
+        (n, 3) positions of the points of the block in the file; NaN without.
     frame
-        What coordinates are; the block has it, too, and takes it to its results.
+        Reference frame of the coordinates; also in the block, and in its results.
     options
-        How it asks to be adjusted.
+        Adjustment settings.
     lacks
-        What an adjustment needs or assumes that the file does not say, with the option that adds it.
+        Missing or assumed data for an adjustment, with the option that adds them.
     messages
-        What was left out, corrected or doubtful.
+        Remarks on omitted, corrected or doubtful data.
     details
-        What the writer of the same format wants to know again; other formats do not read it.
+        Data for the writer of the same format; other formats ignore them.
     sd_taken
-        Whether the reader has taken the standard deviations of images that a user gives, in the unit of the
-        files.
+        Whether the reader has applied user-defined standard deviations of image coordinates, in the unit of
+        the files.
     repeated
-        Second images of points on photos, which were left out.
+        Omitted repeated observations of points in photos.
     features
-        What is to be fitted to adjusted points, as :func:`photogram.features` takes it.
+        Features to fit to adjusted points, as arguments of :func:`photogram.features`.
     statement
-        What is asked of its accuracy statement, as :meth:`photogram.Result.statement` takes it.
+        Settings of its accuracy statement, as arguments of :meth:`photogram.Result.statement`.
     boards
-        What its control is the points of, where photos show a board: by name.
+        Boards whose points are the control, by name.
     unused
-        Images of the board that were left out.
+        Omitted image observations of the board.
     tracks
         Points whose names are numbers of tracks. A list of control points has other names.
     control_crs
@@ -162,13 +162,13 @@ class Project(Brief):
 
     @property
     def checks(self) -> list[int]:
-        """Points with a known position of which nothing is held."""
+        """Check points: points with a known position and only free coordinates."""
         block = self.block
         known = np.isfinite(block.point_positions).any(axis=1) & ~np.isfinite(block.point_sd).any(axis=1)
         return [int(row) for row in np.flatnonzero(known)]
 
     def positions(self) -> Floats:
-        """Return (n, 3) the best that is known of points: as held or checked, else as the file has them."""
+        """Return (n, 3) positions of control and check points, else from the file."""
         found: Floats = np.where(
             np.isnan(self.block.point_positions), self.starts, self.block.point_positions
         )
@@ -213,8 +213,8 @@ def assembled(
 ) -> Project:
     """Return the project of a file from its parts.
 
-    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if the
-    file has none. Errors of the block name the file.
+    `centres` (P, 3) and `matrices` (P, 3, 3), photo to object, are NaN if unknown; `image_sd` is None if
+    missing in the file. Errors of the block name the file.
     """
     place, found = Place(path), list(messages)
     if not photo_ids:
@@ -240,7 +240,7 @@ def assembled(
         lacking.append(Phrase("read.images", fields))
     for each in (image_photos, image_points, image_xy, image_sd):
         if isinstance(each, np.ndarray):
-            # Nobody writes these any more: the block shares them.
+            # These arrays are complete and read-only: the block shares them.
             each.flags.writeable = False
     count = len(point_ids)
     angles = np.full((len(photo_ids), 3), np.nan)
@@ -295,7 +295,7 @@ def assembled(
 
 @contextmanager
 def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
-    """Give a refusal of repeated names its place: a block compares its names itself."""
+    """Add the location to the error of a block on repeated names."""
     try:
         yield
     except InputError:

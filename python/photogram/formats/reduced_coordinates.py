@@ -1,4 +1,4 @@
-"""Blocks of reduced photo coordinates: millimetres from the principal point, free of distortion, y up."""
+"""Reduced photo coordinates: mm from the principal point, y up."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.words import Phrase, option_sd, phrase
 
-BETTER = 3.0  # How much better rotations must fit transposed to be taken so
-LEAST, MOST = 2.0, 3000.0  # Millimetres between which principal distances of cameras lie
+BETTER = 3.0  # Smallest ratio of misfits for which rotations are transposed
+LEAST, MOST = 2.0, 3000.0  # Smallest and largest principal distance of cameras, millimetres
 NOMINAL = 100.0
-"""Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
-SIDE = -0.02  # u3 of unit directions beyond which a perspective camera has no picture
+"""Principal distance in millimetres for an unknown pixel size; it does not affect the rays."""
+SIDE = -0.02  # Largest u3 of unit directions that a perspective camera can image
 
 
 @dataclass
 class Reduced:
-    """What the files of such a block hold."""
+    """The contents of the files of such a block."""
 
-    photos: dict[str, str] = field(default_factory=dict)  # Camera of each photo by its name
+    photos: dict[str, str] = field(default_factory=dict)  # Camera of each photo by photo name
     # Photo, point, x, y in millimetres
     images: list[tuple[str, str, float, float]] = field(default_factory=list)
     # Centre and attitude A of photos, photo to object
     poses: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
-    # Position of control points, and which coordinates are held; of check points none
+    # Position of control points, and which coordinates are fixed or weighted; none of check points
     control: dict[str, tuple[Floats, Bools]] = field(default_factory=dict)
     cameras: dict[str, Camera] = field(default_factory=dict)  # By name
 
@@ -49,7 +49,7 @@ class Reduced:
         if not LEAST < abs(c) < MOST:
             raise place.error(phrase("reduced.distance", value=abs(c), low=LEAST, high=MOST))
         name = f"c {abs(c):.12g} mm"
-        # Coordinates are those of the positive plane: the model has c negative there.
+        # Coordinates are in the positive plane, for which c of the model is negative.
         self.cameras.setdefault(name, Camera("perspective", {"c": -abs(c)}, name=name))
         return name
 
@@ -72,7 +72,7 @@ def project_of(
     if held and "control" not in wishes.sd:
         lacks.append(Phrase("read.control", {"number": len(held), "option": option_sd("control")}))
     for name, (position, used) in found.control.items():
-        # What is not held of a control point is not known; a check point is known altogether.
+        # Free coordinates of a control point are unknown; a check point is completely known.
         row = places[name]
         table.positions[row] = table.starts[row] = np.where(used | ~used.any(), position, np.nan)
         if used.any() and "control" in wishes.sd:
@@ -99,7 +99,7 @@ def project_of(
 
 
 def with_fitting_rotations(project: Project) -> Project:
-    """Return a project whose rotations are transposed where rays meet far better then."""
+    """Return a project with rotations transposed if rays then fit better."""
     block = project.block
     if not np.isfinite(block.photo_attitudes).all():
         return project
@@ -120,7 +120,7 @@ def with_fitting_rotations(project: Project) -> Project:
 
 
 def _misfit(project: Project) -> float:
-    """Return the median residual with points where rays meet; infinite where they meet behind photos."""
+    """Return the median residual of intersections; infinite behind photos."""
     loose = project.replace(
         block=project.block.replace(point_positions=np.full_like(project.starts, np.nan), point_sd=np.inf),
         starts=np.full_like(project.starts, np.nan),
@@ -131,19 +131,19 @@ def _misfit(project: Project) -> float:
 
 @dataclass(frozen=True)
 class ReducedImages:
-    """What such files say of images."""
+    """Contents of such files: cameras, image observations and poses."""
 
     distances: Floats  # Principal distance of each camera, millimetres
-    names: list[str]  # Of the cameras
-    cameras: Indices  # (P,) which one each photo has
-    rows: Indices  # Images that a perspective camera has
+    names: list[str]  # Names of the cameras
+    cameras: Indices  # (P,) camera of each photo
+    rows: Indices  # Observations that a perspective camera can have
     xy: Floats  # (rows, 2) millimetres from the principal point, y up
     posed: Bools  # (P,) photos with a pose
     matrices: Floats  # (P, 3, 3) attitudes A, photo to object
 
 
 def reduced_images(project: Project, digits: int | None = None) -> ReducedImages:
-    """Return the images of a project as a perspective camera without distortion would have seen them."""
+    """Return the images reduced to a camera without distortion."""
     block = project.block
     cameras, which = known_cameras(block)
     pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
@@ -173,7 +173,7 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
 
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
-    """Return positions of control and check points, and which coordinates are held; none are of checks."""
+    """Return control and check points, and their fixed or weighted coordinates."""
     block = project.block
     full = correlated_control(block)
     found = {}
@@ -198,7 +198,7 @@ def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
 
 
 def by_photo(project: Project, reduced: ReducedImages) -> Sequence[list[tuple[str, float, float]]]:
-    """Return name and coordinates of the images of each photo."""
+    """Return names and coordinates of the observations of each photo."""
     block = project.block
     found: list[list[tuple[str, float, float]]] = [[] for _ in block.photo_ids]
     photos = block.image_photos[reduced.rows].tolist()

@@ -1,4 +1,4 @@
-"""The formats that are known, and which of them lies at a path."""
+"""The known formats, and the recognition of the format of a path."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ FORMATS: dict[str, Format] = {
         )
     )
 }
-"""By name, in the order in which help lists them."""
+"""Formats by name, in the order of the help."""
 
 
 def _written(name: str, project: Project) -> Mapping[str, bytes]:
@@ -75,7 +75,7 @@ def _written(name: str, project: Project) -> Mapping[str, bytes]:
 
 
 def _unread(path: Path, wishes: Wishes) -> Project:
-    """Refuse to read what has cameras alone."""
+    """Reject reading of a format with cameras only."""
     del wishes
     raise InputError(phrase("format.cameras-only"), file=path)
 
@@ -100,26 +100,26 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
         )
     }
 )
-"""By name, as `photogram.targets.camera_files` has them."""
+"""Formats of cameras by name, as in `photogram.targets.camera_files`."""
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 SD = ("images", "control", "check", "gnss")
-"""What of any format may have standard deviations that its files do not say."""
-MOST = 200  # Files of a folder that are looked at where the folder itself has no format
+"""Types of data of any format to which the user may add standard deviations."""
+MOST = 200  # Largest number of files that are examined in a folder without format
 
 
 def recognised(path: Path) -> Format:
-    """Return the format of what lies at a path.
+    """Return the format of a file or folder.
 
     Raises
     ------
     InputError
-        Nothing lies there, it has no format that is known, or may be of several.
+        If the path does not exist, its format is unknown, or fits several formats.
     """
     return _located(path)[0]
 
 
 def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
-    """Return the format of what lies at a path, and where: in a folder its only file that has any."""
+    """Return format and location of a project."""
     among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()
@@ -131,7 +131,7 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
     if len(found) == 1:
         return found[0]
     if file_format is not None:
-        # The reader says best what is missing.
+        # The error of the reader describes the missing part best.
         return among[0], path
     if found:
         names = [f"{where.name}: --format {each.name}" for each, where in found]
@@ -150,16 +150,16 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
     Parameters
     ----------
     path
-        A file or a folder; also a folder with one file that has a format.
+        A file or a folder, or a folder with a single file of a known format.
     file_format
-        The name of its format; None: found out.
+        Name of the format; None: detected.
     wishes
-        What the files do not say.
+        Data that the files do not contain, and other user settings.
 
     Raises
     ------
     InputError
-        The path cannot be read or holds something else; names file, record and what stands there.
+        If the path cannot be read or contains something else. The error has file, record and text.
     """
     path = Path(path)
     chosen, path = _located(path, file_format)
@@ -179,7 +179,7 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
                 messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
             )
         except InputError as error:
-            # What refuses arrays or systems of coordinates does not know where they came from.
+            # Checks of arrays and coordinate systems do not report the file.
             raise (error if error.file else InputError(message_of(error), file=path)) from None
         except PhotogramError:
             raise
@@ -189,12 +189,12 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
 
 
 def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
-    """Return the files of a project in a format, by their names.
+    """Return the files of a project in a format, by name.
 
     Raises
     ------
     InputError
-        There is no such format, it is only read, or it has no way to say what the project is.
+        If the format is unknown or read-only, or cannot represent the project.
     """
     chosen = _named(file_format, _TO_WRITE)
     if chosen.write is None:
@@ -206,21 +206,21 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
 
 
 def _fitting(project: Project, chosen: Format) -> Project:
-    """Return a project in the coordinates that a format has: of the object space, and of the images."""
+    """Return a project in the object and image coordinates of a format."""
     project = project if chosen.geographic else in_topocentric(project)
     return in_pixels(project) if chosen.pixels else project
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a project is to be written, and in which format."""
+    """Location and format for writing a project."""
 
     format: Format
     folder: Path  # Parent of its files
     file: str | None = None  # Name of the first file, if the user specifies it
 
     def files(self, project: Project) -> Mapping[Path, bytes]:
-        """Return the files of a project by their paths; those called as the first one share its new name."""
+        """Return the files of a project by path, renamed as the first one."""
         found = to_files(project, self.format.name)
         if self.file is None:
             return {self.folder / name: content for name, content in found.items()}
@@ -237,22 +237,22 @@ class Target:
 
 
 def target(path: Path, file_format: str | None = None) -> Target:
-    """Return what a user means by the name of a file or folder to be written.
+    """Return location and format for the name of a file or folder to write.
 
-    Files say their format by their names (`bundle.out`, `*.im`), folders by that of the format
-    (`model-colmap`, `opensfm`, `sparse/0`); other folders are plain projects.
+    File names select a format (`bundle.out`, `*.im`), folder names too if they contain its name
+    (`model-colmap`, `opensfm`, `sparse/0`). Other folders are plain projects.
 
     Parameters
     ----------
     path
-        What the user calls it.
+        The name.
     file_format
-        The name of the format; None: found out.
+        Name of the format; None: detected.
 
     Raises
     ------
     InputError
-        A name that several formats have.
+        If the name fits several formats.
     """
     path = Path(path)
     among = list(FORMATS.values()) if file_format is None else [_named(file_format, _TO_WRITE)]
@@ -272,17 +272,17 @@ def target(path: Path, file_format: str | None = None) -> Target:
         for each in among
         if name in (each.name, *each.folders) or name.endswith(tuple(f"{mark}{each.name}" for mark in "-_."))
     ]
-    # `_text` of colmap_text is no word of its own: the longest name is what was meant.
+    # `_text` of colmap_text is not a separate word: the longest name is used.
     return Target(max(called, key=lambda each: len(each.name), default=FORMATS["plain"]), path)
 
 
 def cannot_hold(project: Project, file_format: str) -> list[str]:
-    """Return what of a project a format has no place for, in sentences.
+    """Return the parts of a project that a format cannot contain, in sentences.
 
     Raises
     ------
     InputError
-        Line scanners, which other formats than the plain project would take for photos.
+        If the project has line scanners, which only the plain project supports.
     """
     chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
@@ -296,7 +296,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
 
 
 def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
-    """Return a call that adjusts the block of a project as its files ask for, in several rounds if need be.
+    """Return a call that adjusts the block of a project as its files require.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
     Returns
     -------
-    That call itself where its files ask for nothing more.
+    A call with the same arguments, which adjusts repeatedly if necessary; `adjust` itself if once is enough.
     """
     own = next((each for each in FORMATS.values() if each.title == project.title), None)
     return adjust if own is None or own.adjusting is None else own.adjusting(project, adjust)

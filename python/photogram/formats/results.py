@@ -1,4 +1,4 @@
-"""Results that were written as data: read again as results, or as projects to go on with."""
+"""Saved results: read as results, or as projects."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ TITLE = "result as data (Parquet)"
 
 
 def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
-    """Read a result that `to_parquet` or `--parquet DIR` has written: it does all that it did before.
+    """Read a result from the files of `to_parquet` or `--parquet DIR`.
 
-    Values, residuals and redundancy numbers are the same to the last bit, covariances but for rounding
-    (2e-16). What a program wrote beside, such as what snooping took out, does not come back.
+    Values, residuals and redundancy numbers are identical to the last bit, covariances up to rounding
+    (2e-16). Other output, such as the log of data snooping, is not included.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     Raises
     ------
     InputError
-        Files that are missing, damaged, of another version or contradict each other.
+        If files are missing, damaged, of another version, or contradict each other.
     ModuleNotFoundError
-        pyarrow is not installed.
+        If pyarrow is not installed.
     """
     from photogram.collection.result_files import KIND as COLLECTION
     from photogram.collection.saved_result import read_collection_result
@@ -69,12 +69,12 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
 
 
 def is_result(path: Path) -> bool:
-    """Return whether a folder has a result."""
+    """Return whether a folder contains a result."""
     return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()
 
 
 def _project(path: Path, wishes: Wishes) -> Project:
-    """Read the block of a result, where its adjustment has ended, with the options that it had."""
+    """Read the adjusted block of a result, with its adjustment settings."""
     del wishes
     result = read_result(path)
     if not isinstance(result, Result):

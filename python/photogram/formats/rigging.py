@@ -1,4 +1,4 @@
-"""Photos on frames: mounts for a block, and photos that stand for frames whose first sensor took none."""
+"""Mounts of photos on frames, and substitutes for missing frame photos."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Rig:
     """Sensors on one frame."""
 
     name: str
-    reference: str  # The sensor whose axes are the axes of the frame
+    reference: str  # Sensor whose axes are the axes of the frame
     sensors: Mapping[str, Sensor]  # Poses of the other sensors
     # Clocks of sensors on trajectories
     clocks: Mapping[str, Clock] = field(default_factory=dict)
@@ -26,7 +26,7 @@ class Rig:
 
 @dataclass(frozen=True)
 class FrameOf:
-    """Photos that were taken together: their indices by the names of sensors."""
+    """Photos taken simultaneously: their indices by sensor name."""
 
     name: str
     rig: Rig
@@ -35,7 +35,7 @@ class FrameOf:
 
 @dataclass(frozen=True)
 class Stand:
-    """A photo without images that stands for a frame; its camera is called so, or that of another photo."""
+    """A photo without images that represents a frame."""
 
     name: str
     camera: str
@@ -47,9 +47,9 @@ class Stand:
 def mounted(
     frames: Sequence[FrameOf], photos: Sequence[str], centres: Floats, matrices: Floats
 ) -> tuple[list[Mount], list[Stand]]:
-    """Return mounts, and the photos that are missing for them.
+    """Return mounts, and the missing photos of frames.
 
-    `centres`, `matrices`: (P, 3) and (P, 3, 3) poses A, photo to object; NaN where unknown.
+    `centres`, `matrices`: (P, 3) and (P, 3, 3) poses A, photo to object; NaN if unknown.
     """
     mounts: list[Mount] = []
     stands: list[Stand] = []
@@ -61,7 +61,7 @@ def mounted(
         else:
             camera, row = next(iter(frame.photos.items()))
             sensor = frame.rig.sensors[camera]
-            # Of a sensor that is not known the photo's own pose is near enough to begin with.
+            # For an unknown sensor the photo's own pose is a sufficient initial value.
             turn = np.eye(3) if sensor.matrix is None else np.asarray(sensor.matrix)
             matrix = matrices[row] @ turn.T
             name = f"frame {frame.name}"

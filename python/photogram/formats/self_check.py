@@ -1,4 +1,4 @@
-"""Whether positions and observations of a file agree by the conventions that it is read with."""
+"""Check of positions and observations against reader conventions."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.words import phrase
 
-MOST = 20_000  # Images that are looked at
-GROSS, PART = 50.0, 0.1  # Pixels, and part of the width, that a median residual must exceed to be doubted
-BETTER = 10.0  # How much smaller it must be with another convention for that to be named
+MOST = 20_000  # Largest number of observations used
+GROSS, PART = 50.0, 0.1  # Pixels, and part of the width: median residuals that exceed both are doubtful
+BETTER = 10.0  # Smallest improvement of the residual for which another convention is reported
 NEARLY_ALL = 0.9
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How images agree with positions as they were read."""
+    """Agreement of observations with positions of a file."""
 
-    median: float  # Of the residuals' lengths, in the unit of the images; NaN without any
-    behind: float  # The part of the points that lie behind their photos
-    images: int  # How many images were looked at
+    median: float  # Median length of residuals, in the unit of the images; NaN without any
+    behind: float  # Fraction of points behind their photos
+    images: int  # Number of observations used
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _sample(project: Project) -> _Sample:
     block = project.block
     points, matrices = project.positions(), attitude_matrices(block)
     poses = np.column_stack([matrices.reshape(-1, 9), block.photo_positions])
-    # On a trajectory the pose of a photo only tells where it is about.
+    # The pose of a photo on a trajectory is only approximate.
     posed: Bools = np.asarray(np.isfinite(poses).all(axis=1)) | on_shared(block)
     placed: Bools = np.asarray(np.isfinite(points).all(axis=1))
     good = posed[block.image_photos] & placed[block.image_points]
@@ -85,14 +85,14 @@ def _sample(project: Project) -> _Sample:
 
 
 def _rows_of_photos(block: Block, photos: Indices) -> dict[str, Indices]:
-    """Return which of (m,) images are of each photo, by its name."""
+    """Return the indices of (m,) observations by photo name."""
     order = np.argsort(photos, kind="stable")
     bounds = np.searchsorted(photos[order], np.arange(len(block.photo_ids) + 1)).tolist()
     return {name: order[bounds[row] : bounds[row + 1]] for row, name in enumerate(block.photo_ids)}
 
 
 def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the places and axes of a photo at the times of its images, and these in the focal plane."""
+    """Return poses of a photo at image times, and focal coordinates."""
     time, since, there = own.images(xy)
     scale = 1.0 if own.readout is None else float(own.readout.position[0])
     offset = 0.0 if own.offset is None else float(own.offset.position[0])
@@ -103,7 +103,7 @@ def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Flo
 
 
 def agreement(project: Project) -> Agreement:
-    """Return how images agree with positions as they were read."""
+    """Return the agreement of observations with positions of a file."""
     sample = _sample(project)
     if not len(sample.xy):
         return Agreement(np.nan, 0.0, 0)
@@ -112,9 +112,9 @@ def agreement(project: Project) -> Agreement:
 
 
 def doubts(project: Project) -> list[Message]:
-    """Return what is to be said where images and positions do not agree, with the convention that would help.
+    """Return messages on disagreement, with a convention that fits.
 
-    Nothing is changed.
+    The project is not changed.
     """
     found = agreement(project)
     if not found.images:
@@ -137,7 +137,7 @@ def doubts(project: Project) -> list[Message]:
 
 
 def _mirrored(axis: int) -> Callable[[_Sample], _Sample]:
-    """Return a change: image coordinates counted the other way, about the principal point."""
+    """Return a change: image coordinates reversed about the principal point."""
 
     def change(sample: _Sample) -> _Sample:
         middle = images_of(sample.cameras, sample.which, np.tile([0.0, 0.0, -1.0], (len(sample.xy), 1)))

@@ -1,4 +1,4 @@
-"""What a user adds to a project: control, measurements, names, standard deviations, unknown cameras."""
+"""User additions to a project, such as control and observations."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
 
-SAME = 1e-3  # Pixels that two measurements of a point on a photo may be apart to be one
-SIMILAR = 10.0  # How much better control must fit a model after a similarity for the model to be carried over
+SAME = 1e-3  # Largest difference (pixels) of equal observations of a point in a photo
+SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similarity is applied to the model
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Return standard deviations by table from words such as `images=0.5` or `control=0.02,0.02,0.03`."""
+    """Return standard deviations by table from `control=0.02,0.02,0.03`."""
     found = {}
     for each in given:
         name, equals, numbers = each.partition("=")
@@ -68,9 +68,9 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
 
 
 def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
-    """Return a project with the standard deviations of image coordinates that a user gives.
+    """Return a project with user-defined standard deviations of image coordinates.
 
-    A plain project has them where its tables say nothing; some readers take them in the unit of their files.
+    In a plain project they are defaults for its tables. Some readers apply them in the unit of their files.
     """
     if "images" not in sd or project.sd_taken:
         return project
@@ -81,10 +81,10 @@ def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
 
 
 def with_repeated(project: Project) -> Project:
-    """Return a project whose second images of a point on a photo take part: their mean with the first.
+    """Return a project in which means replace repeated observations.
 
-    With the weights of all together it gives the same adjustment as all of them by themselves, for the sum of
-    squares of their differences from the mean does not depend on any unknown; the message says what it is.
+    With the sum of the weights the adjustment is equivalent to all single observations. The sum of squares of
+    their differences from the mean does not depend on any unknown. A message reports this sum.
     """
     block = project.block
     first, second = _repeated_rows(project)
@@ -108,7 +108,7 @@ def with_repeated(project: Project) -> Project:
 
 
 def repeated_remarks(project: Project, result: Result) -> list[Message]:
-    """Report the sum of squares with the additional observations of points in photos, if there are any."""
+    """Report the sum of squares with repeated observations, if any."""
     if not result.converged:
         return []
     block = project.block
@@ -133,7 +133,7 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
 
 
 def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
-    """Return rows of first images in the block, and those of their second ones among the repeated."""
+    """Return rows of first observations in the block, and of their repetitions."""
     block, again = project.block, project.repeated
     if not again.points:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -145,16 +145,16 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
 
 
 def _image_rows(block: Block) -> dict[tuple[str, str], int]:
-    """Return the row of each image observation by the names of photo and point."""
+    """Return the row of each image observation by photo name and point name."""
     ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
     return {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
 
 
 def self_calibrated(project: Project, names: Sequence[str]) -> Project:
-    """Return a project whose cameras have free parameters: those named, or those of their models for `all`.
+    """Return a project whose cameras have free parameters: named ones, or `all`.
 
     A camera whose model lacks a named parameter gets the narrowest model with it that contains its own: k1 of
-    a pinhole. The parameter f of a model with fx and fy is one unknown if these are equal, and two if not.
+    a pinhole. The parameter f of a model with fx and fy is one parameter if they are equal, otherwise two.
     """
     if not names:
         return project
@@ -191,9 +191,9 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
-    """Return a project whose datum is coordinates of chosen points, held: `A=XYZ`, `B=YZ`, `C=Z`.
+    """Return a project with fixed coordinates as datum: `A=XYZ`, `B=YZ`, `C=Z`.
 
-    What was held of points before checks the adjustment.
+    Previously fixed or weighted points become check points.
     """
     if not wanted:
         return project
@@ -215,7 +215,7 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
 
 
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
-    """Return a project with further image measurements: columns and rows of points in photos, pixels."""
+    """Return a project with more image observations, in pixels."""
     messages: list[Message] = []
     found = _with_table(project, path, pixel_table(path, messages), pixel_origin)
     return found.replace(messages=(*found.messages, *messages))
@@ -253,7 +253,7 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
 
 
 def _known_photos(project: Project, given: ControlList) -> ColumnTable:
-    """Return the measurements on photos of the project; underscores stand for blanks there."""
+    """Return observations in photos of the project, with their names."""
     exact = set(project.block.photo_ids)
     plain: dict[str, list[str]] = {}
     for name in project.block.photo_ids:
@@ -271,7 +271,7 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
 
 
 def _present_rows(project: Project, table: ColumnTable) -> set[int]:
-    """Return the rows of measurements that the project has at the same place in the photo."""
+    """Return rows of observations that the project already has."""
     known = _image_rows(project.block)
     pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
     if not any(pair in known for pair in pairs):
@@ -285,10 +285,10 @@ def _present_rows(project: Project, table: ColumnTable) -> set[int]:
 
 
 def _with_list(project: Project, given: ControlList) -> Project:
-    """Return a project with the measurements of a list of control points.
+    """Return a project with the image observations of a list of control points.
 
-    A track with the identifier of a control point is another point, and renamed, unless both have a
-    measurement in common.
+    A track with the identifier of a control point is another point and is renamed, unless both have an equal
+    observation.
     """
     table = _known_photos(project, given)
     present, points = _present_rows(project, table), table.texts("point")
@@ -313,7 +313,7 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    """Return a project with control and check points of a table; a free model is carried onto them."""
+    """Return a project with control and check points of a table."""
     from photogram.formats.control_lists import read_control_list
     from photogram.formats.control_system import check_systems
 
@@ -376,7 +376,7 @@ def with_control(
         statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
         messages=(*messages, *moved.messages[len(project.messages) :]),
         control_crs=settings.crs.get("control", ""),
-        # What is given now is no longer lacking.
+        # Data given now are not missing any more.
         lacks=tuple(
             each
             for each in moved.lacks
@@ -393,7 +393,7 @@ def with_control(
 def _carried(
     project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
 ) -> Project:
-    """Carry a model onto control by a similarity, where it fits so much better than as it stands."""
+    """Transform a free model to control if the fit improves enough."""
     block = project.block
     model = project.starts[points].copy()
     unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))

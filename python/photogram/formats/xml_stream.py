@@ -1,4 +1,4 @@
-"""XML read as a stream: elements of some names are handed over whole, with their lines, and forgotten."""
+"""Streaming XML reader that processes and discards named elements."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from photogram.io.sheets import UNPACKABLE, check_unpacked_size
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import Phrase, phrase
 
-SUFFIXES = (".xml", ".psz")  # The endings of documents, and of archives with a document
+SUFFIXES = (".xml", ".psz")  # Suffixes of documents, and of archives with a document
 PIECE = 1 << 16
 DEEPEST = 200
-LONGEST = 1 << 20  # Bytes of a tag, characters of a text: the parser begins a long tag again with every piece
+LONGEST = 1 << 20  # Largest size of tags and texts: the parser restarts a long tag with every piece
 MOST = 1_000_000
-"""Elements that are kept until what holds them is handed over; 64 characters of theirs count as another."""
+"""Largest number of unprocessed elements; 64 characters of their text count as another."""
 CHARACTERS = 64
 _UNREADABLE = (*UNPACKABLE, ValueError, LookupError)
-"""The errors of archives, and of documents in encodings that are none, or none for a parser."""
+"""Errors of archives, and of documents in unknown or unsupported encodings."""
 
 
 @dataclass
@@ -44,7 +44,7 @@ class Element:
 
     @property
     def place(self) -> Place:
-        """Where it stands."""
+        """Location of the element."""
         return Place(self.file, self.line, f"<{self.name}> {self.text.strip()}"[:120])
 
     def error(self, message: str | Phrase) -> InputError:
@@ -60,7 +60,7 @@ class Element:
         return (each for each in self.children if each.name == name)
 
     def need(self, name: str) -> Element:
-        """Return the first child of a name; an error where there is none."""
+        """Return the first child of a name, which is required."""
         found = self.child(name)
         if found is None:
             raise self.error(phrase("format.member", name=name))
@@ -77,7 +77,7 @@ class Element:
         return self._number(self.text.strip())
 
     def _number(self, text: str) -> float:
-        # There may be millions: the place is only made where one is at fault.
+        # There may be millions of numbers: a location is only created for invalid ones.
         try:
             return finite_number(text)
         except ValueError as error:
@@ -107,7 +107,7 @@ class Element:
         return self._number(self.attributes[name])
 
     def numbers(self, count: int) -> Floats:
-        """Return the text as so many numbers."""
+        """Return the text as a number of numbers."""
         words = self.text.split()
         if len(words) != count:
             raise self.error(phrase("format.count", n=len(words), required=count))
@@ -132,7 +132,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 
 
 def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
-    """Return name and attributes of the root element of a file; nothing for what is no XML."""
+    """Return name and attributes of the root; empty if not XML."""
     found: list[tuple[str, Mapping[str, str]]] = []
     parser = xml.parsers.expat.ParserCreate()
     parser.StartElementHandler = lambda name, attributes: found.append((name, attributes))
@@ -145,13 +145,13 @@ def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
 
 
 def check_root(path: Path) -> None:
-    """Reject a file that has the name of an XML document and no root element that can be read."""
+    """Reject a file with an XML suffix without a readable root element."""
     if path.suffix.lower() in SUFFIXES and not (root := root_of(path)[0]):
         read_stream(path, {}, root)
 
 
 def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:
-    """Read a file; return its root without the elements that were handed over."""
+    """Read a file; return its root without the processed elements."""
     stack: list[Element] = []
     before: list[int] = []
     kept = 0

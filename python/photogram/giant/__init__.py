@@ -1,4 +1,4 @@
-"""The files of GIANT (Elassal and Malhotra, NOAA 1987): COMMON, CAMERAS, IMAGES, FRAMES and GROUND."""
+"""Files of GIANT (Elassal and Malhotra, NOAA 1987)."""
 
 from photogram.arguments.on_demand import attach_checked
 

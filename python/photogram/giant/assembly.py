@@ -1,4 +1,4 @@
-"""From the five files to a block: the rules of the GIANT guide that hold between files, and remarks."""
+"""Conversion of the five files to a block, with remarks."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from photogram.network.structuring import FEWEST_TIES, structure, ties
 from photogram.words import Phrase, phrase
 
 EARTH_RADIUS = 6.371e6  # Metres
-FALSE_ORIGIN = 1e5  # Map projections count from an origin farther off than this; local systems seldom do
-UPRIGHT = 0.97  # Vertical component of the axis of a near-vertical photo, at least
+FALSE_ORIGIN = 1e5  # Map projections have a false origin farther away; local systems seldom do
+UPRIGHT = 0.97  # Smallest vertical component of the axis of a near-vertical photo
 
 
 def remarks(block: Block, frames: list[Frame]) -> list[Message]:
-    """Return remarks on stations without enough rays, names that are alike, and coordinates of a map."""
+    """Return remarks on weak stations, similar names, and map coordinates."""
     messages = []
     for frame, count in zip(frames, ties(block).tolist(), strict=True):
         loose = not (all(frame.position_sd) and all(frame.attitude_sd))
@@ -41,14 +41,14 @@ def remarks(block: Block, frames: list[Frame]) -> list[Message]:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without blanks and case."""
+    """Return a name in small letters without blanks."""
     return "".join(name.split()).casefold()
 
 
 def _alike(block: Block) -> list[Message]:
-    """Name the photos and points whose names differ by case or blanks inside only.
+    """Report photos and points whose names differ only by case or inner blanks.
 
-    The program compared names exactly (2A4), so they are different ones; few users mean that.
+    The program compared names exactly (2A4), so these are different names. This is rarely intended.
     """
     messages = []
     for what, names in (("photos", block.photo_ids), ("points", block.point_ids)):
@@ -65,10 +65,10 @@ def _alike(block: Block) -> list[Message]:
 
 
 def _map_projection(block: Block) -> list[Message]:
-    """Tell State Plane or UTM coordinates by their size; the earth is curved, a map is not.
+    """Report State Plane or UTM coordinates, which are recognised by their size.
 
-    A level surface drops by d^2/2R at the distance d. Seen from the height H that moves the image of a point,
-    at the radius r, by H r^3 / 2 R c^2.
+    A level surface drops by d^2/2R at the distance d, unlike a map. From the height H this moves the image of
+    a point at the radius r by H r^3 / 2 R c^2.
     """
     if block.geographic:
         return []
@@ -87,13 +87,13 @@ def _map_projection(block: Block) -> list[Message]:
     return [Message.of("giant.map-projection", shift=1000 * shift)]
 
 
-LONGEST_METRES = 1e7  # No semi-major axis in metres is longer than this; in feet all are
+LONGEST_METRES = 1e7  # Largest semi-major axis in metres; in feet all are larger
 
 
 def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, list[Message]]:
-    """Return the block of a project, and the remarks on what was left out or deserves a look.
+    """Return the block of a project, and remarks on omitted and doubtful data.
 
-    Photos stand in the order of FRAMES, points in the order of their first image.
+    Photos are in the order of FRAMES, points in the order of their first image.
     """
     limits = limits or Limits()
     common, messages = project.common, list[Message]()
@@ -147,10 +147,9 @@ def job_refraction(
     water: Water | Literal["none"] | None = None,
     index: float | None = None,
 ) -> Refraction | None:
-    """Return the refraction of a job: models of the guide where COMMON has the switch, or those named here.
+    """Return the refraction of a job as in COMMON, or of the named models.
 
-    `none` leaves a model out though COMMON asks for it, None is as COMMON says; the index is that of the
-    water.
+    `none` omits a model that COMMON requires; None follows COMMON. `index` is the refractive index of water.
     """
     asked = air or ("giant" if common.air_refraction else "none")
     in_air = None if asked == "none" else asked
@@ -166,7 +165,7 @@ def job_refraction(
 
 
 def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, ImageFrame]]:
-    """Pair FRAMES with IMAGES. Images of frames that FRAMES does not list are left out silently."""
+    """Pair FRAMES with IMAGES; other images are skipped silently."""
     listed = {frame.name for frame in project.frames}
     measured: dict[str, ImageFrame] = {}
     for images in project.images:
@@ -186,7 +185,7 @@ def _photos(project: Contents, messages: list[Message]) -> list[tuple[Frame, Ima
 
 
 def _lost_header(images: list[ImageFrame], name: str) -> Phrase | str:
-    """Return a hint if a point has the name of a frame: a terminator is missing before its header."""
+    """Return a hint on a missing terminator if a point has a frame's name."""
     for frame in images:
         if name in frame.points:
             record = frame.point_record(frame.points.index(name))
@@ -209,7 +208,7 @@ def _first_images(
     image_points: Indices,
     messages: list[Message],
 ) -> Indices:
-    """Return the rows of the first image of every point on every photo, in their order."""
+    """Return the rows of the first image of every point in every photo, in order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
     order = np.argsort(pairs, kind="stable")
     again = np.sort(order[1:][pairs[order[1:]] == pairs[order[:-1]]])
@@ -225,9 +224,9 @@ def _first_images(
 def _control(
     project: Contents, index: dict[str, int], messages: list[Message]
 ) -> tuple[Floats, Floats, Floats | None]:
-    """Return positions and standard deviations of all points: those of GROUND where it has any.
+    """Return positions and standard deviations of all points, from GROUND if present.
 
-    The second standard deviations are those of check points; None where there are none.
+    The second standard deviations are for check points; None without check points.
     """
     position = np.full((len(index), 3), np.nan)
     sd, check_sd = np.full((len(index), 3), np.inf), None
@@ -252,12 +251,12 @@ def _control(
         rows = list(control)
         values = np.array([point.position for point in control.values()])
         held = np.array([point.held for point in control.values()])
-        # The field of an unheld component may hold nothing: blanks or zero are no value to compare with.
+        # Fields of unheld components may be empty: blanks or zero are not comparison values.
         position[rows] = np.where(held | (values != 0), values, np.nan)
         weights = _or_default([point.sd for point in control.values()], project.common.default_control_sd)
         sd[rows] = np.where(held, weights, np.inf)
         if not held.any(axis=1).all():
-            # The default of COMMON weights control; it says nothing of how good a check point is.
+            # The default of COMMON applies to control, not to the accuracy of check points.
             own = np.array([point.sd for point in control.values()])
             check_sd = np.full_like(position, np.nan)
             check_sd[rows] = np.where(held.any(axis=1, keepdims=True) | (own <= 0), np.nan, own)
@@ -274,7 +273,7 @@ def _or_default(values: ArrayLike, default: ArrayLike) -> Floats:
 
 
 def _longitudes(positions: Floats, geographic: bool) -> Floats:
-    """Bring longitudes written as 0 to 360 degrees to -180 to 180, so that all files agree."""
+    """Convert longitudes of 0 to 360 degrees to -180 to 180, so that all files agree."""
     if geographic:
         longitude = positions[:, 0]
         positions[:, 0] = np.where(
@@ -284,5 +283,5 @@ def _longitudes(positions: Floats, geographic: bool) -> Floats:
 
 
 def _linear_unit(common: Common) -> str:
-    """Tell feet from metres by the axes of the spheroid, which fix the linear unit of the job."""
+    """Return the linear unit of a job, from the axes of its spheroid."""
     return "ft" if common.geographic and common.semi_major > LONGEST_METRES else "m"

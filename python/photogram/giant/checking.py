@@ -1,4 +1,4 @@
-"""The check of a project: that of its block, in the words of the guide, with the remarks on its files."""
+"""The check of a project, with remarks on its files."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def _type_code(kept: Bools) -> int:
 
 
 def check(project: Project, *, limits: Limits | None = None, threads: int | None = None) -> Diagnosis:
-    """Check a project as Appendix H of the guide teaches: first by intersection, then by adjustment.
+    """Check a project as in Appendix H of the guide.
 
-    Nothing is changed or written. What an earlier step explains (a wrong sign, a turned photo) is put right
-    for the later ones, and what it finds wrong is left out of them, so that every error shows by itself.
+    Nothing is changed or written. Later steps use the corrections of earlier ones (a wrong sign, a rotated
+    photo) and omit invalid data, so that every error is reported separately.
 
     Parameters
     ----------

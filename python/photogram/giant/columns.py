@@ -1,9 +1,8 @@
-"""Columns of many records at once, read and written as arrays.
+"""Columns of many records, read and written as arrays.
 
-:mod:`photogram.giant.fields` says what a field means; here the plain ones, which are nearly all, go the same
-way a million at a time. Fields that are not plain to read (blanks inside, exponents, letters, 60 minutes) are
-left to :class:`photogram.giant.records.Record`; numbers that are not plain to write to `format_real` and
-`format_angle`.
+:mod:`photogram.giant.fields` defines the fields. Plain ones, which are nearly all, are processed here in
+arrays of up to a million. Other fields to read (inner blanks, exponents, letters, 60 minutes) are read by
+:class:`photogram.giant.records.Record`. Other numbers are written by `format_real` and `format_angle`.
 """
 
 from __future__ import annotations
@@ -23,11 +22,12 @@ Table = NDArray[np.uint8]
 
 POWERS = 10 ** np.arange(19, dtype=np.int64)
 BLANK, POINT, MINUS, ZERO = b" .-0"
-RUN = 1 << 16  # Values that are written at a time
+RUN = 1 << 16  # Number of values per run
 TIE = 1e-4
-"""A number this close (in units of the last decimal) to the middle between two texts is rounded in decimal.
+"""Numbers this close (in units of the last decimal) to the middle between two texts are rounded in decimal.
 
-Below 1e12 units, which twelve columns hold, a product with a power of ten is wrong by less."""
+Below 1e12 units, the range of twelve columns, a product with a power of ten has a smaller error.
+"""
 
 
 class Columns:
@@ -36,8 +36,7 @@ class Columns:
     Attributes
     ----------
     plain
-        (n,) which records held nothing but plain fields in what was read of them so far; values of the others
-        mean nothing.
+        (n,) which records had only plain fields so far; values of the others are undefined.
     """
 
     def __init__(self, records: Sequence[str], first: int = 1, last: int = 80) -> None:
@@ -56,7 +55,7 @@ class Columns:
     def real(self, first: int, last: int, decimals: int = 3) -> Floats:
         """Read Fw.d fields; blank is zero."""
         negative, digits, places = self._number(first, last, decimals)
-        # Twelve digits and a power of ten are exact, so that the quotient is the number nearest to the text.
+        # Twelve digits and a power of ten are exact, so the quotient is the nearest number to the text.
         size: Floats = digits / POWERS[places]
         return np.where(negative, -size, size)
 
@@ -71,14 +70,14 @@ class Columns:
         return np.where(negative & (digits > 0), -size, size)
 
     def deviation(self, first: int, last: int, *, angle: bool = False) -> Floats:
-        """Read standard deviations; zero stands for the default."""
+        """Read standard deviations; zero means the default."""
         values = self.angle(first, last) if angle else self.real(first, last)
         # Smaller angles could not be written again.
         self.plain &= (values == 0) | (values > (1e-8 * ARCSEC if angle else 0))
         return values
 
     def position(self, geographic: bool) -> Floats:
-        """Read columns 9-44 (F12.3) as (n, 3): X, Y, Z, or longitude and latitude (rad) and height."""
+        """Read columns 9-44 (F12.3) as (n, 3): X, Y, Z, or geographic (rad)."""
         if not geographic:
             return np.column_stack([self.real(9, 20), self.real(21, 32), self.real(33, 44)])
         longitude, latitude, height = self.angle(9, 20), self.angle(21, 32), self.real(33, 44)
@@ -86,7 +85,7 @@ class Columns:
         return np.column_stack([longitude, latitude, height])
 
     def deviations(self, *angles: bool) -> Floats:
-        """Read columns 45-74 as (n, 3) standard deviations; `angles` says which are DMS."""
+        """Read columns 45-74 as (n, 3) standard deviations; `angles` selects DMS fields."""
         fields = zip((45, 55, 65), angles, strict=True)
         return np.column_stack([self.deviation(first, first + 9, angle=angle) for first, angle in fields])
 
@@ -95,7 +94,7 @@ class Columns:
         return np.column_stack([self.angle(first, first + 11) for first in (9, 21, 33)])
 
     def rows(self, *values: Floats) -> list[tuple[Any, ...] | None]:
-        """Return what was read as (n, k) arrays record by record, and None for records that are not plain."""
+        """Return (n, k) arrays as rows, None for records that are not plain."""
         rows = zip(*(zip(*array.T.tolist(), strict=True) for array in values), strict=True)
         return [row if plain else None for row, plain in zip(rows, self.plain.tolist(), strict=True)]
 
@@ -103,14 +102,14 @@ class Columns:
         return self._table[:, first - self._first : last - self._first + 1]
 
     def _number(self, first: int, last: int, decimals: int) -> tuple[Bools, Indices, Indices]:
-        """Read a sign, the digits as a whole number, and how many of them are decimals."""
+        """Read sign, digits as an integer, and number of decimals."""
         field = self._field(first, last)
         negative = np.zeros(len(field), dtype=bool)
         begun, ended, after_point = negative.copy(), negative.copy(), negative.copy()
         digits = np.zeros(len(field), dtype=np.int64)
         count, places = digits.copy(), digits.copy()
         for character in field.T:
-            digit = character - np.uint8(ZERO)  # wraps around below "0"
+            digit = character - np.uint8(ZERO)  # Wraps around below "0"
             is_digit = digit < 10
             is_point, is_blank = character == POINT, character == BLANK
             is_sign = (character == MINUS) | (character == ord("+"))
@@ -128,9 +127,9 @@ class Columns:
 
 
 def real_fields(values: ArrayLike, width: int, decimals: int) -> Table:
-    """Write numbers (n, k) for Fw.d fields, each as :func:`photogram.giant.fields.format_real` does.
+    """Write numbers (n, k) to Fw.d fields; see `format_real`.
 
-    Returns (n, k width) characters of at most 12 a field. Raises ValueError: a number that is infinite or too
+    Returns (n, k width) characters, at most 12 per field. Raises ValueError if a number is infinite or too
     large for the field.
     """
     return _in_runs(values, width, lambda run: _reals(run, width, decimals))
@@ -148,9 +147,9 @@ def _reals(values: Floats, width: int, decimals: int) -> Table:
 
 
 def angle_fields(values: ArrayLike, width: int) -> Table:
-    """Write radians (n, k) as packed DMS fields, each as :func:`photogram.giant.fields.format_angle` does.
+    """Write radians (n, k) to packed DMS fields; see `format_angle`.
 
-    Returns (n, k width) characters of at most 12 a field. Raises ValueError: an angle beyond 360 degrees.
+    Returns (n, k width) characters, at most 12 per field. Raises ValueError if an angle exceeds 360 degrees.
     """
     return _in_runs(values, width, lambda run: _angles(run, width))
 
@@ -179,7 +178,7 @@ def _angles(values: Floats, width: int) -> Table:
 
 
 def position_fields(positions: ArrayLike, geographic: bool) -> Table:
-    """Write (n, 3) coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height.
+    """Write (n, 3) coordinates (F12.3): X, Y, Z, or geographic (rad).
 
     Returns (n, 36) characters.
     """
@@ -190,7 +189,7 @@ def position_fields(positions: ArrayLike, geographic: bool) -> Table:
 
 
 def deviation_fields(deviations: Sequence[tuple[float, ...]], angles: Sequence[bool]) -> list[str]:
-    """Write the standard deviations of records, each as `photogram.giant.fields.format_deviations` does."""
+    """Write standard deviations of records; see `format_deviations`."""
     # A file has few different ones.
     different = {values: format_deviations(values, angles) for values in set(deviations)}
     return [different[values] for values in deviations]
@@ -204,7 +203,7 @@ def texts(table: Table) -> list[str]:
 
 
 def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) -> Table:
-    """Write (n, k) values as (n, k width) characters, in runs that stay in the processor's cache."""
+    """Write (n, k) values as (n, k width) characters, in cached runs."""
     values = np.asarray(values, dtype=np.float64)
     flat = values.ravel()
     table = np.empty((len(flat), width), dtype=np.uint8)
@@ -214,20 +213,20 @@ def _in_runs(values: ArrayLike, width: int, write: Callable[[Floats], Table]) ->
 
 
 def _rounded(values: Floats, places: Indices) -> tuple[Indices, Bools]:
-    """Round to decimals: whole units of the last one, and which are too near to the middle of two to tell."""
+    """Round to units of the last decimal; return which are undecided."""
     scaled = values * POWERS[places]
     units = np.rint(scaled)
     return units.astype(np.int64), np.abs(scaled - units) > 0.5 - TIE
 
 
 def _fitting(units: Indices, places: Indices, room: Indices) -> tuple[Indices, Indices]:
-    """Give up the last decimal, a zero, where rounding up made one more digit than there is room for."""
+    """Omit the last decimal, a zero, if rounding produced one digit too many."""
     carried = (units >= POWERS[np.clip(room, 0, 18)]) & (places > 0)
     return np.where(carried, units // 10, units), places - carried
 
 
 def _packed(units: Indices, places: Indices) -> Indices:
-    """Turn seconds of arc into degrees, minutes and seconds, DDDMMSS; both in units of the last decimal."""
+    """Convert seconds of arc to DDDMMSS, units of the last decimal."""
     unit = POWERS[places]
     minutes, seconds = np.divmod(units, 60 * unit)
     degrees, minutes = np.divmod(minutes, 60)
@@ -238,7 +237,8 @@ def _packed(units: Indices, places: Indices) -> Indices:
 def _characters(negative: Bools, units: Indices, places: Indices, least: int, width: int) -> Table:
     """Write units of the last decimal with an explicit point, right-justified.
 
-    Zeros at the end go, down to `least` decimals; the zero before the point only where there is no room.
+    Trailing zeros are removed down to `least` decimals, the zero before the point only if the field is too
+    narrow.
     """
     units, places = units.copy(), places.copy()
     rows = np.flatnonzero(places > least)
@@ -251,7 +251,7 @@ def _characters(negative: Bools, units: Indices, places: Indices, least: int, wi
     table = np.full((width, len(units)), BLANK, dtype=np.uint8)
     signed = ~negative
     for place, column in enumerate(table[::-1]):
-        # The place counts from the right and includes the point.
+        # The index counts from the right and includes the point.
         units_left = np.where(place == places, units, units // 10)
         first_whole = (place == places + 1) & (place + negative < width)
         is_digit = (place != places) & ((units > 0) | (place < places) | first_whole)

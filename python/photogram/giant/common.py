@@ -1,4 +1,4 @@
-"""COMMON (unit 7): title, job definition, standard deviations of control (GIANT guide, section II.B.1)."""
+"""COMMON (unit 7): title and job definition (GIANT guide, II.B.1)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ UnitVariance = Literal["free", "constrained", "unity"]
 UNIT_VARIANCE: tuple[UnitVariance, ...] = ("free", "constrained", "unity")
 
 SWITCHES = (
-    # column, field of Common, the digit that means True
+    # Column, field of Common, the digit that means True
     (1, "geographic", 1),
     (2, "photo_to_ground", 0),
     (3, "list_input_stations", 0),
@@ -34,7 +34,7 @@ SWITCHES = (
 
 @dataclass
 class Common:
-    """The job definition; the defaults are those of a blank record.
+    """The job definition; the defaults correspond to a blank record.
 
     Attributes
     ----------
@@ -45,23 +45,23 @@ class Common:
     photo_to_ground
         Column 2: the sense of the rotation angles, in and out.
     list_input_stations, list_input_images, list_input_control, list_points, list_stations
-        Columns 3, 4, 5, 6, 8: what the listing shows.
+        Columns 3, 4, 5, 6, 8: contents of the listing.
     save_points, save_stations
         Columns 7, 9: whether units 9 (GROUND) and 8 (FRAMES) are written. The guide's text of column 9
-        repeats that of column 10; 1 is read as "do not save".
+        repeats column 10; 1 means "do not save".
     intersection_only
-        Column 10: stations fixed, every point by itself.
+        Column 10: stations fixed, every point separately.
     error_propagation
-        Column 11: whether covariances are asked for.
+        Column 11: whether covariances are requested.
     unit_variance
-        Column 12: cameras completely free, cameras constrained, or set to unity. `unbiased_variance` is
-        taken but for what is computed as published: `free` is too large where cameras are well known.
+        Column 12: cameras completely free, cameras constrained, or set to unity. `unbiased_variance` replaces
+        it except for results as published: `free` is too large if cameras are accurate.
     sort_points
         Column 13: points in ascending order.
     max_iterations
         Column 14, 1 to 9; blank is 4.
     strip
-        Column 15: the character removed from the beginning of names; blank is none.
+        Column 15: the character removed from the beginning of names, if not blank.
     air_refraction, water_refraction
         Columns 16, 17.
     convergence_percent
@@ -76,8 +76,8 @@ class Common:
         Columns 51-60, 61-70: the axes of the spheroid, whose unit is the linear unit of the job; blank is
         Clarke 1866 in metres.
     control_sd
-        Record 3: standard deviations of control where GROUND has none; radians for longitude and latitude,
-        else linear units; 0 is the built-in default.
+        Record 3: standard deviations of control for blanks in GROUND; radians for longitude and latitude,
+        otherwise linear units; 0 is the built-in default.
     """
 
     title: str = ""
@@ -107,20 +107,20 @@ class Common:
 
     @property
     def unbiased_variance(self) -> Literal["redundancy", "constrained", "unity"]:
-        """What the unit variance is based on today: free cameras do not count, and leave no bias."""
-        # A blank standard deviation of a station is 60,000 units, which nobody has observed.
+        """Basis of the unit variance: as in COMMON, but `redundancy` for `free`."""
+        # A blank standard deviation of a station means 60,000 units: it is not an observation.
         return "redundancy" if self.unit_variance == "free" else self.unit_variance
 
     @property
     def default_control_sd(self) -> tuple[float, float, float]:
-        """What a blank standard deviation in GROUND means: record 3, else 1 unit, or 0.01 seconds of arc."""
+        """Standard deviations for blanks in GROUND: record 3, else 1 unit or 0.01 arcsec."""
         planimetry = 0.01 * ARCSEC if self.geographic else 1.0
         first, second, third = self.control_sd
         return first or planimetry, second or planimetry, third or 1.0
 
     @property
     def default_station_sd(self) -> tuple[float, float, float]:
-        """What a blank standard deviation of a station position means: 60000 units, or 10 minutes of arc."""
+        """Standard deviations for blanks of stations: 60000 units or 10 arcmin."""
         planimetry = 600 * ARCSEC if self.geographic else 60000.0
         return planimetry, planimetry, 60000.0
 
@@ -140,7 +140,7 @@ def parse_common(source: Source) -> Common:
     common.residual_limit = job.real(41, 50)
     common.semi_major = job.real(51, 60, 2) or common.semi_major
     common.semi_minor = job.real(61, 70, 2) or common.semi_minor
-    # Images that were corrected before would be corrected twice.
+    # Corrected images would be corrected twice.
     if common.air_refraction:
         job.remark(phrase("giant.air-refraction"))
     if common.water_refraction:

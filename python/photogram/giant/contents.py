@@ -27,12 +27,12 @@ class Contents(Brief):
     frames: list[Frame]
     images: list[ImageFrame]
     ground: list[GroundPoint]
-    # Remarks on the input, made while it was read and turned into a block
+    # Remarks of the reader, and of the conversion to a block
     messages: list[Message] = field(default_factory=list)
-    directory: Path | None = None  # Where the files were read, if they were
+    directory: Path | None = None  # Folder of the files, if they were read
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what the project is in a few lines: titles, and how many of everything there are."""
+        """Return a short summary of the project: title, and numbers of records."""
         rows = [
             ("cameras", f"{len(self.cameras):,}"),
             ("frames", few([each.name for each in self.frames])),
@@ -54,7 +54,7 @@ class Contents(Brief):
         Raises
         ------
         InputError
-            A value that does not fit its field, or a name that would lose its first character.
+            If a value does not fit its field, or a name would lose its first character.
         """
         geographic, strip = self.common.geographic, self.common.strip
         if strip:
@@ -62,7 +62,7 @@ class Contents(Brief):
             names |= {frame.name for frame in self.images} | {frame.camera for frame in self.images}
             names |= {name for frame in self.images for name in frame.points}
             names |= {point.name for point in self.ground}
-            # Stripping the beginning of a name would make another name of it.
+            # Stripping would change the name.
             for name in sorted(names):
                 if parse_name(name, strip) != name:
                     raise InputError(phrase("giant.stripped-name", name=name, strip=strip))

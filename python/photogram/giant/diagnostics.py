@@ -1,4 +1,4 @@
-"""The warnings of the 1987 program about points and control (GIANT guide, section III)."""
+"""Warnings of the 1987 program on points and control (guide, III)."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from photogram.network.block import Block
 
 @dataclass(frozen=True)
 class ErrorWarning:
-    """One warning: a heading and the points that it concerns.
+    """One warning: a heading and its points.
 
     Attributes
     ----------
     heading
-        In the words of the guide.
+        Text of the guide.
     names
         The points, in the order of the input.
     general
-        Whether the line ERROR WARNINGS stands above the heading in the printout.
+        Whether the printout has the line ERROR WARNINGS above the heading.
     """
 
     heading: str
@@ -32,7 +32,7 @@ class ErrorWarning:
 
 
 def error_warnings(project: Contents, block: Block, limits: Limits | None = None) -> list[ErrorWarning]:
-    """Return the warnings of section III of the guide that a project gives rise to, in the guide's order.
+    """Return the warnings of section III of the guide, in its order.
 
     A control point on one photograph that loses its control is listed there only, not with the pass points.
 
@@ -41,7 +41,7 @@ def error_warnings(project: Contents, block: Block, limits: Limits | None = None
     project, block
         The project and `project.to_block()`, with or without limits.
     limits
-        Only the number of photographs of a point (N4) matters.
+        Only the number of photographs of a point (N4) is used.
     """
     limit = (limits or Limits()).photos_per_point
     control = {point.name: point for point in project.ground}
@@ -68,7 +68,7 @@ def error_warnings(project: Contents, block: Block, limits: Limits | None = None
 
 
 def _on_more_photos(project: Contents, block: Block, limit: int) -> list[str]:
-    """Name the points with more than `limit` images, counted before the block lost any to the limit."""
+    """Return the points with more than `limit` images, before the limit was applied."""
     photos = set(block.photo_ids)
     rays: Counter[str] = Counter()
     for frame in project.images:
@@ -78,7 +78,7 @@ def _on_more_photos(project: Contents, block: Block, limit: int) -> list[str]:
 
 
 def _repeated(project: Contents) -> list[str]:
-    """Name the points that stand in GROUND more than once."""
+    """Return the points with several records in GROUND."""
     records: Counter[str] = Counter()
     for point in project.ground:
         records[point.name] += 1 + point.repeats

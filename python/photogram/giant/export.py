@@ -1,4 +1,4 @@
-"""From a block to GIANT files: a project of a block, and the stations and points of an adjusted one."""
+"""Conversion of blocks to GIANT files, and adjusted records."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Triple = tuple[float, float, float]
 def block_files(
     block: Block, common: Common | None
 ) -> tuple[Common, list[Camera], list[Frame], list[ImageFrame], list[GroundPoint], list[Message]]:
-    """Return the content of the five files for a block; see :meth:`Project.from_block`."""
+    """Return the five files of a block; see :meth:`Project.from_block`."""
     of_images_alone(checked(block), "GIANT files")
     common = dataclasses.replace(
         common or Common(error_propagation=True),
@@ -66,7 +66,7 @@ def block_files(
 
 
 def _write_refraction(common: Common, block: Block) -> list[Message]:
-    """Put the refraction of a block into COMMON; say what cannot be written."""
+    """Write the refraction of a block to COMMON; report unsupported parts."""
     refraction = block.refraction or Refraction()
     common.air_refraction, common.water_refraction = refraction.air is not None, refraction.water is not None
     if refraction.water:
@@ -86,7 +86,7 @@ def _write_refraction(common: Common, block: Block) -> list[Message]:
 
 
 def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
-    """Return the positions and attitudes for FRAMES, which has one set: observed ones where weighted."""
+    """Return positions and attitudes for FRAMES, observed if weighted."""
     stations, left = [], False
     for initial, observed, sd in (
         (block.photo_positions, block.photo_positions_observed, block.photo_position_sd),
@@ -127,7 +127,7 @@ def _ground(block: Block) -> list[GroundPoint]:
 
 
 def _weights(what: str, names: list[str], sd: Floats) -> Floats:
-    """Return standard deviations with 0, the default of GIANT, for infinite ones; nothing can be fixed."""
+    """Return standard deviations, 0 for infinite ones; reject fixed values."""
     fixed = (sd == 0).any(axis=1)
     if fixed.any():
         name = names[int(fixed.argmax())]
@@ -136,7 +136,7 @@ def _weights(what: str, names: list[str], sd: Floats) -> Floats:
 
 
 def _turns(attitudes: Floats) -> Floats:
-    """Bring omega and phi to -180 to 180 degrees and kappa to 0 to 360, as the guide lists them."""
+    """Convert angles to -180 to 180 degrees, kappa to 0 to 360."""
     omega_phi = np.remainder(attitudes[:, :2] + math.pi, 2 * math.pi) - math.pi
     return np.column_stack([omega_phi, np.remainder(attitudes[:, 2], 2 * math.pi)])
 
@@ -147,7 +147,7 @@ def _triple(values: Floats) -> Triple:
 
 
 def adjusted_frames(project: Contents, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
-    """Return the stations for units 8 and 20: adjusted values (P, 3) with the deviations of the input."""
+    """Return stations for units 8 and 20: adjusted values (P, 3), input sd."""
     turned = _turns(attitudes)
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     return [
@@ -163,11 +163,11 @@ def adjusted_frames(project: Contents, block: Block, positions: Floats, attitude
 def adjusted_ground(
     project: Contents, block: Block, positions: Floats, *, as_published: bool = False
 ) -> list[GroundPoint]:
-    """Return the points for unit 9: every point on two or more photographs; NaN positions were not used.
+    """Return the points for unit 9: all on two or more photographs.
 
-    Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
-    be read as GROUND without turning them into control. They are sorted, P9 before P10, unless COMMON (column
-    13) says not to; `as_published` as the 1987 program did and the printout does: names right-justified.
+    Control has its standard deviations and type code. Pass points get the type code 7, so that the file can
+    be read as GROUND without turning them into control. Points are sorted, P9 before P10, unless COMMON
+    (column 13) forbids it. `as_published` sorts right-justified names as the 1987 program did.
     """
     control = {point.name: point for point in project.ground}
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
@@ -198,9 +198,9 @@ def adjusted_records(
 ) -> dict[str, list[str]]:
     """Return the records of the output files by name (GIANT guide, section II.A).
 
-    RESTART (unit 20) always, but for stations that diverged beyond its columns; FRAMES (unit 8) and GROUND
-    (unit 9) of an adjustment that converged, unless COMMON says not to save them. Positions and attitudes (P,
-    3), (P, 3), (n, 3) are those of the last iteration, as in :func:`adjusted_frames` and
+    RESTART (unit 20) is omitted only if stations diverged beyond its columns. FRAMES (unit 8) and GROUND
+    (unit 9) are the result of a converged adjustment, unless COMMON forbids saving. Positions and attitudes
+    (P, 3), (P, 3), (n, 3) are from the last iteration, as in :func:`adjusted_frames` and
     :func:`adjusted_ground`.
     """
     geographic = project.common.geographic

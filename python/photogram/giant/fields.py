@@ -1,7 +1,7 @@
-"""Single fields of fixed-column records: numbers, packed degrees-minutes-seconds and names, read and written.
+"""Reading and writing of single fields of fixed-column records.
 
-Everything here works on the characters of one field and raises ValueError; :mod:`photogram.giant.records`
-adds the file, the record and the columns. Rules: GIANT guide, section II.B.
+Functions process the characters of one field and raise ValueError; :mod:`photogram.giant.records` adds file,
+record and columns. Rules: GIANT guide, section II.B.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from photogram.show.angles import ARCSEC
 from photogram.words import phrase
 
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
-"""The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
+"""Largest angle that is written, 360 59 59: a field may contain 360 degrees plus minutes."""
 
-LARGEST_PACKED = 10**8  # Far beyond every angle, and well within what decimal arithmetic divides
+LARGEST_PACKED = 10**8  # Larger than every angle, and safe for decimal division
 
 
 def parse_name(field: str, strip: str = "") -> str:
-    """Read a name: left-justified, without the leading `strip` characters of COMMON column 15.
+    """Read a name without the leading `strip` characters (COMMON column 15).
 
-    A name of nothing but that character becomes one of it, so that it does not vanish.
+    A name that consists of this character is reduced to one of it, so that it is not empty.
     """
     name = field.strip(" ")
     if not strip or not name.startswith(strip):
@@ -32,7 +32,7 @@ def parse_name(field: str, strip: str = "") -> str:
 
 
 def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
-    """Split DDDMMSS.sss into sign (1 or -1), degrees, minutes and seconds, in decimal arithmetic."""
+    """Split decimal DDDMMSS.sss into sign, degrees, minutes and seconds."""
     sign, value = (-1 if packed < 0 else 1), abs(packed)
     degrees, rest = divmod(value, 10000)
     minutes, seconds = divmod(rest, 100)
@@ -56,10 +56,10 @@ def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
 
 
 def format_real(value: float, width: int, decimals: int) -> str:
-    """Write a number for an Fw.d field: explicit point, as many digits as it needs, right-justified.
+    """Write a number for an Fw.d field with an explicit point, right-justified.
 
-    A number that does not fit is rounded. At least `decimals` decimals where there is room. The implied point
-    of the format is used only where the explicit one would cost a digit. NaN, an unknown value, is a blank
+    A number that does not fit is rounded. It has at least `decimals` decimals if they fit. The implied point
+    of the format is used only if the explicit one would cost a digit. NaN, an unknown value, is a blank
     field.
     """
     if math.isnan(value):
@@ -84,7 +84,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
 
 
 def _rounded(value: float, width: int) -> str:
-    """Round to the decimals that fit; too long where not even the whole number and its point do."""
+    """Round to the decimals that fit; the result may be too long."""
     places, excess = width + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
@@ -96,7 +96,7 @@ def _rounded(value: float, width: int) -> str:
 
 
 def pack_dms(arcseconds: Decimal) -> str:
-    """Write seconds of arc as DDDMMSS.sss with the decimals they have; leading zeros are left out."""
+    """Write seconds of arc as DDDMMSS.sss without leading zeros."""
     whole_minutes, seconds = divmod(abs(arcseconds), 60)
     degrees, minutes = divmod(int(whole_minutes), 60)
     packed = 10000 * degrees + 100 * minutes + seconds
@@ -106,9 +106,9 @@ def pack_dms(arcseconds: Decimal) -> str:
 def format_angle(value: float, width: int) -> str:
     """Write radians as a packed DMS field with an explicit point, right-justified.
 
-    An angle that came from such a field is written exactly; others to five decimals of the second, or four
-    where the columns end. A negative angle that would lose the fourth decimal gets 360 degrees added, which
-    spares the sign. NaN, an unknown value, is a blank field.
+    An angle from such a field is written exactly; others to five decimals of the second, or four at the end
+    of the columns. A negative angle that would lose the fourth decimal is increased by 360 degrees, which
+    needs no sign. NaN, an unknown value, is a blank field.
     """
     if math.isnan(value):
         return " " * width
@@ -121,7 +121,7 @@ def format_angle(value: float, width: int) -> str:
 
 
 def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
-    """Write radians as packed DMS with `least` to `most` decimals of the second, as far as they fit."""
+    """Write radians as packed DMS with `least` to `most` decimals."""
     if not abs(value) <= MOST_ANGLE:
         raise ValueError(phrase("giant.angle", value=value))
     arcseconds = Decimal(repr(float(value) / ARCSEC))
@@ -145,15 +145,15 @@ def format_name(name: str) -> str:
 
 
 def printed_order(name: str) -> tuple[int, str]:
-    """Return the key by which the program sorted names: as right-justified fields, character by character.
+    """Return the sort key of the program: right-justified names.
 
-    A blank sorts before every character that a name begins with, so that the shorter name comes first.
+    A blank precedes every first character of a name, so shorter names are first.
     """
     return len(name), name
 
 
 def format_principal_distance(value: float) -> str:
-    """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks."""
+    """Write a principal distance (F10.3); zero, the default of the camera, is blank."""
     if value == 0:
         return " " * 10
     field = format_real(value, 10, 3)
@@ -167,7 +167,7 @@ def _significant(field: str) -> bool:
 
 
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
-    """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks."""
+    """Write standard deviations, F10.3 or DMS; zero, the default, is blank."""
     fields = []
     for value, angle in zip(values, angles, strict=True):
         if value == 0:

@@ -1,4 +1,4 @@
-"""Finding the files of a project."""
+"""Search for the files of a project."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from photogram.errors import InputError
 from photogram.words import phrase
 
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
-"""The input files; they are found in any letter case and with any one extension."""
+"""The input files; letter case and extension are ignored."""
 
 
 def present_files(directory: Path) -> dict[str, list[Path]]:
-    """Return the files in a directory that could be each of `NAMES`."""
+    """Return the candidates in a directory for each of `NAMES`."""
     found: dict[str, list[Path]] = {name: [] for name in NAMES}
     try:
         entries = sorted(directory.iterdir())
@@ -22,14 +22,14 @@ def present_files(directory: Path) -> dict[str, list[Path]]:
         raise InputError(phrase("giant.folder", reason=reason), file=directory) from None
     for entry in entries:
         name = project_name(entry)
-        # A link that leads nowhere or round in a loop is meant to be the file: reading it says what it is.
+        # A broken or circular link counts as the file: the reader reports its error.
         if name and (entry.is_file() or (entry.is_symlink() and not entry.exists())):
             found[name].append(entry)
     return found
 
 
 def project_name(path: Path) -> str | None:
-    """Return which file of a project this would be by its name; None for another file."""
+    """Return the project file that a file name denotes; None for another file."""
     name = path.stem.upper()
     return name if name in NAMES else None
 
@@ -48,7 +48,7 @@ def find_files(directory: Path) -> dict[str, Path]:
 
 
 def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
-    """Return the records that a writer makes."""
+    """Return the records of a writer; its errors name the file."""
     try:
         return writer()
     except ValueError as error:

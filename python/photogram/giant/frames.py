@@ -1,4 +1,4 @@
-"""CAMERAS (unit 1) and FRAMES (units 3, 8, 20): cameras and stations (GIANT guide, sections II.B.2 and 4)."""
+"""CAMERAS (unit 1) and FRAMES (units 3, 8, 20) (GIANT guide, II.B)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Camera:
     Attributes
     ----------
     name
-        At most 8 characters; blank is a name too, of use where there is one camera only.
+        At most 8 characters; a blank name is valid, for a single camera.
     principal_distance
         Millimetres; negative for the positive (diapositive) plane, positive for the negative plane.
     record
-        Where the camera was read.
+        Record of the camera.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Frame:
     position_sd, attitude_sd
         Standard deviations in the same units; 0 is the default of the guide.
     record
-        Where the station was read: its first record.
+        First record of the station.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Frame:
 
 
 def parse_frames(source: Source, geographic: bool) -> list[Frame]:
-    """Read FRAMES; the order of the frames is kept, for it structures the normal equations."""
+    """Read FRAMES in their order, which structures the normal equations."""
     records = source.records()
     positions = Columns([record.text for record in records[::2]])
     attitudes = Columns([record.text for record in records[1::2]])

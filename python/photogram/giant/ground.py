@@ -1,4 +1,4 @@
-"""GROUND (units 4 and 9): ground control and adjusted ground points (GIANT guide, section II.B.5)."""
+"""GROUND (units 4 and 9): ground points (GIANT guide, II.B.5)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 from photogram.words import phrase
 
-CHECK_POINT = 7  # The type code of a point of which nothing is held
+CHECK_POINT = 7  # The type code of a point with all components unheld
 
 
 @dataclass(slots=True)
@@ -28,11 +28,11 @@ class GroundPoint:
     sd
         Standard deviations in the same units; 0 is the default of COMMON.
     type_code
-        Column 80: the sum of 1, 2 and 4 for components that are to be ignored (unheld); 7 is a check point.
+        Column 80: the sum of 1, 2 and 4 for unheld (ignored) components; 7 is a check point.
     record
-        Where the point was read.
+        Record of the point.
     repeats
-        How many further records of the same name were read; they do not count.
+        Number of further records of the same name, which are ignored.
     """
 
     name: str
@@ -44,12 +44,12 @@ class GroundPoint:
 
     @property
     def held(self) -> tuple[bool, bool, bool]:
-        """Which components are held."""
+        """Held components: X, Y, Z."""
         return not self.type_code & 1, not self.type_code & 2, not self.type_code & 4
 
 
 def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
-    """Read GROUND; of a point that stands there twice the first record counts, with a remark."""
+    """Read GROUND; the first record of a repeated point is used, with a remark."""
     records = source.records()
     names = source.point_names([record.number for record in records])
     columns = Columns([record.text for record in records])

@@ -1,4 +1,4 @@
-"""IMAGES (unit 2): the image coordinates, frame by frame (GIANT guide, section II.B.3)."""
+"""IMAGES (unit 2): image coordinates (GIANT guide, II.B.3)."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class ImageFrame:
     xy
         (k, 2) image coordinates in millimetres.
     principal_distance
-        Millimetres, signed; 0 takes that of the camera.
+        Millimetres, signed; 0: the principal distance of the camera.
     sd
         Standard deviations of x and y in millimetres; 0 is the default, 0.010.
     camera
         Name of the camera system.
     record
-        Where the header was read.
+        Record of the header.
     numbers
-        (k,) numbers of the points' records, where they were read from a file.
+        (k,) record numbers of the points, if they were read from a file.
     """
 
     name: str
@@ -52,15 +52,15 @@ class ImageFrame:
     numbers: list[int] = field(default_factory=list, compare=False, repr=False)
 
     def point_record(self, row: int) -> Record | None:
-        """Return where the image of a row was read."""
+        """Return the record of the image of a row."""
         return self.record.source.record(self.numbers[row]) if self.record else None
 
 
 def parse_images(source: Source) -> list[ImageFrame]:
     """Read IMAGES.
 
-    All point records are read at once, column by column; those that are not plain numbers are read again one
-    by one.
+    All point records are read together, column by column; records that are not plain numbers are read again
+    one by one.
     """
     numbers = source.filled()
     ends = [row for row, number in enumerate(numbers) if source.lines[number - 1].startswith(TERMINATOR)]

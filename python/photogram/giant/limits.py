@@ -1,4 +1,4 @@
-"""The installation parameters N1 to N6 of the 1987 program (GIANT guide, section I.E)."""
+"""Limits N1 to N6 of the 1987 program (GIANT guide, section I.E)."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ NAMES = {
     "N5": "cameras",
     "N6": "bandwidth",
 }
-SHOWN = 40  # Names of points that a message lists at most
+SHOWN = 40  # Largest number of point names in a message
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a job; None, the default of each, is no limit.
+    """Limits of a job; None (default) means no limit.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Limits:
     control
         N3: records of GROUND.
     photos_per_point
-        N4: photographs on which one point may appear; of the others its images are dropped.
+        N4: photographs of one point; images in further photographs are dropped.
     cameras
         N5: camera systems.
     bandwidth
@@ -53,7 +53,7 @@ class Limits:
     Raises
     ------
     InputError
-        A limit that is not a positive whole number.
+        If a limit is not a positive integer.
     """
 
     stations: int | None = None
@@ -71,12 +71,12 @@ class Limits:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read limits as the guide names them: `N1=300,N4=8`.
+        """Read limits with the names of the guide: `N1=300,N4=8`.
 
         Raises
         ------
         InputError
-            Another name, or a limit that is not a positive whole number.
+            If a name is unknown, or a limit is not a positive integer.
         """
         values: dict[str, int] = {}
         for each in text.split(","):
@@ -88,16 +88,16 @@ class Limits:
 
 
 def check_files(project: Contents, limits: Limits) -> None:
-    """Refuse more stations, control or cameras than the limits allow."""
+    """Reject more stations, control or cameras than the limits allow."""
     control = sum(1 + point.repeats for point in project.ground)
     _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)
     _check("GROUND CONTROL", project.ground, control, limits.control)
-    # The guide has no message for N5; this one follows the others.
+    # The guide lacks a message for N5; this one follows the others.
     _check("CAMERA SYSTEMS", [], len(project.cameras), limits.cameras)
 
 
 def check_points(names: Sequence[str] | dict[str, int], limits: Limits) -> None:
-    """Refuse more different points than the limits allow."""
+    """Reject more different points than the limits allow."""
     _check("IMAGE POINTS", [], len(names), limits.points)
 
 
@@ -109,7 +109,7 @@ def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int
 
 
 def allowed_images(image_points: Indices, names: list[str], limits: Limits, messages: list[Message]) -> Bools:
-    """Return which images the limit of photographs of a point (N4) leaves: the first ones given.
+    """Return images below the limit N4 of photographs per point.
 
     `image_points` (m,) are indices of points, photo by photo; `messages` gets the warning of the guide.
     """
@@ -136,10 +136,10 @@ def check_bandwidth(
     intersection_only: bool,
     messages: list[Message],
 ) -> None:
-    """Refuse a block whose effective bandwidth in the order of the input exceeds a limit (N6).
+    """Reject a block whose effective bandwidth in input order exceeds a limit (N6).
 
-    Intersection needs no normal equations of stations: then the point that would break the limit is remarked
-    on only.
+    Intersection needs no normal equations of stations: then the point that exceeds the limit causes a remark
+    only.
     """
     overflow = structure.overflow(limit)
     if overflow is None:

@@ -1,4 +1,4 @@
-"""A GIANT project: five files in a directory, read, written and turned into a block."""
+"""A GIANT project: five files, converted to a block and back."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Project(Contents):
-    """A project: the content of the five files, and the way to a block and back."""
+    """The content of a GIANT project, with conversion to a block and back."""
 
     def _check(self, threads: int | None) -> Diagnosis:
         from photogram.giant.checking import check
@@ -34,20 +34,19 @@ class Project(Contents):
         return check(self, threads=threads)
 
     def to_block(self, limits: Limits | None = None) -> Block:
-        """Return the block: apply the rules that hold between files (GIANT guide, sections II.B and III).
+        """Return the block of a project (GIANT guide, sections II.B and III).
 
         Remarks are added to `messages`, once each.
 
         Parameters
         ----------
         limits
-            The installation parameters of the 1987 program; by default there are none.
+            The installation parameters of the 1987 program; default: no limits.
 
         Raises
         ------
         InputError
-            A frame without images, a camera that is not defined, no frame at all, or a limit that is
-            exceeded.
+            If images of a frame, a camera, or all frames are missing, or a limit is exceeded.
         """
         block, messages = assemble(self, limits)
         known = set(self.messages)
@@ -59,23 +58,23 @@ class Project(Contents):
         """Return the project of a block.
 
         Infinite standard deviations of stations become the (weak) defaults of the guide; points with a known
-        component go to GROUND, with the components that are not held in their type codes. Numbers are kept as
-        far as the columns go when the project is written: at least 4 decimals of the second for longitudes
-        and latitudes, 5 decimals of the millimetre for image coordinates.
+        component are written to GROUND, with unheld components in their type codes. Written numbers are
+        rounded to their columns: at least 4 decimals of the second for longitudes and latitudes, 5 decimals
+        of the millimetre for image coordinates.
 
         Parameters
         ----------
         block
             The block.
         common
-            Switches of the job; title, object space, sense of rotation and spheroid come from the block.
-            Default: error propagation is asked for.
+            Switches of the job; title, object space, sense of rotation and spheroid are taken from the
+            block. Default: error propagation is requested.
 
         Raises
         ------
         InputError
-            Something that GIANT files cannot say: fixed values, different standard deviations within a photo,
-            observations beside images.
+            If GIANT files cannot contain a part of the block: fixed values, different standard deviations
+            within a photo, other observations than image observations.
         """
         return cls(*block_files(block, common))
 
@@ -86,7 +85,7 @@ def read_project(directory: str | os.PathLike[str]) -> Project:
     Raises
     ------
     InputError
-        A file that is missing or ambiguous, or a record that cannot be read; it names file, record number and
+        If a file is missing or ambiguous, or a record cannot be read. The error names file, record number and
         record.
     """
     directory = Path(directory)
@@ -111,7 +110,7 @@ def read_project(directory: str | os.PathLike[str]) -> Project:
 
 
 def project_files(project: Project, directory: Path, *, overwrite: bool = False) -> dict[Path, bytes]:
-    """Return the five files of a project as they would be written by :func:`write_project`."""
+    """Return the five files of a project that :func:`write_project` writes."""
     texts = project.records()
     targets = {name: directory / name for name in NAMES}
     if directory.exists():
@@ -127,22 +126,22 @@ def project_files(project: Project, directory: Path, *, overwrite: bool = False)
 
 
 def write_project(project: Project, directory: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the five files into a directory, which is made if need be; each file whole or not at all.
+    """Write the five files to a directory, each complete or absent.
 
     Parameters
     ----------
     project
-        What to write.
+        The project.
     directory
-        Where.
+        Output directory.
     overwrite
-        Whether input files that are there already, under whatever spelling, may be replaced.
+        If True, existing input files may be replaced, in any spelling of their names.
 
     Raises
     ------
     InputError
-        A value that does not fit its field, or files that are there already.
+        If a value does not fit its field, or files exist and `overwrite` is False.
     OSError
-        The files cannot be written.
+        If the files cannot be written.
     """
     write_whole(project_files(project, Path(directory), overwrite=overwrite))

@@ -1,4 +1,4 @@
-"""The records of the GIANT files: their fields by columns (GIANT guide, section II.B)."""
+"""Records of GIANT files: fields by columns (GIANT guide, II.B)."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
 T = TypeVar("T")
-QUARTER_CIRCLE = math.pi / 2 + 1e-12  # The largest latitude, rounding allowed for
+QUARTER_CIRCLE = math.pi / 2 + 1e-12  # The largest latitude, with a tolerance for rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Source(records.Source):
     """The records of one file."""
 
-    strip: str = ""  # The leading character removed from names (COMMON column 15), or nothing
+    strip: str = ""  # The leading character removed from names (COMMON column 15), or empty
 
     @classmethod
     def read(cls, path: Path, strip: str = "") -> Self:
@@ -61,10 +61,10 @@ class Record(records.Record):
         return parse_name(self.columns(first, first + 7), self.source.strip)
 
     def identification(self, spellings: dict[str, Record]) -> str:
-        """Read the name in columns 1-8 and refuse a second spelling of one name.
+        """Read the name in columns 1-8 and reject a second spelling of one name.
 
-        `spellings` collects the first record of every name. Stripping a leading character, or blanks, can
-        make two names one.
+        `spellings` collects the first record of every name. Removal of a leading character, or of blanks, can
+        make two names equal.
         """
         name = self.name(1)
         first = spellings.setdefault(name, self)
@@ -91,7 +91,7 @@ class Record(records.Record):
             self._parse(first, last, f"F{width}.{decimals}", lambda text: parse_real(text, decimals))
         )
         if abs(value) >= 10**width:
-            # As with standard deviations: the output files have the same columns.
+            # As for standard deviations: the output files have the same columns.
             raise self.error(phrase("giant.range", first=first, last=last, value=value, width=width))
         return value
 
@@ -104,14 +104,14 @@ class Record(records.Record):
         return angle
 
     def deviation(self, first: int, last: int, *, angle: bool = False) -> float:
-        """Read a standard deviation, F10.3 or DMS; zero stands for the default."""
+        """Read a standard deviation, F10.3 or DMS; zero means the default."""
         value = self.angle(first, last) if angle else self.real(first, last)
         if value < 0:
             raise self.error(phrase("giant.negative-sd", first=first, last=last))
         try:
             format_deviations((value,), (angle,))
         except ValueError:
-            # An exponent can say what the output files, which repeat it, could not.
+            # An exponent allows values that the output files cannot repeat.
             raise self.error(phrase("giant.sd-range", first=first, last=last)) from None
         return value
 
@@ -129,7 +129,7 @@ class Record(records.Record):
         return self.angle(9, 20), self.angle(21, 32), self.angle(33, 44)
 
     def deviations(self, *angles: bool) -> tuple[float, float, float]:
-        """Read the three standard deviations of columns 45-74; `angles` says which are DMS."""
+        """Read standard deviations of columns 45-74; `angles`: DMS fields."""
         first, second, third = angles
         return (
             self.deviation(45, 54, angle=first),
@@ -151,10 +151,10 @@ class Record(records.Record):
 
 
 def error_at(record: Record | None, text: Phrase) -> InputError:
-    """Return an error about a record, or without a location if the data are not from a file."""
+    """Return an error about a record; without a record, no location."""
     return record.error(text) if record else InputError(text)
 
 
 def message_at(record: Record | None, text: Phrase) -> Message:
-    """Return a remark on a record, or without a location if the data are not from a file."""
+    """Return a remark on a record; without a record, no location."""
     return record.message(text) if record else Message(text)

@@ -1,1 +1,1 @@
-"""Files: text, tables of commas, records of fixed columns, and the one writer of all results."""
+"""Files: text, CSV tables, records, and the writer of all results."""

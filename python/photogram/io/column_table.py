@@ -1,4 +1,4 @@
-"""Columns of a table as they are asked for: names, numbers, words, each with its place for what is wrong."""
+"""Columns of a table on demand: names, numbers, words, with locations for errors."""
 
 from __future__ import annotations
 
@@ -27,10 +27,9 @@ TRUE, FALSE = (
 
 @dataclass(frozen=True)
 class Names:
-    """A column of names: each name once, in the order in which they come, and which one each row has.
+    """A column of names: different names in order, and the name of each row.
 
-    `distinct` is whether the reader knows that no name is empty, and that all differ by more than blanks and
-    case.
+    `distinct` is True if no name is empty, and all differ by more than blanks and case.
     """
 
     names: list[str]
@@ -40,19 +39,19 @@ class Names:
 
 @dataclass(frozen=True)
 class ColumnTable:
-    """A table whose columns are asked for by name."""
+    """A table with access to columns by name."""
 
     path: Path  # The file
-    head: Place  # The record that names the columns
-    columns: tuple[str, ...]  # Their names, in small letters
-    count: int  # How many rows there are
+    head: Place  # Record with the column names
+    columns: tuple[str, ...]  # Column names in small letters
+    count: int  # Number of rows
     cells: Mapping[str, Sequence[str]]  # Columns of text
     records: Sequence[int]  # Number of the record of each row
     delimiter: str = ","
-    # Columns that were read as numbers or names already
+    # Columns already read as numbers or names
     ready: Mapping[str, Floats | Names] = field(default_factory=dict)
-    numeric: frozenset[str] = frozenset()  # Columns whose cells together show how the table writes numbers
-    # What the file calls the columns, in small letters; empty for one that it does not name
+    numeric: frozenset[str] = frozenset()  # Columns whose cells define the number format
+    # Names of the columns in the file, in small letters; empty for unnamed ones
     own: tuple[str, ...] = ()
 
     def __contains__(self, column: str) -> bool:
@@ -60,7 +59,7 @@ class ColumnTable:
 
     @property
     def headings(self) -> list[tuple[str, str]]:
-        """What each column is called here, and in the file, as far as it names them."""
+        """Internal name and name in the file of each column."""
         return list(zip(self.columns, self.own or self.columns, strict=True))
 
     @cached_property
@@ -73,17 +72,17 @@ class ColumnTable:
         return marks_of((cell for column in numbers for cell in column), self.delimiter)
 
     def place(self, row: int) -> Place:
-        """Return where a row stands."""
+        """Return the location of a row."""
         record = self.records[row]
         text = self._lines[record - 1] if record <= len(self._lines) else None
         return Place(self.path, record, text)
 
     def error(self, row: int, message: str | Phrase) -> InputError:
-        """Return an error that names the place of a row."""
+        """Return an error with the location of a row."""
         return self.place(row).error(message)
 
     def cell_error(self, row: int, column: str, code: str, **fields: Any) -> InputError:
-        """Return an error of a cell, by the code of its message."""
+        """Return an error of a cell from the code of its message."""
         return self.error(row, phrase("error.column", column=column, message=Phrase(code, fields)))
 
     def unknown_error(
@@ -94,14 +93,14 @@ class ColumnTable:
         return self.error(row, phrase("error.column", column=column, message=message))
 
     def renamed(self, names: Mapping[str, str]) -> ColumnTable:
-        """Return the table with other names of some columns."""
+        """Return the table with new names of some columns."""
         columns = tuple(names.get(column, column) for column in self.columns)
         cells = {names.get(column, column): own for column, own in self.cells.items()}
         ready = {names.get(column, column): own for column, own in self.ready.items()}
         return replace(self, columns=columns, cells=cells, ready=ready)
 
     def some(self, rows: Sequence[int]) -> ColumnTable:
-        """Return the table with some of its rows, in this order."""
+        """Return the table with selected rows, in this order."""
         cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
         ready = {
             column: replace(own, rows=own.rows[rows]) if isinstance(own, Names) else own[rows]
@@ -111,7 +110,7 @@ class ColumnTable:
         return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
 
     def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
-        """Return the table with other texts in a column."""
+        """Return the table with new texts in a column."""
         ready = {name: own for name, own in self.ready.items() if name != column}
         return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
@@ -121,7 +120,7 @@ class ColumnTable:
             raise self.head.error(missing_columns(missing, self.columns))
 
     def names(self, column: str) -> Names:
-        """Return a column of names, without blanks at both ends."""
+        """Return a column of names, without outer blanks."""
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = factorised(self._cells(column))
@@ -141,7 +140,7 @@ class ColumnTable:
         return found
 
     def names_once(self, column: str) -> list[str]:
-        """Return a column of names as :meth:`names` has them, none of which may stand in two rows."""
+        """Return a column of names as :meth:`names` does; reject repeated names."""
         found, texts = self.names(column), self.texts(column)
         if len(found.names) < self.count:
             _, first = np.unique(found.rows, return_index=True)
@@ -150,7 +149,7 @@ class ColumnTable:
         return texts
 
     def texts(self, column: str, default: str = "") -> list[str]:
-        """Return a column of text, without blanks at both ends; empty cells have the default."""
+        """Return a column of text, without outer blanks; empty cells have the default."""
         found = self.ready.get(column)
         if isinstance(found, Names):
             return [found.names[row] or default for row in found.rows]
@@ -159,7 +158,7 @@ class ColumnTable:
         return [cell or default for cell in self._cells(column)]
 
     def _cells(self, column: str) -> Sequence[str]:
-        """Return the cells of a column of text: none are numbers of a Parquet file, unless all are empty."""
+        """Return text cells of a column; reject Parquet numbers."""
         numbers = self.ready.get(column)
         if numbers is None:
             return self.cells[column]
@@ -175,13 +174,13 @@ class ColumnTable:
         infinite: bool = False,
         read: Callable[[str], float] | None = None,
     ) -> Floats:
-        """Return (rows,) a column of numbers; empty cells, and all cells of a missing column, are `default`.
+        """Return (rows,) a column of numbers, with `default` for missing cells.
 
-        `infinite` permits `inf`; `read` reads a cell in place of :func:`finite_number`.
+        `infinite` permits `inf`; `read` replaces :func:`finite_number`.
         """
         found = self.ready.get(column)
         if isinstance(found, np.ndarray):
-            # The file has numbers as such; NaN is an empty cell.
+            # The file contains numbers; NaN is an empty cell.
             if not infinite and np.isinf(found).any():
                 row = int(np.argmax(np.isinf(found)))
                 raise self.cell_error(row, column, "error.finite", value=float(found[row]))
@@ -221,13 +220,13 @@ class ColumnTable:
         return np.stack(found, axis=1)
 
     def given(self, columns: Sequence[str]) -> Floats:
-        """Return (rows, k) k columns of numbers, none of which may be missing."""
+        """Return (rows, k) k columns of numbers; reject missing ones."""
         values = self.vectors(columns)
         self.check_given(values, columns)
         return values
 
     def check_given(self, values: Floats, columns: Sequence[str], table: str = "") -> None:
-        """Reject NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
+        """Reject NaN in (rows, k) numbers; `[sd]` may replace columns of `table`."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
@@ -237,9 +236,9 @@ class ColumnTable:
     def words(
         self, column: str, known: Sequence[str], default: str | None = None, *, optional: bool = False
     ) -> list[str]:
-        """Return a column of known words in small letters; empty cells have the default, or the first.
+        """Return a column of known words in small letters.
 
-        `optional`: the default of empty cells needs not be a known word.
+        If `optional`, the default of empty cells may be another word.
         """
         words = [word.lower() for word in self.texts(column, known[0] if default is None else default)]
         for row, word in enumerate(words):
@@ -248,7 +247,7 @@ class ColumnTable:
         return words
 
     def flags(self, column: str) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true."""
+        """Return (rows,) a column of true or false; empty cells are true."""
         values = np.ones(self.count, dtype=bool)
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
@@ -260,7 +259,7 @@ class ColumnTable:
 
 
 def _all_apart(names: Sequence[str]) -> bool:
-    """Whether names are surely all right: without blanks, and different when case is put aside."""
+    """Return whether names are valid: no blanks, different ignoring case."""
     text = "\n".join(names).casefold()
     words = text.split()
     if len(words) < len(names) or text.count("\n") >= len(names):
@@ -270,7 +269,7 @@ def _all_apart(names: Sequence[str]) -> bool:
 
 
 def merged(codes: Indices, texts: list[str]) -> Names:
-    """Return names of which those that were alike but for blanks at their ends are one."""
+    """Return names in which equal ones, ignoring outer blanks, are merged."""
     if len(set(texts)) == len(texts):
         return Names(texts, codes)
     found = factorised(texts)
@@ -278,7 +277,7 @@ def merged(codes: Indices, texts: list[str]) -> Names:
 
 
 def factorised(cells: Sequence[str]) -> Names:
-    """Return each name once, in the order in which they come."""
+    """Return the different names in the order of their first rows."""
     places: dict[str, int] = {}
     rows = np.fromiter((places.setdefault(cell, len(places)) for cell in cells), np.int64, len(cells))
     return Names(list(places), rows)

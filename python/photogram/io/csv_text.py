@@ -1,4 +1,4 @@
-"""Tables as comma-separated text: numbers read back to the last bit, names have quotation marks if needed."""
+"""Tables as CSV with exact numbers, and names in quotes if needed."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from photogram import _photocore
 
-_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By kinds of arrays
+_ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By types of arrays
 
 
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:
-    """Return a table as text: comments, a header, a line per row; empty cells for NaN and None."""
+    """Return a table as CSV with comments; empty cells for NaN and None."""
     head = [*(f"# {each}" for each in comments), ",".join(columns)]
     rows = _photocore.csv_rows([_column(column) for column in columns.values()])
     return ("\n".join(head) + "\n").encode() + rows

@@ -1,8 +1,8 @@
-"""Tables as people write them: any usual delimiter, decimal point or comma, comments, columns in any order.
+"""Reader of text tables with any usual delimiter and column order.
 
-The header says what is what. A record is a line; names may stand in quotation marks. The extension module
-reads large tables of regular lines. All other tables, and all that is at fault, are read line by line with
-the same result and the place of every cell.
+The header defines the columns. A record is a line; names may have quotation marks. The extension module reads
+large tables of regular lines. All other tables, and tables with errors, are read line by line with the same
+result and the location of every cell.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD, cells
 from photogram.words import Phrase, phrase
 
-LARGE = 1 << 16  # Bytes of a table above which the extension module reads it
-PIECE = 1 << 22  # Bytes of a large table that are read at a time
+LARGE = 1 << 16  # Size (bytes) of a table above which the extension module reads it
+PIECE = 1 << 22  # Bytes of a large table per read
 COMMENT = "#"
-TITLES = 30  # Lines in which a header is looked for below titles
-NAMELESS = "?"  # The first column where each row has a cell more than the header
+TITLES = 30  # Number of lines below titles that are searched for a header
+NAMELESS = "?"  # The first column if each row has one cell more than the header
 Spelling = Callable[[Sequence[str]], Sequence[str]]
-_SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)  # What Excel writes before a table
+_SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)  # First line of tables from Excel
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 
@@ -62,7 +62,7 @@ def read_columns(
 
 
 def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
-    """Return the names of all columns; `settled` where a user may say which of two is one."""
+    """Return the names of all columns; `settled`: the user may choose."""
     columns = tuple(spelling(own))
     for column in columns:
         if column and columns.count(column) > 1:
@@ -76,7 +76,7 @@ def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool
 def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = ()) -> ColumnTable:
     """Read a table whose columns are known, after any comments, titles and headers.
 
-    Columns that are not used have empty names; `numbers` as in :func:`read_columns`.
+    Unused columns have empty names; `numbers` as in :func:`read_columns`.
     """
 
     def header(text: str) -> _Header:
@@ -98,10 +98,10 @@ _Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
 
 
 def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]) -> ColumnTable:
-    """Read a table; a large regular one in pieces, by its header at the beginning."""
+    """Read a table; a large regular one in pieces, if its header is at the beginning."""
     if path.suffix.lower() != ".xlsx" and path.is_file() and path.stat().st_size > LARGE:
         begin = read_beginning(path, LARGE).rpartition("\n")[0]
-        # If the header is not in the beginning, it is searched in the whole text.
+        # If the header is not at the beginning, the whole text is searched.
         with suppress(InputError):
             table = _regular(path, header(begin), numbers)
             if table is not None:
@@ -124,9 +124,9 @@ def _head(
     spelling: Spelling,
     hint: Callable[[Sequence[str]], str | Phrase] | None,
 ) -> tuple[Place, str]:
-    """Find the header: the first line, or the last comment before it where only that names known columns.
+    """Find the header: the first line, or the last comment before it.
 
-    Lines of titles may stand before it: then it is the first below them that names several known columns.
+    If title lines precede it, it is the first line below them with several known columns.
     """
     comment: Place | None = None
     for record, line in enumerate(_lines(text), 1):
@@ -154,7 +154,7 @@ def _head(
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Yield the lines of a text, without a copy of what nobody asks for."""
+    """Yield the lines of a text without copying the unused rest."""
     start = 0
     while (end := text.find("\n", start)) >= 0:
         yield text[start:end]
@@ -190,9 +190,9 @@ def _by_lines(
     delimiter: str,
     numbers: Collection[str],
 ) -> tuple[list[list[str]], list[int]]:
-    """Split the lines below a header into rows, all as wide as the columns.
+    """Split the lines below a header into rows of equal width.
 
-    Where they have one cell more, the first has no name if the names would else stand over no numbers.
+    If rows have one cell more than the header, the first column may be unnamed; see `_shifted`.
     """
     rows, records = list[list[str]](), list[int]()
     width = len(columns)
@@ -203,7 +203,7 @@ def _by_lines(
         place = Place(path, record, line)
         cells = _split(place, delimiter)
         if len(cells) != width:
-            # A delimiter at the end of every line is one cell too many, and empty.
+            # A delimiter at the end of every line produces an additional empty cell.
             if len(cells) == width + 1 and not cells[-1]:
                 cells.pop()
             elif not rows and len(cells) == width + 1 and _shifted(cells, columns, numbers):
@@ -216,7 +216,7 @@ def _by_lines(
 
 
 def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Whether a record has as many cells as there are columns, and numbers where they are numbers."""
+    """Return whether a record fits the columns and their numbers."""
     cells = _split(place, _delimiter(place))
     return len(cells) == len(columns) and all(
         _NUMBER.fullmatch(cell) is not None
@@ -226,7 +226,7 @@ def _fits(place: Place, columns: Sequence[str], numbers: Collection[str]) -> boo
 
 
 def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[str]) -> bool:
-    """Whether columns stand over numbers if the first cell has no column, and must, for they would not."""
+    """Return whether numbers fit their columns if the first cell is unnamed."""
     numeric = [k for k, column in enumerate(columns) if column in numbers]
     as_is, shifted = (
         all(_NUMBER.fullmatch(cells[k + step]) or not cells[k + step] for k in numeric) for step in (0, 1)
@@ -235,7 +235,7 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
 
 
 def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
-    """Read a large table; None if a line is irregular: `_by_lines` then reports its location."""
+    """Read a large table; None if a line is irregular."""
     head, own, columns, delimiter = header
     assert head.record is not None
     if delimiter == " " or not all(columns):
@@ -245,7 +245,7 @@ def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTab
         mark = codecs.BOM_UTF8
         file.seek(len(mark) if file.read(len(mark)) == mark else 0)
         above = b"".join(itertools.islice(file, head.record))
-        # A carriage return alone ends a line, too.
+        # A single carriage return ends a line, too.
         if b"\r" in above.replace(b"\r\n", b""):
             return None
         while lines := file.read(PIECE) + file.readline():
@@ -264,7 +264,7 @@ def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTab
 def _decoded(
     contents: Mapping[str, Floats | tuple[bytes, Indices, bool]], encoding: str
 ) -> dict[str, Floats | Names] | None:
-    """Return columns with names in an encoding; None if the names have another encoding."""
+    """Return columns with decoded names; None for another encoding."""
     ready: dict[str, Floats | Names] = {}
     for column, content in contents.items():
         if isinstance(content, np.ndarray):
@@ -304,7 +304,7 @@ def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> Column
         digits = kind.is_integer(column.type) and name not in numbers
         if is_text or digits or kind.is_dictionary(column.type):
             texts, codes = coded(column)
-            empty = [""] * bool((codes < 0).any())  # the last name
+            empty = [""] * bool((codes < 0).any())  # The last name
             ready[name] = merged(codes % (len(texts) + 1), [*(str(text).strip() for text in texts), *empty])
         elif is_number:
             ready[name] = column.to_numpy().astype(float)

@@ -1,4 +1,4 @@
-"""Reading text files; one that cannot be read is an :class:`~photogram.errors.InputError` that names it."""
+"""Reader of text files; errors name the file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from photogram.errors import InputError
 from photogram.io.sheets import sheet_text
 from photogram.words import phrase
 
-HEAD = 4096  # Bytes in which text of two bytes a character is told, where it has no mark
+HEAD = 4096  # Bytes in which two-byte encodings without byte order mark are detected
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Name the file that the system cannot read: an :class:`OSError` becomes an :class:`InputError`."""
+    """Convert an :class:`OSError` to an :class:`InputError` that names the file."""
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
     try:
@@ -32,16 +32,16 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_beginning(path: Path, size: int = HEAD) -> str:
-    """Read what a text file begins with, by which formats are told, as :func:`read_text` does."""
+    """Read the start of a text file, for format detection, as :func:`read_text` does."""
     with reading(path), path.open("rb") as file:
         text = _decoded(file.read(size), whole=False)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, UTF-16, else that of Windows; any line ends become line feeds.
+    """Read a text file: UTF-8, UTF-16 or Windows, with any line ends.
 
-    The first sheet of an Excel workbook is text, too: a line a row, tabs between its cells.
+    The first sheet of an Excel workbook is text, too: one line per row, with tabs between cells.
     """
     if path.suffix.lower() == ".xlsx":
         return sheet_text(path)
@@ -51,7 +51,7 @@ def read_text(path: Path) -> str:
 
 
 def _decoded(data: bytes, *, whole: bool = True) -> str:
-    """Decode the bytes of a file; where they are not the whole of it, its last character may be cut."""
+    """Decode the bytes of a file, or of its start."""
     for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
         try:
             return codecs.getincrementaldecoder(encoding)().decode(data, whole)
@@ -61,7 +61,7 @@ def _decoded(data: bytes, *, whole: bool = True) -> str:
 
 
 def _wide(data: bytes) -> str | None:
-    """Return the encoding of two bytes a character: by its mark, else by zeros in alternate places."""
+    """Return a two-byte encoding, by its mark or by zero bytes, else None."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     head = data[:HEAD]
@@ -72,7 +72,7 @@ def _wide(data: bytes) -> str | None:
 
 
 def read_lines(path: Path) -> list[str]:
-    """Read the lines of a text file as :func:`read_text` does, without their ends."""
+    """Read the lines of a text file as :func:`read_text` does, without line ends."""
     lines = read_text(path).removesuffix("\x1a").split("\n")
     if lines[-1] == "":
         lines.pop()

@@ -1,4 +1,4 @@
-"""JSON: the one form of all documents, and trees of what was read, whose errors name the path."""
+"""JSON: format of all documents, and trees of read values."""
 
 from __future__ import annotations
 
@@ -24,16 +24,15 @@ LARGEST = 1e300
 
 
 def to_json(document: object) -> bytes:
-    """Return a document as JSON: UTF-8, two blanks a level, numbers to the last bit, a line end at its end.
+    """Return a document as JSON: UTF-8, indented, exact numbers.
 
-    Arrays of NumPy are lists, data classes what their fields are, numbers as keys text, and what is not a
-    number is null.
+    Arrays of NumPy become lists, dataclasses objects, numeric keys text, and NaN and infinite numbers null.
     """
     return orjson.dumps(document, default=_rows, option=_FORM)
 
 
 def _rows(value: object) -> object:
-    """Return the rows of an array that does not lie in memory row by row, or holds what is no number."""
+    """Return the rows of an unusual array as lists."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     raise TypeError(f"a JSON document cannot contain {type(value).__name__}")
@@ -41,7 +40,7 @@ def _rows(value: object) -> object:
 
 @contextmanager
 def holding(what: str, path: Path | None = None) -> Iterator[None]:
-    """Report errors of a document that lacks members or has others than expected."""
+    """Report errors of a document with missing or unexpected members."""
     try:
         yield
     except InputError as error:
@@ -54,14 +53,14 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Tree:
-    """A value within a file, and where it stands there."""
+    """A value of a JSON file and its path."""
 
     value: Any
     file: Path
     path: str = ""
 
     def error(self, message: str | Phrase) -> InputError:
-        """Return an error that names file and path."""
+        """Return an error that contains file and path."""
         located = phrase("error.at", what=self.path or phrase("error.document"), message=message)
         return InputError(located, file=self.file, text=repr(self.value)[:120])
 
@@ -83,7 +82,7 @@ class Tree:
         return Tree(members[key], self.file, f"{self.path}/{key}")
 
     def get(self, key: str, default: Any) -> Tree:
-        """Return a member, or a default where it is missing or null."""
+        """Return a member, or a default if it is missing or null."""
         value = self._as(dict, "error.table").get(key)
         return Tree(default if value is None else value, self.file, f"{self.path}/{key}")
 
@@ -138,5 +137,5 @@ def read_json(path: Path) -> Tree:
 
 
 def unknown(tree: Tree, what: str, known: Mapping[str, Any]) -> InputError:
-    """Return an error for a word that is none of those known."""
+    """Return an error for an unknown word."""
     return tree.error(unknown_name(what, str(tree.value), known))

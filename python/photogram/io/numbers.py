@@ -1,4 +1,4 @@
-"""Numbers in text files: one strict spelling, and the marks by which tables divide decimals and thousands."""
+"""Numbers in text files: strict spelling, decimal and thousands marks."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
-LARGEST_INTEGER = 2**63 - 1  # The largest that an array of 64-bit integers holds
+LARGEST_INTEGER = 2**63 - 1  # The largest 64-bit integer
 
-LONGEST = 1_000  # Characters of a number at most: 767 digits tell any two numbers of double precision apart
+LONGEST = 1_000  # Largest number of characters of a number: 767 digits distinguish any doubles
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -23,12 +23,12 @@ _BLANKS = re.compile(r"(?<=\d)['’ \u00a0\u202f](?=\d{3}(?!\d))")
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether a text is digits 0 to 9 and nothing else; other alphabets, superscripts and signs are not."""
+    """Return whether a text consists of digits 0 to 9."""
     return text.isascii() and text.isdigit()
 
 
 def whole_number(text: str, lowest: int = 0, highest: int = LARGEST_INTEGER) -> int:
-    """Read a whole number between two limits, which is not negative by default."""
+    """Read an integer between two limits, by default not negative."""
     if len(text) > LONGEST or not _WHOLE.fullmatch(text):
         raise InputError(phrase("error.whole", value=text))
     value = int(text)
@@ -38,9 +38,9 @@ def whole_number(text: str, lowest: int = 0, highest: int = LARGEST_INTEGER) -> 
 
 
 def finite_number(text: str) -> float:
-    """Read a number in decimal digits, with an exponent or without.
+    """Read a number in decimal digits, with or without exponent.
 
-    What Python reads besides is refused: NaN and infinity, `1_000`, digits of other alphabets, and numbers
+    Other spellings of Python are rejected: NaN and infinity, `1_000`, digits of other alphabets, and numbers
     beyond double precision.
     """
     value = float(text) if len(text) <= LONGEST and _NUMBER.fullmatch(text) else math.nan
@@ -50,7 +50,7 @@ def finite_number(text: str) -> float:
 
 
 def number_or_text(text: str) -> int | float | str:
-    """Return the number that a text is by the rules of Python, else the text."""
+    """Return the number in a text by the rules of Python, otherwise the text."""
     for kind in (int, float):
         try:
             return kind(text)
@@ -61,15 +61,15 @@ def number_or_text(text: str) -> int | float | str:
 
 @dataclass(frozen=True)
 class Marks:
-    """How the numbers of a table are written."""
+    """The number format of a table."""
 
-    decimal: str  # What divides decimals, `.` or `,`
-    thousands: bool  # Whether a number shows that the other of both divides thousands
+    decimal: str  # Decimal mark, `.` or `,`
+    thousands: bool  # Whether a number shows that the other mark separates thousands
 
     def plain(self, text: str) -> str:
-        """Return a number as it is spelled here: a decimal point, no marks of thousands.
+        """Convert a number to a decimal point without marks of thousands.
 
-        Anything else comes back as it is, for whoever reads numbers to refuse.
+        Other texts are returned unchanged; the reader of numbers rejects them.
         """
         simple = _SIMPLE.fullmatch(text) is not None
         if not _MARKED.fullmatch(text) or (simple and (self.decimal == "." or "." not in text)):
@@ -86,11 +86,11 @@ class Marks:
 
 
 def marks_of(cells: Iterable[str], delimiter: str) -> Marks:
-    """Return how the numbers of a table are written, from all its cells that look like numbers.
+    """Return the number format of a table, from all cells that look like numbers.
 
-    The last of both marks in one number divides decimals; a mark that stands twice in one does not, and
-    neither does one before which or behind which digits are not in threes. Where nothing tells, a comma
-    divides decimals unless it divides cells.
+    The last of two different marks in a number is the decimal mark. A repeated mark separates thousands. A
+    single mark before groups of three digits is ambiguous; other single marks are decimal marks. If all marks
+    are ambiguous, a comma is the decimal mark unless it is the delimiter.
     """
     decimals, thousands = set[str](), set[str]()
     doubtful = ""

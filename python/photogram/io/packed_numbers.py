@@ -1,4 +1,4 @@
-"""Files of numbers with white space between them, packed by bzip2 or gzip or not, read piece by piece."""
+"""Files of numbers and white space, optionally packed, read in pieces."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from photogram.words import Phrase, phrase
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),
     b"\x1f\x8b": lambda file: cast("BinaryIO", gzip.GzipFile(fileobj=file)),
-}  # How files that begin like this are unpacked piece by piece
+}  # Functions that unpack files with these first bytes in pieces
 LONGEST = max(map(len, COMPRESSED))
-PIECE = 1 << 17  # Characters that are read at a time
-SHOWN = 120  # Characters of a faulty line that are shown
+PIECE = 1 << 17  # Characters per read
+SHOWN = 120  # Characters of an invalid line in messages
 
 
 def pieces(path: Path) -> Iterator[bytes]:
-    """Yield the file, unpacked, in pieces that end where a number does."""
+    """Yield the unpacked file in pieces that end between numbers."""
     unpack = None
     try:
         with path.open("rb") as file:
@@ -58,7 +58,7 @@ def _whole_words(path: Path, file: BinaryIO) -> Iterator[bytes]:
 
 
 def packed(content: bytes, suffix: str) -> bytes:
-    """Return content packed as a suffix (`.bz2`, `.gz`) says; as it is for any other."""
+    """Return content packed as its suffix (`.bz2`, `.gz`) requires."""
     if suffix == ".bz2":
         return bz2.compress(content)
     return gzip.compress(content, mtime=0) if suffix == ".gz" else content
@@ -70,7 +70,7 @@ def whole(numbers: Floats) -> NDArray[np.bool_]:
 
 
 def at(path: Path, index: int, message: str | Phrase) -> InputError:
-    """Return an error at the line that holds the word of the given index."""
+    """Return an error at the line that contains the word of the given index."""
     words = lines = 0
     if not path.is_file():
         # A pipe cannot be read again.

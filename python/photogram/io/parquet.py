@@ -1,4 +1,4 @@
-"""Parquet files whose columns say what they are: unit and description are metadata of every field.
+"""Parquet files with unit and description in each field.
 
 pyarrow is an extra (`pip install 'photogram[parquet]'`).
 """
@@ -20,13 +20,13 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     import pyarrow
 
-ROWS = 2**17  # Of a row group
-LEVEL = 1  # Of zstd: numbers of measurements hardly get smaller at higher ones
+ROWS = 2**17  # Rows per row group
+LEVEL = 1  # Compression level of zstd: higher levels hardly reduce measured numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """A column of names that repeat: row i is `names[rows[i]]`."""
+    """A column of repeated names: row i is `names[rows[i]]`."""
 
     names: Sequence[str]
     rows: Indices
@@ -41,16 +41,16 @@ class Column:
 
     name: str  # Without blanks
     values: Any  # (rows,) an array or names, or (rows, k) an array: k numbers in each row
-    unit: str = ""  # `m`, `rad`, `px`, `m2` ...; `1` of plain numbers; empty where it has none
+    unit: str = ""  # `m`, `rad`, `px`, `m2` ...; `1` for plain numbers; empty without unit
     description: str = ""  # One line
-    order: tuple[str, ...] = ()  # What the k numbers are
+    order: tuple[str, ...] = ()  # Names of the k numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A table that was read: arrays of numbers and lists of names, and what the file says of itself.
+    """A table that was read: arrays of numbers, lists of names, and metadata.
 
-    A column that is not there, or holds something else than is asked for, is an :class:`InputError`.
+    A missing column, or one of another type, is an :class:`InputError`.
     """
 
     path: Path  # The file
@@ -59,7 +59,7 @@ class Sheet:
 
     @property
     def rows(self) -> int:
-        """How many rows it has."""
+        """Number of rows."""
         return len(next(iter(self.columns.values()), ()))
 
     def column(self, name: str) -> Any:
@@ -76,7 +76,7 @@ class Sheet:
         return values
 
     def numbers(self, name: str, columns: int = 0) -> Any:
-        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides their number."""
+        """Return a column of numbers: (rows,), or (rows, columns)."""
         values = self.column(name)
         kind = values.dtype.kind if isinstance(values, np.ndarray) else ""
         width = values.shape[1] if kind and values.ndim == 2 else 0
@@ -87,15 +87,15 @@ class Sheet:
 
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
-    """Return a function that writes columns of one length, with metadata of the table, to an open file."""
-    from pyarrow import parquet, types  # take long to import
+    """Return a function that writes columns and metadata to an open file."""
+    from pyarrow import parquet, types  # Import is slow
 
     table = _table(columns, about)
     repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
     few = [name for name in repeated if types.is_dictionary(table.schema.field(name).type)]
 
     def write(file: BinaryIO) -> None:
-        # Of numbers of measurements hardly two are alike: a dictionary of them takes ten times as long.
+        # Measured numbers are rarely equal: a dictionary of them takes ten times as long.
         parquet.write_table(
             table,
             file,
@@ -123,7 +123,7 @@ def read_sheet(path: Path) -> Sheet:
 
 
 def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
-    """Return the names of a column of text, and the name of each row; -1 for empty cells."""
+    """Return names of a text column, and the index of each row (-1: empty)."""
     import pyarrow
 
     whole = column.unify_dictionaries().combine_chunks()
@@ -135,13 +135,13 @@ def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
 
 
 def packed(matrices: np.ndarray) -> np.ndarray:
-    """Return (n, k (k + 1) / 2) the lower triangles of (n, k, k) symmetric matrices, row by row."""
+    """Return (n, k (k + 1) / 2) lower triangles of (n, k, k) matrices by row."""
     rows, columns = np.tril_indices(matrices.shape[1])
     return np.ascontiguousarray(matrices[:, rows, columns])
 
 
 def unpacked(triangles: np.ndarray) -> np.ndarray:
-    """Return (n, k, k) symmetric matrices of their lower triangles."""
+    """Return (n, k, k) symmetric matrices from their lower triangles."""
     k = round(((8 * triangles.shape[1] + 1) ** 0.5 - 1) / 2)
     rows, columns = np.tril_indices(k)
     matrices = np.empty((len(triangles), k, k))
@@ -168,7 +168,7 @@ def _array(values: Any) -> pyarrow.Array:
     if isinstance(values, Repeated):
         names = pyarrow.array(values.names, pyarrow.string())
         rows = pyarrow.array(values.rows.astype(np.int32))
-        # A dictionary of a great many names would stand before every group of rows.
+        # A large dictionary would be repeated in every group of rows.
         few = len(values.names) <= ROWS
         return pyarrow.DictionaryArray.from_arrays(rows, names) if few else names.take(rows)
     if isinstance(values, np.ndarray) and values.ndim == 2:

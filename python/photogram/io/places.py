@@ -1,4 +1,4 @@
-"""Places in files, so that errors and remarks can name them."""
+"""Locations in files, for errors and remarks."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from photogram.words import Phrase, phrase
 
 
 class Failing(Protocol):
-    """What can tell where it stands in a file: a place, an element of XML, a member of JSON."""
+    """An object with a location: a place, XML element or JSON member."""
 
     def error(self, message: str | Phrase, /) -> InputError:
-        """Return an error that names the place."""
+        """Return an error with the location."""
 
 
 @contextmanager
 def at_place(place: Failing, what: str | Phrase = "") -> Iterator[None]:
-    """Let errors name a place, and the faulty thing, if they name no file yet."""
+    """Add a location, and the name of the invalid item, to errors without a file."""
     try:
         yield
     except InputError as error:
@@ -35,26 +35,26 @@ def at_place(place: Failing, what: str | Phrase = "") -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where something was read: file, record number (from 1) and record, as far as they are known."""
+    """Location of data: file, record number (from 1) and record, if known."""
 
     file: Path | None = None
     record: int | None = None
     text: str | None = None
 
     def error(self, message: str | Phrase) -> InputError:
-        """Return an error that names the place."""
+        """Return an error with the location."""
         return InputError(message, file=self.file, record=self.record, text=self.text)
 
     def number(self, text: str, what: str | Phrase = "") -> float:
-        """Return a finite number that a text is; an error names the place, and what it should be."""
+        """Read a finite number; errors contain the location and its name."""
         with at_place(self, what):
             return finite_number(text)
 
     def whole(self, text: str, what: str | Phrase = "", highest: int = LARGEST_INTEGER) -> int:
-        """Return a whole number that is not negative; errors as :meth:`number`."""
+        """Read an integer that is not negative; errors as :meth:`number`."""
         with at_place(self, what):
             return whole_number(text, highest=highest)
 
     def message(self, message: str | Phrase) -> Message:
-        """Return a remark that names the place."""
+        """Return a remark with the location."""
         return Message(message, self.file, self.record, self.text)

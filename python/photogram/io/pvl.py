@@ -1,6 +1,6 @@
-"""Labels in PVL (parameter value language), as ISIS and the archives of planetary images write them.
+"""Labels in PVL (parameter value language) of planetary images.
 
-Read by hand: a hundred lines, where the package `pvl` were one more dependency of every installation.
+This reader is short; the package `pvl` would be an additional dependency of every installation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from photogram.words import Phrase, phrase
 
 
 class Quantity(NamedTuple):
-    """A value with the unit that stands behind it, between angle brackets."""
+    """A value with its unit, which follows in angle brackets."""
 
     value: Value
     unit: str
@@ -31,18 +31,18 @@ class Group:
 
     name: str  # Empty for the label itself
     kind: str  # `group`, `object`, or `label`
-    line: int = field(default=1, compare=False)  # Where it begins, from 1
+    line: int = field(default=1, compare=False)  # First line, from 1
     items: list[tuple[str, Value]] = field(
         default_factory=list
-    )  # In the order of the file, repeated keys too
+    )  # In the order of the file, including repeated keys
     inside: list[Group] = field(default_factory=list)  # Groups and objects, in the order of the file
 
     def get(self, key: str) -> Value | None:
-        """Return the first value of a key, None where there is none. Capitals are all one."""
+        """Return the first value of a key, ignoring case; None if it is missing."""
         return next((value for own, value in self.items if own.lower() == key.lower()), None)
 
     def groups(self, name: str) -> list[Group]:
-        """Return the groups and objects of a name that are directly in it. Capitals are all one."""
+        """Return the groups and objects of a name directly in it, ignoring case."""
         return [each for each in self.inside if each.name.lower() == name.lower()]
 
 
@@ -54,9 +54,9 @@ _TOKEN = re.compile(
     |(?P<word>(?:[^\s=(){},;"'<>/-]|/(?!\*)|-(?:\r?\n\s*)?)+)""",
     re.VERBOSE,
 )
-_CONTINUED = re.compile(r"-\r?\n\s*")  # A hyphen at the end of a line: the text goes on without it
+_CONTINUED = re.compile(r"-\r?\n\s*")  # A hyphen at the end of a line: the text continues without it
 _FOLDED = re.compile(r"\s*\n\s*")
-_WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")  # Zeros in front are part of a name
+_WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")  # Leading zeros are part of a name
 _DECIMAL = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _BASED = re.compile(r"(2|8|16)#([-+]?[0-9A-Fa-f]{1,16})#")
 _PLAIN = re.compile(r"[^\s=(){},;\"'<>#/-](?:[^\s=(){},;\"'<>#/-]|/(?!\*)|-(?!$))*")
@@ -73,7 +73,7 @@ class _Token(NamedTuple):
 
 
 class _Reader:
-    """The tokens of a label, one after the other."""
+    """A reader of consecutive tokens of a label."""
 
     def __init__(self, text: str, file: Path, numbers: bool) -> None:
         self.text, self.file, self.at, self.numbers = text, file, 0, numbers
@@ -81,7 +81,7 @@ class _Reader:
         self.token = self._next()
 
     def line(self, at: int) -> int:
-        """Return the number of a line; those before the one that was asked for last are not counted again."""
+        """Return the number of a line; counting continues from the previous request."""
         known, line = self.known if self.known[0] <= at else (0, 1)
         self.known = at, line + self.text.count("\n", known, at)
         return self.known[1]
@@ -90,7 +90,7 @@ class _Reader:
         return InputError(message, file=self.file, record=self.line(self.token.start if at is None else at))
 
     def take(self) -> _Token:
-        """Return this token, and go to the next."""
+        """Return this token and move to the next."""
         taken = self.token
         self.token = self._next()
         return taken
@@ -112,7 +112,7 @@ class _Reader:
 def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
     """Return the groups of a label, up to its `End` or the end of the text.
 
-    `numbers`: whether words that are numbers become numbers; if not, all values are the texts of the label.
+    If `numbers` is False, numeric words remain text.
     """
     reader = _Reader(text, file, numbers)
     label = Group("", "label")
@@ -143,7 +143,7 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
 
 
 def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start: int) -> None:
-    """End the innermost group; its name may be said again."""
+    """End the innermost group; its name may be repeated."""
     if len(open_groups) == 1 or open_groups[-1].kind != kind:
         raise reader.error(phrase("pvl.end", key=key), start)
     ended = open_groups.pop()
@@ -189,7 +189,7 @@ def _scalar(reader: _Reader, key: str) -> str | int | float:
 
 
 def _number(word: str) -> str | int | float:
-    """Return the number that a word is; the word itself where it is none that is finite."""
+    """Return the finite number in a word, otherwise the word."""
     if _WHOLE.fullmatch(word):
         return int(word)
     if (based := _BASED.fullmatch(word)) is not None:
@@ -203,7 +203,7 @@ def _number(word: str) -> str | int | float:
 
 
 def label_text(label: Group) -> str:
-    """Return a label as text, which :func:`parsed` reads as it was."""
+    """Return a label as text that :func:`parsed` reads without changes."""
     return "\n".join([*_lines(label, ""), "End", ""])
 
 

@@ -1,4 +1,4 @@
-"""A file as numbered records of fixed columns: the cards of all programs, and numbers as FORTRAN has them."""
+"""A file as numbered records of fixed columns, and numbers in FORTRAN formats."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
 WIDTH = 80
-WIDE = 0.25  # Zero bytes that no text of one byte a character has, as a part of all
-LARGEST_EXPONENT = 400  # Beyond every number in double precision, digits before and after the point included
+WIDE = 0.25  # Fraction of zero bytes that indicates other encodings than one byte per character
+LARGEST_EXPONENT = 400  # Larger than the exponent of every double, including digits around the point
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
@@ -26,9 +26,9 @@ _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 class Source:
     """The records of one file."""
 
-    path: Path  # Where the file is
-    lines: list[str]  # Its records without their line ends, cut after column 80
-    messages: list[Message] = field(default_factory=list)  # Remarks made while the records are read
+    path: Path  # Path of the file
+    lines: list[str]  # Its records without line ends, cut after column 80
+    messages: list[Message] = field(default_factory=list)  # Remarks of the reader
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -73,7 +73,7 @@ class Record:
 
     @property
     def place(self) -> Place:
-        """Where the record stands."""
+        """Location of the record."""
         return Place(self.source.path, self.number, self.text)
 
     def error(self, text: str | Phrase) -> InputError:
@@ -102,7 +102,7 @@ def parse_real(field: str, decimals: int) -> Decimal:
 
     A blank field is zero, blanks inside are ignored (BLANK='NULL'), and without a decimal point the last
     `decimals` digits are the fraction. An exponent follows E or D, with or without a sign, or is a sign and
-    digits without a letter: `1.5+2` is 150. NaN and infinity have no spelling.
+    digits without a letter: `1.5+2` is 150. NaN and infinity are not supported.
     """
     digits = field.replace(" ", "")
     if not digits:

@@ -1,8 +1,8 @@
-"""Tables of all programs, with commas, semicolons, tabs or bars, whose errors name file, record and text.
+"""Tables with commas, semicolons, tabs or bars, and located errors.
 
-Nothing in a file can make reading dear or end it with anything but an :class:`InputError`: a record has a
-greatest length, which keeps every cell below the limit of the module `csv`; columns are looked up by name;
-numbers have one strict spelling (:mod:`photogram.io.numbers`).
+No file can make reading expensive or cause another error than :class:`InputError`. Records have a maximum
+length, which limits cells below the limit of the module `csv`. Columns are looked up by name, and numbers
+have one strict spelling (:mod:`photogram.io.numbers`).
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from photogram.io.places import Place
 from photogram.messages import missing_columns
 from photogram.words import phrase
 
-DELIMITERS = ("\t", ";", ",", "|")  # What a header shows to stand between cells, in this order
-LONGEST_RECORD = 100_000  # Characters of a record at most. The module `csv` stops at cells of 131,072
+DELIMITERS = ("\t", ";", ",", "|")  # Possible delimiters in a header, in order of priority
+LONGEST_RECORD = 100_000  # Characters of a record; the module `csv` rejects cells above 131,072
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One record: its cells by column, and where it stands; a cell that is no such value is refused."""
+    """One record: its cells by column, and its location; invalid cells are rejected."""
 
     cells: Mapping[str, str]
     place: Place
-    commas: bool = False  # Whether decimals may have commas: these do not stand between cells
+    commas: bool = False  # Whether decimals may have commas, which then do not separate cells
 
     def integer(self, column: str, default: int | None = None) -> int:
-        """Return a whole number that is not negative; `default` where the cell or the column is missing."""
+        """Return an integer that is not negative; `default` if missing."""
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
         return self.place.whole(text, phrase("cells.cell", column=column))
 
     def number(self, column: str) -> float | None:
-        """Return a finite number; None where the cell is blank or the column is missing."""
+        """Return a finite number; None if the cell is blank or the column is missing."""
         text = self.cells.get(column, "")
         if not text:
             return None
@@ -56,15 +56,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: the names of its columns, and its records, which are split one at a time."""
+    """A table: column names, and records, which are split one at a time."""
 
     path: Path  # The file
-    head: Place  # The record that names the columns
+    head: Place  # The record with the column names
     columns: tuple[str, ...]  # Their names
-    records: tuple[Place, ...]  # The records below, blank ones and comments left out
-    comments: tuple[Place, ...] = ()  # Records that begin with the mark of a comment
+    records: tuple[Place, ...]  # The records below, without blank ones and comments
+    comments: tuple[Place, ...] = ()  # Comment records
     ragged: bool = False  # Whether cells may be missing at the end of a record; they are blank then
-    delimiter: str = ","  # What stands between cells, as the header has it
+    delimiter: str = ","  # Delimiter of the header
 
     @classmethod
     def read(
@@ -96,7 +96,7 @@ class Table:
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
     def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
-        """Return the table with columns named by the first of their aliases (small letters) that is there."""
+        """Return the table with columns renamed by their first alias."""
         names, lowered = list(self.columns), [name.casefold() for name in self.columns]
         for column, others in aliases.items():
             if column not in names and (own := next((each for each in others if each in lowered), None)):
@@ -110,7 +110,7 @@ class Table:
             raise self.head.error(missing_columns(missing, self.columns))
 
     def rows(self) -> Iterator[Row]:
-        """Split the records, one after the other."""
+        """Split the records one after the other."""
         count = len(self.columns)
         for place in self.records:
             texts = cells(place, self.delimiter)
@@ -120,7 +120,7 @@ class Table:
 
 
 def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[str]:
-    """Split a record at its commas, or another delimiter; quotation marks hold a cell together.
+    """Split a record at a delimiter, except inside quotation marks.
 
     `blanks`: whether blanks may precede quotation marks.
     """
@@ -138,10 +138,9 @@ def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[s
 def read_rows(
     path: Path, needed: Collection[str], aliases: Mapping[str, Collection[str]] = MappingProxyType({})
 ) -> list[Row]:
-    """Read a ragged table without comments, in which the columns `needed` are present.
+    """Read a ragged table without comments, with the required columns `needed`.
 
-    `aliases` are headings of other programs, in small letters, for columns that are not there by their own
-    names.
+    `aliases` are headings of other programs, in small letters, for columns that do not have their own names.
     """
     table = Table.read(path, ragged=True).renamed(aliases)
     table.require(*needed)

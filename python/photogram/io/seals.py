@@ -1,4 +1,4 @@
-"""Checksums (SHA-256) that hold files together: what was changed, cut or exchanged is refused."""
+"""Checksums (SHA-256) that reject changed or exchanged files."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.words import phrase
 
-SEAL = "sha256"  # The member of a document that holds its own checksum
+SEAL = "sha256"  # The member of a document that contains its own checksum
 
 
 def seal(document: Mapping[str, Any]) -> str:
-    """Return the checksum of a document of JSON, whatever its own member says."""
+    """Return the checksum of a JSON document, without its own checksum member."""
     content = {name: each for name, each in document.items() if name != SEAL}
     return hashlib.sha256(orjson.dumps(content)).hexdigest()
 
 
 def check_sealed(document: Mapping[str, Any], path: Path) -> None:
-    """Reject a document that is not the one which was sealed."""
+    """Reject a document that differs from the sealed one."""
     if document.get(SEAL) != seal(document):
         raise InputError(phrase("file.changed"), file=path)
 
@@ -38,13 +38,13 @@ def check_seal(path: Path, expected: object, of: str) -> None:
 
 
 class Seals:
-    """Checksums of files that are being written: known when they are."""
+    """Checksums of files that are being written, available afterwards."""
 
     def __init__(self) -> None:
         self.known: dict[str, str] = {}
 
     def through(self, name: str, content: Callable[[Any], object]) -> Callable[[BinaryIO], None]:
-        """Return what writes a content and keeps the checksum under a name."""
+        """Return a function that writes a content and stores its checksum under a name."""
 
         def write(file: BinaryIO) -> None:
             hashing = _Hashing(file)
@@ -55,7 +55,7 @@ class Seals:
 
 
 class _Hashing(io.RawIOBase):
-    """A file that is written from its beginning to its end; who has opened the file below closes it."""
+    """A sequentially written file; its owner closes the file below."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._at, self.digest = file, 0, hashlib.sha256()

@@ -1,4 +1,4 @@
-"""Sheets of Excel as text (extra `excel`), and the limits of zip archives, which reject packed bombs."""
+"""Sheets of Excel as text (extra `excel`), and limits of zip archives."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from typing import Any
 from photogram.errors import InputError
 from photogram.words import phrase
 
-LARGEST = 1 << 29  # Bytes that a workbook may unpack to: larger ones are attacks
+LARGEST = 1 << 29  # Largest size (bytes) of an unpacked workbook; larger ones are attacks
 MAX_RATIO, SMALL = 250, 1 << 26  # Members above SMALL bytes have at most this ratio of sizes
 UNPACKABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, struct.error)
 _NEEDS_OPENPYXL = phrase("error.package", what="an Excel workbook", package="openpyxl", extra="excel")
 
 
 def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> None:
-    """Reject members of an archive whose headers announce many times the bytes that they are packed into.
+    """Reject archive members with suspicious unpacked sizes.
 
     No member is unpacked beyond its header.
     """
@@ -34,7 +34,7 @@ def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> Non
 
 
 def sheet_text(path: Path) -> str:
-    """Return the first sheet of a workbook: a line a row, tabs between its cells, values of formulas."""
+    """Return the first sheet of a workbook as lines with tabs."""
     try:
         import openpyxl
     except ImportError:
@@ -53,7 +53,7 @@ def sheet_text(path: Path) -> str:
         raise
     except OSError as error:
         raise InputError(phrase("error.read", reason=error.strerror or str(error)), file=path) from None
-    except Exception as error:  # whatever a damaged archive makes the library raise
+    except Exception as error:  # A damaged archive may raise any exception
         reason = f"{type(error).__name__}: {error}"
         raise InputError(phrase("file.workbook", reason=reason), file=path) from None
     width = max((k + 1 for row in rows for k, cell in enumerate(row) if cell is not None), default=0)
@@ -66,13 +66,13 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
-        return str(int(value))  # names that are numbers
+        return str(int(value))  # Names that are numbers
     text = " ".join(str(value).split())
     return f'"{text.replace(chr(34), chr(34) * 2)}"' if '"' in text else text
 
 
 def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[str, str]) -> bytes:
-    """Return tables as a workbook, a sheet each, with notes on tables in a last sheet.
+    """Return tables as a workbook, with notes in a last sheet.
 
     Headers are in the first row; text is never a formula.
     """

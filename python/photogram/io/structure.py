@@ -1,8 +1,8 @@
-"""Objects of data classes as plain values of JSON, and back: exactly, and nothing but what a reader knows.
+"""Lossless conversion of dataclass objects to JSON values, and back.
 
-Unlike pickles such a document runs no code: it names classes of a list that the reader has, and gives their
-fields. Objects that several others share are one object again. Numbers that JSON does not have (NaN, infinite
-ones), arrays, tuples and tables of names are marked: `{"array": ...}`, `{"tuple": ...}`, `{"map": ...}`.
+Unlike pickle, such a document runs no code. It contains names of classes, which must be in a list of the
+reader, and their fields. Shared objects remain shared. Numbers outside JSON (NaN, infinite), arrays, tuples
+and tables of names are marked: `{"array": ...}`, `{"tuple": ...}`, `{"map": ...}`.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from photogram.arguments.annotations import check_members
 from photogram.errors import InputError, message_of
 from photogram.words import phrase
 
-SMALL = 36  # Numbers up to which an array is written as numbers that people can read
+SMALL = 36  # Largest size of an array that is written as readable numbers
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class Stand(ABC):
-    """An object of a data class that stands in a document for one that its own fields do not make."""
+    """A substitute, in a document, for an object with computed fields."""
 
     @abstractmethod
     def original(self) -> object:
-        """Return what it stands for."""
+        """Return the represented object."""
 
 
 class Encoder:
-    """Makes plain values; one for a whole document, which knows what it has written."""
+    """Converter to plain values of one document."""
 
     def __init__(self, stands: Mapping[type, Callable[[Any], Stand]] | None = None) -> None:
         self._stands = stands or {}
@@ -42,7 +42,7 @@ class Encoder:
         self._kept: list[object] = []
 
     def value(self, given: Any) -> Any:
-        """Return a value of JSON that says what the given one is."""
+        """Convert a value to JSON."""
         if given is None or isinstance(given, bool | str):
             return given
         if isinstance(given, int | np.integer):
@@ -65,7 +65,7 @@ class Encoder:
         raise TypeError(f"a document cannot contain {type(given).__name__}")
 
     def fields(self, given: Any, omitted: Iterable[str] = ()) -> dict[str, Any]:
-        """Return the fields of an object of a data class that make it, but for some."""
+        """Return the init fields of a dataclass object by name, except omitted ones."""
         left = set(omitted)
         return {
             each.name: self.value(getattr(given, each.name))
@@ -79,7 +79,7 @@ class Encoder:
         shown = self._stands[type(given)](given) if type(given) in self._stands else given
         own = {"is": type(shown).__name__, **self.fields(shown)}
         self._written[id(given)] = len(self._kept)
-        self._kept.append(given)  # as long as it lives nothing else has its id
+        self._kept.append(given)  # No other object has its id during its lifetime
         return own
 
     def _array(self, given: np.ndarray) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class Encoder:
 
 
 class Decoder:
-    """Makes objects of what an :class:`Encoder` has written, of the given classes only."""
+    """Converter of :class:`Encoder` output to objects of the given classes only."""
 
     def __init__(self, classes: Iterable[type], path: Path) -> None:
         self._classes = {each.__name__: each for each in classes}
@@ -111,12 +111,12 @@ class Decoder:
         }
 
     def value(self, given: Any) -> Any:
-        """Return what a value of JSON stands for."""
+        """Convert a JSON value to an object."""
         if isinstance(given, list):
             return [self.value(each) for each in given]
         if not isinstance(given, dict):
             return given
-        kind = next(iter(given), "")  # the mark comes first: members of objects may be called as marks are
+        kind = next(iter(given), "")  # The first key is the mark: members may have names of marks
         if kind not in self._kinds:
             raise self._error("document.kind", value=str(given))
         try:
@@ -127,7 +127,7 @@ class Decoder:
             raise self._error("document.value", value=str(given), kind=kind, reason=str(error)) from None
 
     def fields(self, given: Any, kind: type = object) -> dict[str, Any]:
-        """Return the fields of an object of a class that were written one by one."""
+        """Return the separately written fields of an object of a class."""
         if not isinstance(given, dict):
             raise self._error("error.table", value=str(given))
         members = {name: self.value(value) for name, value in given.items()}

@@ -1,4 +1,4 @@
-"""TOML files: tables whose values are read by kind and range; errors name file, line, table and key."""
+"""TOML files: values with type and range, and located errors."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 MOST_DIGITS = 1000
-_ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")  # Python names no line of such integers
+_ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")  # Python reports no line for such integers
 
 
 class TomlFile:
     """The content of a file.
 
-    `replaced` are values that replace those of the file: `section.key=value`, texts with or without quotes.
+    `replaced` are values that replace values of the file: `section.key=value`, texts with or without quotes.
     """
 
     def __init__(self, path: Path, replaced: Sequence[str] = ()) -> None:
@@ -67,7 +67,7 @@ class TomlFile:
         return Place(self.path, record, self.lines[record - 1] if record and known else None)
 
     def error(self, key: str, message: str | Phrase, section: str = "") -> InputError:
-        """Return an error at the first line that has a key or table: of the section, if there."""
+        """Return an error at the line of a key or table, if in the section."""
         replaced = [text for pair, text in self._replaced.items() if pair == (section, key) or pair[0] == key]
         if replaced:
             return InputError(
@@ -76,11 +76,11 @@ class TomlFile:
         return self.place(key, section).error(message)
 
     def place(self, key: str, section: str = "") -> Place:
-        """Return the first line that has a key or table: of the section, if there."""
+        """Return the first line with a key or table, preferably in the section."""
         word = rf"[\"']?{re.escape(key)}[\"']?\s*[\]=.]"
         own = list(self._lines_of(section)) if section else []
         first = rf"^\s*\[?\[?\s*{word}"
-        # Inline tables and names with points have their keys amid a line.
+        # Inline tables and names with points have their keys inside a line.
         for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}")):
             for record, line in lines or enumerate(self.lines, 1):
                 if re.match(pattern, line):
@@ -88,7 +88,7 @@ class TomlFile:
         return self._place(own[0][0] if own else None)
 
     def _lines_of(self, section: str) -> Iterator[tuple[int, str]]:
-        """Yield the lines of a section with their numbers: below its header, or with its name before keys.
+        """Yield the numbered lines of a section.
 
         The section `NAME 2` is the second table of an array.
         """
@@ -106,19 +106,19 @@ class TomlFile:
 
 
 def day_of(value: object) -> date:
-    """Return a day of TOML, or of a text such as 1983-07-02; `ValueError` if it is neither."""
-    # A time of a day is a date of Python's, too.
+    """Return a date of TOML or text (1983-07-02); else `ValueError`."""
+    # A datetime of Python is a date, too.
     return value if type(value) is date else date.fromisoformat(value if isinstance(value, str) else "")
 
 
 def quoted_text(text: str) -> str:
-    """Return a text as files of TOML have it, between quotation marks."""
+    """Return a text in quotation marks, as in TOML."""
     # Strings of JSON are strings of TOML, except for one control character, which JSON does not escape.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def toml_text(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return tables as text of TOML, without tables and values that are empty (None)."""
+    """Return tables as TOML text, without empty tables and values (None)."""
     lines = []
     for name, values in tables.items():
         if own := [f"{key} = {_text(value)}" for key, value in values.items() if value is not None]:
@@ -139,10 +139,10 @@ def _text(value: Any) -> str:
 
 
 class Table:
-    """One table of a TOML file, by its name in errors.
+    """One table of a TOML file, with its name for errors.
 
-    Missing values without a default, values of another kind or beyond their limits are an :class:`InputError`
-    that names file, line, table and key.
+    Missing values without a default, and values of another type or outside their limits are an
+    :class:`InputError` that contains file, line, table and key.
     """
 
     def __init__(self, values: Mapping[str, Any], name: str, source: TomlFile) -> None:
@@ -163,7 +163,7 @@ class Table:
         )
 
     def value_error(self, key: str, code: str, value: object = None, **fields: Any) -> InputError:
-        """Return an error of a value, by the code of its message."""
+        """Return an error of a value from the code of its message."""
         shown = value_field(self.values.get(key) if value is None else value)
         return self.error(key, phrase(code, value=shown, **fields))
 
@@ -193,20 +193,20 @@ class Table:
         return number
 
     def says(self, today: str, report: str) -> bool:
-        """Return whether the table has a value in the units of today; else it may have it in the report's."""
+        """Return whether the key in present units is set; reject both keys."""
         if today in self and report in self:
             raise self.error(today, phrase("error.exclusive", first=today, second=report))
         return today in self
 
     def positive(self, key: str, default: float | None = None) -> float:
-        """Return a finite number above zero."""
+        """Return a finite positive number."""
         number = self.number(key, default)
         if not number > 0:
             raise self.value_error(key, "error.positive", number)
         return number
 
     def count(self, key: str, default: int | None = None, *, low: int = 0) -> int:
-        """Return an integer that is not below a limit."""
+        """Return an integer with a lower limit."""
         value = self.value(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value < 2**31:
             raise self.value_error(key, "error.whole-range", value, low=low, high=2**31 - 1)
@@ -232,7 +232,7 @@ class Table:
         return self._word(key, self.value(key, default))
 
     def words(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-        """Return names of things as `word` does."""
+        """Return names as `word` does."""
         return tuple(self._word(key, value) for value in self.items(key, default))
 
     def texts(self, key: str) -> tuple[str, ...]:
@@ -252,7 +252,7 @@ class Table:
     def numbers(
         self, key: str, counts: int | Collection[int], default: Sequence[float] | None = None
     ) -> list[float]:
-        """Return one of some counts of finite numbers; infinite ones mark fixed or free values.
+        """Return finite numbers of an allowed count; infinite: fixed or free.
 
         A single number needs no brackets.
         """
@@ -272,7 +272,7 @@ class Table:
         return list(self._of_kind(key, list | tuple, "error.list", default))
 
     def rows(self, key: str, kinds: tuple[type[str] | type[float], ...]) -> list[list[Any]]:
-        """Return a list of lists of names (`str`) and numbers (`float`); empty if it is missing."""
+        """Return a list of lists of names (`str`) and numbers (`float`)."""
         rows = []
         for row in self.items(key, []):
             if not isinstance(row, list) or len(row) != len(kinds):
@@ -312,7 +312,7 @@ class Table:
 
 
 class KeyPlace:
-    """A table of a file, or a key of it, as the place of errors."""
+    """Location of a table of a file, or of a key in it."""
 
     def __init__(self, table: Table, key: str = "") -> None:
         self.table, self.key = table, key
@@ -326,7 +326,7 @@ class KeyPlace:
 
 
 class Document:
-    """A TOML file of tables by name, one or several of each; a missing or surplus one is an InputError."""
+    """A TOML file of named tables; missing or surplus ones are errors."""
 
     def __init__(self, tables: Mapping[str, list[Table]], source: TomlFile) -> None:
         self._tables, self.source = tables, source
@@ -335,7 +335,7 @@ class Document:
         return name in self._tables
 
     def table(self, name: str) -> Table:
-        """Return a table that must be there, once."""
+        """Return a required table, which must not be repeated."""
         tables = self.tables(name)
         if len(tables) != 1:
             raise self.source.error(name, phrase("error.repeated", kind="table", name=name))
@@ -346,7 +346,7 @@ class Document:
         return self.table(name) if name in self._tables else Table({}, name, self.source)
 
     def changed(self, values: Mapping[str, Mapping[str, Any]]) -> Document:
-        """Return the document with other values of keys, by table."""
+        """Return the document with new values of keys, by table."""
         tables = dict(self._tables)
         for name, others in values.items():
             if others:
@@ -363,7 +363,7 @@ class Document:
 def read_document(
     path: Path, keys: Mapping[str, Collection[str] | None], replaced: Sequence[str] = ()
 ) -> Document:
-    """Read a TOML file with the keys of each table; None: the reader of the table checks its keys."""
+    """Read a TOML file with the allowed keys of each table (None: any)."""
     source = TomlFile(path, replaced)
     tables: dict[str, list[Table]] = {}
     for name, content in source.content.items():
@@ -385,7 +385,7 @@ def read_document(
 
 
 def _value(text: str) -> Any:
-    """Return what a value is as TOML has it, or as a text."""
+    """Return a value in TOML syntax, or the text itself."""
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
     except ValueError:  # TOMLDecodeError, endless numbers, and a line with several values
@@ -394,7 +394,7 @@ def _value(text: str) -> Any:
 
 
 def float_of(value: float) -> float:
-    """Return a number as a float: infinite if an integer is beyond double precision."""
+    """Return a number as a float; infinite if an integer exceeds double precision."""
     if isinstance(value, int) and abs(value) >= 2**1023:
         return math.inf if value > 0 else -math.inf
     return float(value)

@@ -1,4 +1,4 @@
-"""Numbers in other units: conversions that give numbers back as they were typed."""
+"""Numbers in other units: conversions that preserve numbers as they were typed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-TYPED_DECIMALS = 12  # Decimals that people type at most
+TYPED_DECIMALS = 12  # Largest number of decimals in typed numbers
 
-MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))  # Of angles, degrees
+MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))  # Rounding of angles, degrees
 
 
 def scaled(values: Floats, factor: float) -> Floats:
@@ -17,13 +17,13 @@ def scaled(values: Floats, factor: float) -> Floats:
 
 
 def degrees_typed(radians: Floats, rounding: float = 0.0) -> Floats:
-    """Return angles in degrees, as they were typed if only conversions have changed their last digits."""
+    """Return angles in degrees, with the decimals that were typed."""
     return _typed(np.degrees(radians), rounding)
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def _typed(values: Floats, rounding: float) -> Floats:
-    """Return numbers as short decimals if only rounding separates them, others unchanged."""
+    """Return numbers as short decimals if only rounding separates them."""
     size = np.abs(values)
     decimals = np.clip(11.0 - np.floor(np.log10(size)), 0.0, TYPED_DECIMALS)
     short = np.rint(values * 10.0**decimals) / 10.0**decimals

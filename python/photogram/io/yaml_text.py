@@ -1,4 +1,4 @@
-"""YAML as OpenCV, ROS and Kalibr write it: mappings, sequences, flow lists, plain and quoted values, tags.
+"""YAML as in OpenCV, ROS and Kalibr, without anchors and block text.
 
 Anchors, block text and several documents are rejected with their lines. Tags such as `!!opencv-matrix` are
 ignored.
@@ -21,8 +21,8 @@ from photogram.io.numbers import number_or_text
 from photogram.io.places import Place
 from photogram.words import phrase
 
-DEEPEST = 50  # Brackets and indents within each other
-# Possessive: a run of blanks would be tried in all ways to divide it.
+DEEPEST = 50  # Largest depth of brackets and indents
+# Possessive: a run of blanks would be split in all possible ways.
 _KEY = re.compile(
     r"""("(?:[^"\\]|\\.)*+"\s*+|'[^']*+'\s*+|[^\s#'"\[\]{},&*!|>%@`-][^#:]*+|-[^\s#:][^#:]*+):(?:\s+|$)"""
 )
@@ -35,7 +35,7 @@ _WORDS: Mapping[str, Any] = {"": None, "~": None, "null": None, "true": True, "f
 
 
 class _Line:
-    """A line with something in it: its indent, its text without comments, its number."""
+    """A line with content: its indent, its text without comments, its number."""
 
     def __init__(self, place: Place, text: str) -> None:
         self.place = place
@@ -44,7 +44,7 @@ class _Line:
 
 
 def read_yaml_text(path: Path) -> dict[str, Any]:
-    """Return the mapping that a file is."""
+    """Return the mapping in a file."""
     lines = []
     for record, text in enumerate(read_lines(path), 1):
         place = Place(path, record, text)
@@ -97,7 +97,7 @@ class _Reader:
             rest = line.text[1:]
             inner = rest.lstrip()
             if _KEY.match(inner) and not inner.startswith(("[", "{")):
-                # A mapping that begins behind the dash.
+                # A mapping that begins after the dash.
                 line.indent, line.text = indent + len(line.text) - len(inner), inner
                 found.append(self.block(line.indent, depth + 1))
             else:
@@ -105,7 +105,7 @@ class _Reader:
         return found
 
     def _value(self, text: str, indent: int, depth: int) -> Any:
-        """Return what stands behind a key or dash, or in the lines below that are indented more."""
+        """Return the value after a key or dash, or in indented lines."""
         line = self.lines[self.at]
         text = _TAG.sub("", text, count=1) if text.startswith("!") else text
         if text[:1] in ("&", "*", "|", ">", "@", "`"):
@@ -124,7 +124,7 @@ class _Reader:
         return None
 
     def _flow(self, text: str) -> Any:
-        """Return a list or mapping in brackets, which may go on over several lines."""
+        """Return a list or mapping in brackets, which may continue over several lines."""
         first = self.lines[self.at].place
         self.at += 1
         tokens = _tokens(text, first)
@@ -142,7 +142,7 @@ class _Reader:
         return value
 
 
-_Tokens = list[tuple[str, str]]  # What each is (a bracket, `,` or `:` by itself; `text`), and its text
+_Tokens = list[tuple[str, str]]  # Type (a bracket, `,`, `:`, or `text`), and text of each token
 
 
 def _tokens(text: str, place: Place) -> _Tokens:
@@ -159,7 +159,7 @@ def _tokens(text: str, place: Place) -> _Tokens:
 
 
 def _opened(tokens: _Tokens, depth: int, place: Place) -> int:
-    """Return how many brackets are open after some tokens, of `depth` before them."""
+    """Return the number of open brackets after some tokens, from `depth` before them."""
     for kind, _ in tokens:
         depth += (kind in "[{") - (kind in "]}")
         if depth < 0:
@@ -224,7 +224,7 @@ def camera_info(
     turn: Floats | None = None,
     projection: Floats | None = None,
 ) -> bytes:
-    """Return a camera as ROS writes it (`sensor_msgs/CameraInfo`); turn and projection rectify it.
+    """Return a camera in ROS format (`sensor_msgs/CameraInfo`).
 
     The lens is the distortion model with its coefficients.
     """
@@ -245,7 +245,7 @@ def camera_info(
 
 
 def matrix_lines(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
-    """Return a matrix as ROS or OpenCV writes it."""
+    """Return a matrix in the format of ROS or OpenCV."""
     found = np.atleast_2d(np.asarray(values, dtype=float))
     rows, columns = found.shape
     tag, indent, kind = (" !!opencv-matrix", "   ", ["dt: d"]) if opencv else ("", "  ", [])

@@ -6,7 +6,7 @@ from .distortion import DistortionCurve as DistortionCurve
 from .distortion import LensField as LensField
 from .distortion import distortion_curve as distortion_curve
 from .distortion import lens_field as lens_field
-from .pattern_pictures import DrawnPattern as DrawnPattern
-from .pattern_pictures import drawn_patterns as drawn_patterns
+from .patterns import DrawnPattern as DrawnPattern
+from .patterns import drawn_patterns as drawn_patterns
 from .picture_data import plot_distortion as plot_distortion
 from .picture_data import plot_lens_field as plot_lens_field

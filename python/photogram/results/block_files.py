@@ -24,6 +24,8 @@ from photogram.network.geometry import Spheroid
 from photogram.network.lens import Lens
 from photogram.network.motion import scanners
 from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
+from photogram.network.observations import Observation
+from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import (
@@ -36,6 +38,7 @@ from photogram.network.trajectories import (
     Table,
     Trajectory,
 )
+from photogram.network.unknowns import Unknown
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature, Features, Quantity
@@ -207,12 +210,11 @@ class KeptTrajectory(Stand):
         return made
 
 
-CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
-"""Classes that a document of a block with trajectories may name."""
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
 
 
-VALUE_CLASSES = (
+CLASSES = (
+    *(KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed),
     AdjustedCamera,
     AdjustedUnknown,
     Film,
@@ -238,3 +240,12 @@ VALUE_CLASSES = (
     SumsOfSquares,
     Undetermined,
 )
+
+
+def saved_classes() -> list[type]:
+    """Return the classes that the document of a block may name, observations and unknowns of all kinds."""
+    found, bases = [*CLASSES], [Observation, Unknown, Passage]
+    while bases:
+        own: list[Any] = bases.pop().__subclasses__()
+        found, bases = [*found, *own], [*bases, *own]
+    return found

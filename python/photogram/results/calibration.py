@@ -21,7 +21,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances, photo_components
 from photogram.results.distortion import INTERIOR
-from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
+from photogram.results.model_tests import TermsTest, groups_of_terms, tail_probability, terms_test
 from photogram.results.scores import quadratic
 from photogram.show.page import about
 
@@ -219,10 +219,8 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
 
 def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> GroupTest:
     rows = [camera.names.index(name) for name in names]
-    value = quadratic(camera.covariance[np.ix_(rows, rows)], camera.values[rows]) / len(rows)
-    if math.isinf(result.freedom_of_scale):
-        return GroupTest(names, value, _photocore.chi_square(value * len(rows), len(rows)))
-    return GroupTest(names, value, _photocore.fisher(value, len(rows), result.degrees_of_freedom))
+    value, k = quadratic(camera.covariance[np.ix_(rows, rows)], camera.values[rows]), len(rows)
+    return GroupTest(names, value / k, tail_probability(value, k, result.freedom_of_scale))
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,19 +149,14 @@ def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
     inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
     rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
     added = "measured" if curve.direction == "backward" else "ideal"
-    heads = {
-        "values": "Distortion",
-        "sd": "sd",
-        "sd_mapping": "sd of the mapping",
-        "balanced": "Balanced",
-        "sd_balanced": "sd of balanced",
-    }
+    column: Any = partial(Quantity, axes=axes, kind="deviation", decimals=3)
     columns = [
         Quantity(curve.radii, (Axis.of("", unit),), "deviation", head="Radius", decimals=4),
-        *(
-            Quantity(getattr(curve, name), axes, "deviation", head=head, decimals=3)
-            for name, head in heads.items()
-        ),
+        column(curve.values, head="Distortion"),
+        column(curve.sd, head="sd"),
+        column(curve.sd_mapping, head="sd of the mapping"),
+        column(curve.balanced, head="Balanced"),
+        column(curve.sd_balanced, head="sd of balanced"),
     ]
     sizes = {"observed": curve.observed, "zero": curve.balanced_at, "distance": curve.balanced_distance}
     note = about("curve", added=added, unit=unit, **sizes)

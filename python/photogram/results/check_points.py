@@ -14,10 +14,10 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.observations.points import Control
-from photogram.results.network import AdjustedNetwork
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
+    from photogram import Result
     from photogram.show.quantity import Axis
     from photogram.statistics.findings import Agreement
 
@@ -47,64 +47,50 @@ class CheckPoints:
         return tested.values, np.exp(tested.log_probability())
 
 
-def check_points(
-    network: AdjustedNetwork,
-    block: Block,
-    differences: Floats,
-    kinds: np.ndarray,
-    *,
-    second: float,
-    untested: str = "",
-    whole: bool = True,
-) -> CheckPoints:
-    """Return the check points of an adjusted block with their tests.
+def check_points(result: Result) -> CheckPoints:
+    """Return the check points of a result, tested one by one and together.
 
-    `differences` are (n, 3) adjusted minus given coordinates, `kinds` (n,) those of all points; `second` are
-    the degrees of freedom with which the variance of unit weight was estimated, infinite where it is known;
-    `untested` says why nothing is tested, `whole` whether the normal equations may be asked for the
-    covariances of points with each other.
+    A block that was adjusted in parts has no covariances of points with each other, so no test of all.
     """
-    rows = np.flatnonzero(network.used_points & (kinds == "check"))
-    given, assumed = _given(block, rows, differences[rows])
-    found = CheckPoints(
-        rows=rows,
-        names=tuple(block.point_ids[row] for row in rows.tolist()),
-        differences=differences[rows],
-        sd=network.point_sd[rows],
-        given_sd=given,
-        assumed=assumed,
-        untested=untested,
-    )
+    block = result.block
+    rows = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
+    differences = result.point_differences[rows]
+    given, assumed = _given(block, rows, differences)
+    untested = "" if result.converged else "the adjustment has not converged"
+    if not result.photo_given_sd.any():
+        untested = "all photos are fixed, and no standard deviation has their errors"
+    if result.datum.is_chosen:
+        untested = "the datum of the network is chosen, and theirs is another"
     if not len(rows):
-        return replace(found, untested="there are none")
-    if not np.isfinite(network.point_cofactors[rows]).all():
-        return replace(found, untested=untested or "covariances were not computed")
-    return found if untested else replace(found, agreement=_agreement(network, block, found, second, whole))
+        untested = "there are none"
+    elif not np.isfinite(result.point_cofactors[rows]).all():
+        untested = untested or "covariances were not computed"
+    names, sd = tuple(block.point_ids[row] for row in rows.tolist()), result.point_sd[rows]
+    found = CheckPoints(rows, names, differences, sd, given, assumed, untested)
+    return found if untested else replace(found, agreement=_agreement(result, found))
 
 
-def _agreement(
-    network: AdjustedNetwork, block: Block, found: CheckPoints, second: float, whole: bool
-) -> Agreement:
+def _agreement(result: Result, found: CheckPoints) -> Agreement:
     from photogram.results.axes import point_axes  # few blocks have check points
     from photogram.statistics.agreement import agreement
 
     survey = np.zeros((len(found.rows), 3, 3))
     survey[:, range(3), range(3)] = found.given_sd**2
-    asked = partial(agreement, scale=network.covariance_scale, second=second)
+    asked = partial(agreement, scale=result.covariance_scale, second=result.freedom_of_scale)
     alone = asked(
         found.differences,
-        network.point_cofactors[found.rows],
+        result.point_cofactors[found.rows],
         survey,
         name=partial(_named, found.names),
-        apart=partial(_apart, found.differences, point_axes(block)),
+        apart=partial(_apart, found.differences, point_axes(result.block)),
     )
-    if not whole:
+    if not result.WHOLE:
         return alone
     some = together(len(found.rows))
-    joint = network.state.joint(found.rows[some].tolist())
+    joint = result.state.joint(found.rows[some].tolist())
     if joint is None:
         try:
-            joint = network.covariance(("point", found.names[some])) / network.covariance_scale
+            joint = result.covariance(("point", found.names[some])) / result.covariance_scale
         except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
             return alone
     return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)

@@ -148,7 +148,6 @@ def weighed_document(found: VarianceComponents, network: Document) -> Document:
 
 
 def components_section(found: VarianceComponents) -> Section:
-    """Return the section: which standard deviations are wrong, factors with their intervals."""
     parts: list[Part] = [
         Remarks([*map(str, statement(found))]),
         Drawing("picture-components", "Variance components", about("components.caption"), found.plot),

@@ -56,6 +56,12 @@ class Things:
     # What the core calls the parts of such a thing; none where it is called as it is
     parts: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, every: Sequence[Any], components: str) -> Things:
+        """Return adjusted cameras or common unknowns, whose unknowns an attribute names."""
+        names, unknowns = [each.name for each in every], [getattr(each, components) for each in every]
+        return cls(names, unknowns, [each.values for each in every], [each.sd for each in every])
+
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
@@ -131,26 +137,15 @@ def adjusted(result: Result) -> Adjusted:
     places = unknowns_of_photo[:3]
     steps = (*places, "rho x", "rho y", "rho z")
     points = [places] * len(block.point_ids)
-    # Blocks with principal distances have a camera for each: they are known, and nobody asks for them.
-    cameras, unknowns = result.cameras, result.unknowns
     return Adjusted(
         network="block",
         things={
             "photo": Things(block.photo_ids, [unknowns_of_photo] * count, photos, sd),
             "step": Things(block.photo_ids, [steps] * count, photos, sd),
             "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
-            "camera": Things(
-                [each.name for each in cameras],
-                [each.names for each in cameras],
-                [each.values for each in cameras],
-                [each.sd for each in cameras],
-            ),
-            "unknown": Things(
-                [each.name for each in unknowns],
-                [each.components for each in unknowns],
-                [each.values for each in unknowns],
-                [each.sd for each in unknowns],
-            ),
+            # Blocks with principal distances have a camera for each, which is known and never asked for.
+            "camera": Things.of(result.cameras, "names"),
+            "unknown": Things.of(result.unknowns, "components"),
         },
     )
 

@@ -134,10 +134,9 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
     messages = []
     if datum.lost > NOTABLE_LOSS:
         messages.append(Message(phrase("free.rounding", share=datum.lost)))
-    if datum.kind == "inner constraints":
-        return [Message(phrase("free.inner", datum=datum.phrase)), *messages]
-    if datum.kind == "relative":
-        return [Message(phrase("free.relative", datum=datum.phrase)), *messages]
+    if datum.kind in ("inner constraints", "relative"):
+        code = f"free.{datum.kind.partition(' ')[0]}"
+        return [Message(phrase(code, datum=datum.phrase)), *messages]
     if datum.kind == "minimum constraints":
         fixed, levels = held_unknowns(datum.held), _levelled(block, len(datum.held))
         return [Message(phrase("free.minimum", fixed=fixed, levels=levels or ""))]

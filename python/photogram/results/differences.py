@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
-from photogram.results.covariance import adjusted
+from photogram.results.covariance import Things, adjusted
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -92,23 +92,13 @@ def differences(first: Result, second: Result) -> Differences:
     alone: dict[str, list[str]] = {}
     compared = 0
     for kind in _KINDS:
-        places = [
-            {
-                (name, k): (row, part)
-                for row, name in enumerate(each.ids)
-                for part, k in enumerate(each.components[row])
-            }
-            for each in (one[kind], two[kind])
-        ]
-        shared = [key for key in places[0] if key in places[1]]
-        found = [
-            (_picked(each.values, own, shared), _picked(each.sd, own, shared))
-            for each, own in ((one[kind], places[0]), (two[kind], places[1]))
-        ]
-        (value, sd), (other, other_sd) = found
+        mine, theirs = _by_name(one[kind]), _by_name(two[kind])
+        shared = [key for key in mine if key in theirs]
+        pairs = (np.array([own[key] for key in shared], dtype=float) for own in (mine, theirs))
+        (value, sd), (other, other_sd) = (own.reshape(-1, 2).T for own in pairs)
         known = np.isfinite(value) & np.isfinite(other)
         compared += int(np.count_nonzero(known))
-        missing = {name for name, _ in places[0].keys() ^ places[1].keys()}
+        missing = {name for name, _ in mine.keys() ^ theirs.keys()}
         missing |= {shared[row][0] for row in np.flatnonzero(np.isfinite(value) != np.isfinite(other))}
         if missing:
             alone[kind] = sorted(missing)
@@ -128,13 +118,14 @@ def differences(first: Result, second: Result) -> Differences:
     return Differences(values, deviations, ratio, alone, compared)
 
 
-def _picked(
-    arrays: Sequence[Floats] | Floats,
-    places: dict[tuple[str, str], tuple[int, int]],
-    keys: Sequence[tuple[str, str]],
-) -> Floats:
-    rows = (places[key] for key in keys)
-    return np.array([arrays[row][part] for row, part in rows], dtype=float)
+def _by_name(things: Things) -> dict[tuple[str, str], list[float]]:
+    """Return values and standard deviations by names of things and components."""
+    rows = zip(things.ids, things.components, things.values, things.sd, strict=True)
+    return {
+        (name, component): pair
+        for name, components, *numbers in rows
+        for component, *pair in zip(components, *numbers, strict=True)
+    }
 
 
 def _larger(before: Largest, sizes: Floats, kind: str, keys: Sequence[tuple[str, str]]) -> Largest:

@@ -174,7 +174,6 @@ def rms_of(values: Floats) -> float:
 
 
 def _differences(result: Result, values: Iterable[float]) -> list[str]:
-    """Write differences in the components, those that are angles also as lengths."""
     axes, lengths, unit = point_axes(result.block), result._terms().lengths, result.block.linear_unit
     return [
         f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"

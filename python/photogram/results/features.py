@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import unknown_name
+from photogram.messages import by_name, unknown_name
 from photogram.show import quantity
 from photogram.show.page import Drawing, Part, Section, Text, about
 from photogram.show.quantity import Axis, Table, members, of_each
@@ -23,10 +23,8 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     import pandas as pd
 
-T = TypeVar("T", "Quantity", "Feature")
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
 _EXPANDED = "expanded uncertainty, k times the standard deviation"
-MAX_SEARCHED_NAMES = 10_000
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
 Definition = tuple[str, str | Sequence[str]]
@@ -82,7 +80,8 @@ class Feature:
 
     def __getitem__(self, name: str) -> Quantity:
         """Return a quantity by its name."""
-        return _named(self.quantities, name, "quantity")
+        found: Quantity = by_name(self.quantities, name, "quantity")
+        return found
 
     @property
     def form(self) -> str:
@@ -121,7 +120,8 @@ class Features:
 
     def __getitem__(self, name: str) -> Feature:
         """Return a feature by its name."""
-        return _named(self.features, name, "feature")
+        found: Feature = by_name(self.features, name, "feature")
+        return found
 
     def __iter__(self) -> Iterator[Feature]:
         """Go through the features."""
@@ -225,18 +225,10 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
             continue
         matching = [name for name in names if fnmatchcase(name, each)]
         if not matching:
-            searched = len(names) < MAX_SEARCHED_NAMES and not {*"*?["} & {*each}
             absent = phrase("error.absent", kind="point", name=each)
-            raise InputError(unknown_name("point", each, names) if searched else absent)
+            raise InputError(absent if {*"*?["} & {*each} else unknown_name("point", each, names))
         found |= dict.fromkeys(matching, True)
     return list(found)
-
-
-def _named(all_: Sequence[T], name: str, kind: str) -> T:
-    for each in all_:
-        if each.name == name:
-            return each
-    raise KeyError(str(unknown_name(kind, name, [each.name for each in all_])))
 
 
 def features_section(features: Features | None, picture: Drawing | None = None) -> Section:

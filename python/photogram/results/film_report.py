@@ -36,7 +36,6 @@ class MarkResiduals:
 
 
 def mark_residuals(result: Result) -> MarkResiduals:
-    """Return the residuals of all readings of marks, in the order of the block."""
     kind = result.kinds.get(Fiducial.KIND)
     rows = [] if kind is None else kind.rows.tolist()
     read = [each for each in (result.block.observations[row] for row in rows) if isinstance(each, Fiducial)]
@@ -123,7 +122,6 @@ _MM = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 
 
 def film_table(result: Result) -> list[Quantity]:
-    """Return the films of photos: values, standard deviations, marks read and lost, the largest test."""
     rows, films = [row for row, _ in result.films], [film for _, film in result.films]
     axes = tuple(Axis.of(name, unit) for name, unit in zip(FILM, _UNITS, strict=True))
     residuals = mark_residuals(result)
@@ -195,7 +193,6 @@ def form_table(result: Result) -> list[Quantity]:
 
 
 def mark_table(result: Result) -> list[Quantity]:
-    """Return the marks of cameras: adjusted, less the certificate, and mean residuals of their readings."""
     every, residuals, photos = result.fiducials.values(), mark_residuals(result), result.block.photo_ids
     columns = residuals.photos, residuals.marks, residuals.xy, residuals.tests
     readings: dict[str, list[dict[str, Any]]] = {each.name: [] for each in every}
@@ -228,7 +225,6 @@ def mark_table(result: Result) -> list[Quantity]:
 
 
 def scanner_table(result: Result) -> list[Quantity]:
-    """Return the scanners: pixels, adjusted values less the calibration, standard deviations."""
     of = {id(film.scanner): film.readings for _, film in result.films}
     every = [each for each in result.unknowns if id(each.given) in of]
     values, changes, sd = (

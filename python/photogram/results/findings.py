@@ -42,11 +42,11 @@ def network_findings(
     systematic: Sequence[Systematic],
 ) -> Findings:
     """Return the findings that every network has, with tests of fixed values and of patterns."""
-    tests = Tests(result)
+    tests, summary = Tests(result), result.reliability_summary
     return Findings(
         status=result.status,
         observations=[
-            *(tests.components if result.reliability_summary is None else tests.groups),
+            *(tests.components if summary is None else tests.groups),
             *(each if result.KNOWN else each.studentized(*result.sum_and_freedom) for each in fixed),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
@@ -56,7 +56,9 @@ def network_findings(
         systematic=systematic,
         snooped=result.snooped,
         remarks=[*unseen(result), *_assumptions(result)],
-        unchecked=_unchecked(result),
+        unchecked=[] if summary is None else summary.hypotheses.unchecked(),
+        common=[] if summary is None else summary.hypotheses.common_errors(),
+        common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
         can_snoop=True,
     )
 
@@ -168,16 +170,10 @@ def _patterns(result: Result) -> list[Systematic]:
     return patterns(result, cameras, axes, lambda own: fall_by_lens(result, own))
 
 
-def _unchecked(result: AdjustedNetwork) -> list[Phrase]:
-    """Return the errors that would remain undetected and move many points."""
-    summary = result.reliability_summary
-    return [] if summary is None else summary.hypotheses.unchecked()
-
-
 def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
     """Return which errors of the datum no independent observation checks."""
     summary = result.reliability_summary
-    names = [] if summary is None else [each.name for each in summary.hypotheses.assumptions]
+    names = [] if summary is None else summary.hypotheses.assumptions
     return [Phrase("line.datum-assumed", {"errors": names})] if names else []
 
 

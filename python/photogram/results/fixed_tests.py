@@ -172,17 +172,17 @@ def station_partials(result: Result) -> Floats:
     return found
 
 
-def as_adjusted(result: Result) -> Block:
-    """Return a block whose photos are where its adjustment has put them."""
+def as_adjusted(result: Result, *, free: bool = False) -> Block:
+    """Return a block whose photos are where its adjustment has put them, `free` or as they were given."""
     changes: dict[str, Any] = {
         "photo_positions": result.photo_positions,
         "photo_attitudes": result.photo_attitudes,
     }
-    if result.block.timed:
-        # What is held of their poses is held of coefficients.
-        free = np.full((len(result.block.photo_ids), 3), np.inf)
+    if free or result.block.timed:
+        # What is held of poses on trajectories is held of coefficients.
+        sd = np.full((len(result.block.photo_ids), 3), np.inf)
         changes |= {"photo_positions_observed": None, "photo_attitudes_observed": None}
-        changes |= {"photo_position_sd": free, "photo_attitude_sd": free}
+        changes |= {"photo_position_sd": sd, "photo_attitude_sd": sd}
     return result.block.replace(**changes)
 
 

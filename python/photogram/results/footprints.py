@@ -14,6 +14,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
+from photogram.results.fixed_tests import as_adjusted
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -51,14 +52,7 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
     `sizes` are width and height of the images of each camera in the unit of image coordinates. Without these
     the images reach as far as the measurements on all photos of the camera.
     """
-    block = result.block.replace(
-        photo_positions=result.photo_positions,
-        photo_attitudes=result.photo_attitudes,
-        photo_positions_observed=None,
-        photo_attitudes_observed=None,
-        photo_position_sd=np.inf,
-        photo_attitude_sd=np.inf,
-    )
+    block = as_adjusted(result, free=True)
     axes = local_axes(block)
     levels = grounds(result, axes.positions(result.point_positions)[:, 2])
     centres, turns = axes.positions(block.photo_positions), axes.cameras()

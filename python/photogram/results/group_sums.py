@@ -20,6 +20,7 @@ from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import by_name
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
@@ -119,10 +120,8 @@ class GroupSums(Documented, Brief):
 
     def __getitem__(self, name: str) -> GroupSum:
         """Return the group of a name."""
-        for each in self.groups:
-            if each.name == name:
-                return each
-        raise KeyError(name)
+        found: GroupSum = by_name(self.groups, name, "group")
+        return found
 
     def groups_table(self) -> Table:
         """Return the declared table: sums, factors of standard deviations, probabilities of sums."""
@@ -185,17 +184,6 @@ class Left:
 
 def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Floats, Floats]:
     """Return (G,) numbers of observations, weighted sums of squares and sums of redundancy numbers."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        squares = {
-            "images": (result.residuals / result.image_given_sd) ** 2 * result.image_weights[:, np.newaxis],
-            "points": _weighted_squares(result.point_residuals, result.point_given_sd),
-            "photos": _weighted_squares(result.photo_residuals, result.photo_given_sd),
-        }
-    redundancy = {
-        "images": result.redundancy,
-        "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
-        "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
-    }
     kinds = [*result._terms().kinds]
     size = sum(len(kind.rows) for kind in kinds)
     of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
@@ -203,8 +191,16 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
         of_observations[kind.rows] = kind.squares
         shares[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
         components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
-    squares["observations"] = of_observations
-    redundancy["observations"] = np.where(np.isfinite(of_observations), shares, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        images = (result.residuals / result.image_given_sd) ** 2 * result.image_weights[:, np.newaxis]
+        points = _weighted_squares(result.point_residuals, result.point_given_sd)
+        photos = _weighted_squares(result.photo_residuals, result.photo_given_sd)
+    squares = {"images": images, "points": points, "photos": photos, "observations": of_observations}
+    parts = (result.redundancy, result.point_redundancy, result.photo_redundancy, shares)
+    redundancy = {
+        name: np.where(np.isfinite(squares[name]) | (name == "images"), part, np.nan)
+        for name, part in zip(squares, parts, strict=True)
+    }
     ones = {name: np.where(np.isfinite(values), 1.0, np.nan) for name, values in redundancy.items()}
     ones["observations"] *= components
     counts = np.round(grouping.summed(ones)).astype(np.int64)

@@ -118,9 +118,9 @@ _Labelled = tuple[dict[str, _Labels], dict[str, str]]
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
     components = "component" in bases
     of_images = [_images_by(of, basis) for basis in bases if basis not in ("kind", "component")]
-    head = [", ".join(parts) for parts in zip(*of_images, strict=True)] if of_images else None
-    plain = np.array(head if head is not None else [""] * len(of.given.image_photos), dtype=object)
-    named = np.array([f"images, {each}" if each else "images" for each in plain.tolist()], dtype=object)
+    named = np.full(len(of.given.image_photos), "images", dtype=object)
+    if of_images:
+        named[:] = [", ".join(("images", *parts)) for parts in zip(*of_images, strict=True)]
     images = np.stack([named, named], axis=1)
     parents: dict[str, str] = {}
     if of_images:
@@ -188,10 +188,11 @@ def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, st
         for label in dict.fromkeys(found):
             numbers.setdefault(label, len(numbers) - 1)
 
-    def number(part: _Labels, used: Bools | None = None) -> Indices:
-        flat = (part.ravel() if used is None else np.where(used, part, "").ravel()).tolist()
+    def number(part: _Labels, used: Any = ...) -> Indices:
+        found, flat = np.full(part.shape, -1, dtype=np.int64), part[used].ravel().tolist()
         enter(flat)
-        return np.fromiter(map(numbers.__getitem__, flat), np.int64, len(flat)).reshape(part.shape)
+        found[used] = np.fromiter(map(numbers.__getitem__, flat), np.int64).reshape(part[used].shape)
+        return found
 
     # In the order of the photos, whatever that of the images is.
     enter(labels["images"][np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())

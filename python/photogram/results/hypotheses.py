@@ -17,22 +17,28 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.strips import strips_of
 from photogram.show.cells import unit_written
-from photogram.show.quantity import Quantity, Table
+from photogram.show.quantity import Axis, Quantity, Table, records
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram import Result
-    from photogram.results.network import AdjustedNetwork
+    from photogram.network.block import Block
+    from photogram.network.unadjusted import Given
     from photogram.results.network_trial import NamedSuspects
     from photogram.results.reliability import Reliability
 
-LIMIT = 4.0  # Standard deviations from which on an undetected error of a point counts
-SHARE = 0.02  # Share of points that an undetected error may move beyond the limit
+Facts = dict[str, Any]  # That hypotheses require beside the network; see `NetworkTrial.hypotheses`
+
+LIMIT = 6.0  # Standard deviations from which on an undetected error of a point counts
+SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
 FEWEST = 2  # Points beside the suspect that it moves at least
 UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetected
-EFFECTS = 32  # Groups with computed effects: those of the largest bias-to-noise ratios
+EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 DETECTED = 4.13  # Standard deviations of a check point from which on a change is detected: root of lambda0
+ALTERNATIVES = 20.0  # Odds up to which less likely errors are alternatives
+LENSES = frozenset(
+    {"camera-term", "bending"}
+)  # Errors that patterns of residuals reveal, or that have such a cause
 MAIN = 0.8  # Share of the square of an error above which one component stands for it
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 SEPARABLE = 0.9  # Correlation of scores from which on hypotheses cannot be distinguished
@@ -105,11 +111,18 @@ class Hypothesis:
         size = max(abs(d) / p for d, p in zip(self.mdb, self.plausible, strict=True))
         return math.erf(size / math.sqrt(2))
 
+    def moves(self) -> bool:
+        """Whether the estimated error moves a point beyond the limit."""
+        if self.effect is None or self.error is None:
+            return False
+        share = float(np.linalg.norm(self.estimate) / np.linalg.norm(self.error))
+        return share * self.effect.ratio > LIMIT
+
     def is_harmful(self, points: int) -> bool:
         """Whether an undetected error moves too many of a number of points."""
         if self.effect is None or self.checked or self.code in UNGRADED:
             return False
-        if self.undetected < RARE or (self.mdb is None and self.code in DATUM):
+        if self.undetected < RARE or self.code in DATUM:
             return False
         return self.effect.others >= max(FEWEST, math.ceil(SHARE * points))
 
@@ -124,6 +137,7 @@ class Hypotheses:
     point_ids: Sequence[str]
     axes: Sequence[str]
     units: Callable[[str], str]  # Unit of the errors of a type
+    single_odds: float  # Largest log odds of an error of a single observation, images among them
 
     @property
     def harmful(self) -> list[Hypothesis]:
@@ -164,14 +178,43 @@ class Hypotheses:
         return f"{math.sqrt(squares.sum()):.3g}{unit}", own.name
 
     @property
-    def assumptions(self) -> list[Hypothesis]:
-        """Errors of the datum that no independent source tests."""
-        return [each for each in self.every if each.code in DATUM and each.redundancy < UNTESTED]
+    def assumptions(self) -> list[Phrase]:
+        """Names of the observations that define the datum, and that no independent source tests."""
+        untested = {each.code for each in self.every if each.code in DATUM and each.undetected >= RARE}
+        sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
+        codes = [codes[0] for codes in sources if untested.intersection(codes)]
+        return [phrase(f"datum.{code}") for code in codes]
 
-    def candidates(self, level: float) -> list[Hypothesis]:
-        """Return the hypotheses that the tests do not exclude at a level, the most likely first."""
-        found = [each for each in self.every if each.probability < level / max(len(self.every), 1)]
-        return sorted(found, key=lambda each: -each.log_odds)
+    @property
+    def common(self) -> list[Hypothesis]:
+        """Detected errors of sets that explain more than any single observation, the most likely first."""
+        found = [
+            each
+            for each in self.every
+            if each.group is None and each.code not in LENSES and each.probability < DETECTION[0]
+        ]
+        found.sort(key=lambda each: -each.log_odds)
+        if not found or found[0].log_odds < self.single_odds:
+            return []
+        return [each for each in found if each.log_odds > found[0].log_odds - math.log(ALTERNATIVES)]
+
+    def common_errors(self) -> list[Phrase]:
+        """Return messages on these errors, the most likely first."""
+        found = self.common
+        return [
+            phrase(
+                "common.error" if each is found[0] else "common.alternative",
+                named=each.name,
+                size=_size(each, self.units(each.code)),
+                odds=math.exp(found[0].log_odds - each.log_odds),
+            )
+            for each in found
+        ]
+
+    @property
+    def common_is_harmful(self) -> bool:
+        """Whether the most likely of these errors moves a point beyond the limit."""
+        return any(each.moves() for each in self.common[:1])
 
     def tests(self) -> Table:
         """Return the declared table of all tests."""
@@ -221,6 +264,17 @@ class Hypotheses:
             shown=np.array(order[:10], dtype=np.int64),
         )
 
+    def document(self) -> list[dict[str, Any]]:
+        """Return the rows that both tables show as JSON objects."""
+        every, numbers = self.tests(), self.external_reliability()
+        shown = sorted({*self._shown(every), *self._shown(numbers)})
+        rows = [records(table.columns) for table in (every, numbers)]
+        return [{**rows[0][k], **rows[1][k]} for k in shown]
+
+    @staticmethod
+    def _shown(table: Table) -> list[int]:
+        return [] if table.shown is None else table.shown.tolist()
+
     def _names(self) -> list[Quantity]:
         return [
             _column("code", [each.code for each in self.every], "", kind="name"),
@@ -238,51 +292,70 @@ def _column(name: str, values: Any, head: str, **more: Any) -> Quantity:
     )
 
 
+def _size(own: Hypothesis, unit: str) -> str:
+    """Return an estimate with its standard deviation; of several parameters the largest one."""
+    k = int(np.argmax(np.abs(own.estimate)))
+    sd = math.sqrt(max(own.cofactors[k * (len(own.estimate) + 1)], 0.0))
+    axis = f"{own.parameters[k]} " if len(own.estimate) > 1 else ""
+    return f"{axis}{own.estimate[k]:.4g}{unit} (sd {sd:.2g})"
+
+
 def _written(own: Hypothesis, values: Sequence[float]) -> str:
     names = own.parameters or [""] * len(values)
     return ", ".join(f"{name} {value:.4g}".lstrip() for name, value in zip(names, values, strict=False))
 
 
-def hypotheses(result: AdjustedNetwork, found: Reliability) -> Hypotheses:
-    """Return the hypotheses of an adjusted network that is tested."""
-    trial = found.trial
-    estimated = None if found.known else result.sum_and_freedom
-    facts = result.hypothesis_facts()
+def hypotheses(
+    found: Reliability,
+    facts: Facts,
+    given: Given,
+    axes: Sequence[Axis],
+    estimated: tuple[float, float] | None,
+) -> Hypotheses:
+    """Return the hypotheses of an adjusted network that is tested.
+
+    `axes` are those of its points, `estimated` the sum of squares and the degrees of freedom if the unit
+    weight is estimated.
+    """
+    trial, tests, suspects = found.trial, found.tests, found.suspects
+    core, check_sd = {**NO_FACTS, **facts}, facts.get("check_sd")
+    core.pop("check_sd", None)
     rows, correlations = trial.core.hypotheses(
-        **{**NO_FACTS, **facts}, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
+        **core, estimated=estimated, detection=DETECTION, limit=LIMIT, effects=EFFECTS
     )
-    name = group_names(cast("NamedSuspects", trial.suspects), getattr(result.given, "camera_names", ()))
-    axes = result._terms().point_axes
-    length, image = unit_written(axes[2].small), result.given.image_unit
-    units = {"camera-f": f" {image}", "camera-point": f" {image}", "attitude": " rad", "boresight": " rad"}
-    units |= dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), "")
-    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if "times" in facts else " exposures")
+    name = group_names(cast("NamedSuspects", suspects), getattr(given, "camera_names", ()))
     numbers = Counter((row["code"], row["component"] is None) for row in rows)
     every = []
     for row in rows:
         effect = None if row["effect"] is None else Effect(*row["effect"])
         own = Hypothesis(**{**row, "effect": effect}, name=name(row))
         odds = _log_odds(own, numbers[own.code, own.component is None], estimated)
-        every.append(replace(own, log_odds=odds, checked=_is_checked(result, effect)))
+        every.append(replace(own, log_odds=odds, checked=_is_checked(effect, check_sd)))
+    length, image = unit_written(axes[2].small), given.image_unit
+    units = {"camera-f": f" {image}", "camera-point": f" {image}"}
+    units |= dict.fromkeys(("attitude", "boresight", "control-rotation"), " rad")
+    units |= dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown", "observation"), "")
+    units |= dict.fromkeys(("time-offset", "readout-time"), " s" if "times" in facts else " exposures")
+    images = (suspects.kinds == 0) & tests.active
+    largest = float(np.nanmax(tests.statistic[images], initial=0.0))
+    of_images = largest / 2 - math.log(3) - math.log(max(int(np.count_nonzero(images)), 1))
     return Hypotheses(
         every,
         correlations,
-        points=int(np.count_nonzero(result.used_points)),
-        point_ids=result.given.point_ids,
+        points=len(np.unique(suspects.points[images])),
+        point_ids=given.point_ids,
         axes=[axis.name for axis in axes],
         units=lambda code: units.get(code, f" {length}"),
+        single_odds=max([of_images, *(each.log_odds for each in every if each.group is not None)]),
     )
 
 
-def _is_checked(result: AdjustedNetwork, effect: Effect | None) -> bool:
+def _is_checked(effect: Effect | None, check_sd: Floats | None) -> bool:
     """Whether an error moves a check point by an amount that its test detects."""
-    if effect is None or not len(effect.checks):
-        return False
-    checks = cast("Result", result).check_points
-    if checks.agreement is None:
+    if effect is None or check_sd is None or not len(effect.checks):
         return False
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.abs(np.array(effect.checks)) / np.hypot(checks.sd, checks.given_sd)
+        ratios = np.abs(np.array(effect.checks)) / check_sd
     return bool((np.nan_to_num(ratios, posinf=0.0) > DETECTED).any())
 
 
@@ -297,7 +370,7 @@ def _log_odds(own: Hypothesis, count: int, estimated: tuple[float, float] | None
     return statistic / 2 - k / 2 * math.log(max(own.observations, k + 1)) - math.log(count) - absurd / 2
 
 
-NO_FACTS: dict[str, Any] = {
+NO_FACTS: Facts = {
     "velocities": np.empty((0, 3)),
     "times": [],
     "position_sets": [],
@@ -309,12 +382,14 @@ NO_FACTS: dict[str, Any] = {
 }
 
 
-def block_facts(result: Result) -> dict[str, Any]:
-    """Return the facts that hypotheses on a block require: velocities, sets, sizes of images."""
-    block = result.block
+def block_facts(block: Block, places: Floats) -> Facts:
+    """Return the facts that hypotheses on a block require: velocities, sets, sizes of images.
+
+    `places` are the (P, 3) adjusted positions of photos.
+    """
     count = len(block.photo_ids)
     cameras = np.zeros(count, dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
-    facts: dict[str, Any] = {"widths": [], "readouts": [], "checks": result.check_points.rows.tolist()}
+    facts: Facts = {"widths": [], "readouts": []}
     of_images = cameras[block.image_photos]
     for camera in range(max(len(block.cameras), 1)):
         xy = block.image_xy[of_images == camera]
@@ -333,7 +408,6 @@ def block_facts(result: Result) -> dict[str, Any]:
             seconds[row[each.photos[0]]] = each.time  # type: ignore[attr-defined]
     timed = bool(np.isfinite(seconds).all() and np.ptp(seconds) > 0)
     times = seconds if timed else np.arange(count, dtype=np.float64)
-    places = result.photo_positions
     velocities, sets = np.full((count, 3), math.nan), np.full(count, -1)
     strips = strips_of(places) if count > 1 else []
     for number, strip in enumerate(strips):
@@ -349,11 +423,8 @@ def block_facts(result: Result) -> dict[str, Any]:
     _, kinds, sizes = np.unique(block.point_sd, axis=0, return_inverse=True, return_counts=True)
     own = np.unique(kinds[control])
     if 1 < len(own) <= MOST_SETS and (sizes[own] > 1).all():
-        set_of: dict[int, int] = {kind: k for k, kind in enumerate(own.tolist())}
-        facts["control_sets"] = [
-            set_of[kind] if is_control else None
-            for kind, is_control in zip(kinds.tolist(), control.tolist(), strict=True)
-        ]
+        set_of = {int(kind): k for k, kind in enumerate(own)}
+        facts["control_sets"] = [set_of.get(kind) for kind in kinds.tolist()]
     return facts
 
 

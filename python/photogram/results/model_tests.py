@@ -26,7 +26,7 @@ from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import unknown_name
+from photogram.messages import by_name, unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
@@ -74,45 +74,24 @@ class TermsTest:
 
 @dataclass(frozen=True)
 class Model:
-    """One of several models of the same observations.
+    """One of several models of the same observations."""
 
-    Attributes
-    ----------
-    name
-        What the caller calls it.
-    squares, freedom, parameters
-        Weighted sum of squares, degrees of freedom, estimated parameters of cameras.
-    bic
-        The criterion; the least is the best.
-    checks
-        Root mean square of check points, in the linear unit, where there are ten; NaN otherwise.
-    """
-
-    name: str
-    squares: float
+    name: str  # Name of the caller for it
+    squares: float  # Weighted sum of squares
     freedom: int
-    parameters: int
-    bic: float
-    checks: float
+    parameters: int  # Estimated parameters of cameras
+    bic: float  # The criterion; the least is the best
+    checks: float  # Root mean square of ten check points or more, linear unit; NaN otherwise
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Documented, Brief):
-    """Models of the same observations side by side.
+    """Models of the same observations side by side."""
 
-    Attributes
-    ----------
-    models
-        The best first.
-    known
-        Whether the unit weight is taken for known.
-    nested
-        Tests of every model against the next larger one that has all its parameters and more: names of both,
-        T, its dimension, and the probability where the smaller one is right.
-    """
-
-    models: tuple[Model, ...]
-    known: bool
+    models: tuple[Model, ...]  # The best first
+    known: bool  # Whether the unit weight is known
+    # Tests of every model against the next larger one that has all its parameters and more: names of both, T,
+    # its dimension, and the probability if the smaller one is right
     nested: tuple[tuple[str, str, float, int, float], ...]
 
     @property
@@ -122,10 +101,7 @@ class Comparison(Documented, Brief):
 
     def difference(self, name: str) -> float:
         """Return by how much the criterion of a model is larger than the least."""
-        for each in self.models:
-            if each.name == name:
-                return each.bic - self.best.bic
-        raise KeyError(name)
+        return float(by_name(self.models, name, "model").bic - self.best.bic)
 
     def statement(self) -> str:
         """Return what the criterion says, in words."""
@@ -288,7 +264,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
             freedom = [_all_freedom(results[each]) for each in (small, large)]
             k, statistic = freedom[0] - freedom[1], omega[0] - omega[1]
             scale = 1.0 if taken else omega[1] / freedom[1]
-            p = _probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
+            p = tail_probability(max(statistic, 0.0) / scale, k, math.inf if taken else freedom[1])
             nested.append((small, large, statistic, k, p))
     return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
 
@@ -383,11 +359,11 @@ def _tested(
     camera: str, names: Sequence[str], statistic: float, freedom: float, scale: float, effect: float
 ) -> TermsTest:
     k = len(names)
-    probability = _probability(statistic / scale, k, freedom)
+    probability = tail_probability(statistic / scale, k, freedom)
     return TermsTest(camera, tuple(names), statistic, k, freedom, probability, effect)
 
 
-def _probability(value: float, k: int, freedom: float) -> float:
+def tail_probability(value: float, k: int, freedom: float) -> float:
     if math.isinf(freedom):
         return _photocore.chi_square(value, k)
     return _photocore.fisher(value / k, k, freedom) if freedom > 0 else math.nan

@@ -195,8 +195,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     @abstractmethod
-    def given(self) -> Given:
-        """What was adjusted."""
+    def given(self) -> Given: ...
 
     @classmethod
     def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
@@ -213,8 +212,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     @abstractmethod
-    def sum_and_freedom(self) -> tuple[float, float]:
-        """The weighted sum of squares of all observations, and its degrees of freedom."""
+    def sum_and_freedom(self) -> tuple[float, float]: ...
 
     @property
     def global_test(self) -> GlobalTest | None:
@@ -279,9 +277,12 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
             # Everything else stands; a network that rounding makes singular here has said so before.
             return None
-        return reliability_summary(found, hypotheses(self, found), heights=self.geographic)
+        estimated = None if self.KNOWN else self.sum_and_freedom
+        axes, facts = self._terms().point_axes, self._hypothesis_facts()
+        own = hypotheses(found, facts, self.given, axes, estimated)
+        return reliability_summary(found, own, heights=self.geographic)
 
-    def hypothesis_facts(self) -> dict[str, Any]:
+    def _hypothesis_facts(self) -> dict[str, Any]:
         """Return what hypotheses need to know beside the network; nothing if they are not about it."""
         return {}
 
@@ -330,18 +331,15 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     @abstractmethod
-    def photo_residuals(self) -> Floats:
-        """(P, k) observed minus adjusted unknowns of photos; 0 where fixed, NaN where free."""
+    def photo_residuals(self) -> Floats: ...
 
     @property
     @abstractmethod
-    def photo_given_sd(self) -> Floats:
-        """(P, k) standard deviations of the unknowns as observations: infinite free, zero fixed."""
+    def photo_given_sd(self) -> Floats: ...
 
     @property
     @abstractmethod
-    def point_residuals(self) -> Floats:
-        """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
+    def point_residuals(self) -> Floats: ...
 
     @property
     def point_given_sd(self) -> Floats:

@@ -199,33 +199,19 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     with np.errstate(over="ignore"):
         rms = np.sqrt((residuals**2).mean(axis=0))
         length = np.hypot(*residuals.T)
-    facts = [
-        Fact(
-            "Residuals of images, rms in x and y", f"{significant(rms[0], 3)}, {significant(rms[1], 3)}", unit
-        ),
-        Fact(
-            "Length of image residuals, median and largest",
-            f"{significant(float(np.median(length)), 3)}, {significant(float(length.max()), 3)}",
-            unit,
-        ),
-    ]
+    lengths = float(np.median(length)), float(length.max())
+    both = [", ".join(significant(value, 3) for value in pair) for pair in (rms.tolist(), lengths)]
+    names = ("Residuals of images, rms in x and y", "Length of image residuals, median and largest")
+    facts = [Fact(name, value, unit) for name, value in zip(names, both, strict=True)]
     redundancy = result.redundancy[used]
     if np.isfinite(redundancy).all():
-        hidden = int(np.count_nonzero(redundancy <= _NOT_CHECKED))
-        facts.append(
-            Fact(
-                "Redundancy numbers of images, mean and least",
-                f"{redundancy.mean():.3f}, {redundancy.min():.3f}",
-                note="the share of an error that shows in its own residual: 0 not checked at all, 1 fully",
-            )
-        )
-        facts.append(
-            Fact(
-                "Image coordinates that nothing checks",
-                f"{hidden} of {redundancy.size}",
-                note=f"redundancy below {_NOT_CHECKED:g}",
-            )
-        )
+        least = f"{redundancy.mean():.3f}, {redundancy.min():.3f}"
+        hidden = f"{int(np.count_nonzero(redundancy <= _NOT_CHECKED))} of {redundancy.size}"
+        below = f"redundancy below {_NOT_CHECKED:g}"
+        facts += [
+            Fact("Redundancy numbers of images, mean and least", least, note=about("redundancy-numbers")),
+            Fact("Image coordinates that nothing checks", hidden, note=below),
+        ]
     return facts
 
 

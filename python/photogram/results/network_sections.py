@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.results.axes import Determined, Terms, point_axes
+from photogram.results.axes import Determined, point_axes
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
     control,
@@ -173,7 +173,6 @@ def check_section(result: Result) -> Section:
 
 @np.errstate(all="ignore")
 def _check_summary(result: Result) -> Table:
-    """Return mean and rms differences by component, beside their standard deviations."""
     axes, checks = point_axes(result.block), result.check_points
     factors = np.array([axis.factor for axis in axes])
     d, sd = checks.differences * factors, np.hypot(checks.sd, checks.given_sd) * factors
@@ -200,7 +199,6 @@ def _check_summary(result: Result) -> Table:
 
 
 def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
-    """Return the tests of points, all components together, of many those of least probability."""
     statistic, p = named(columns, "statistic"), named(columns, "probability")
     law = "T" if result.unit_variance == "unity" else "F"
     tests = [columns[0], replace(statistic, head=law, decimals=2), replace(p, head="p", figures=2)]
@@ -209,14 +207,12 @@ def _check_tests(result: Result, columns: Sequence[Quantity]) -> Table:
 
 
 def _compared(key: str, title: str, columns: Sequence[Quantity]) -> list[Table]:
-    """Return given and adjusted coordinates of the components that can be compared."""
     tests = next(column.values for column in columns if column.head == "Test value")
     there = np.isfinite(named(columns, "d").values)
     return component_table(key, title, columns, there, tests, named(columns, "sd").values)
 
 
 def stations_section(result: AdjustedNetwork) -> Section:
-    """Return what was given of photos as observations, layer by layer."""
     tables: list[Table] = []
     layers, own = result._terms().layers, result.stations
     there, sd = np.isfinite(own.sd), result.photo_sd[own.rows]
@@ -242,7 +238,6 @@ def beside_section(result: Result) -> Section:
 
 
 def images_section(result: AdjustedNetwork) -> Section:
-    """Return image observations, of many those with the largest test values, for reports as text."""
     columns = images(result)
     *_, residuals, redundancy, tests = columns
     sizes = np.nan_to_num(np.abs(tests.values)).max(axis=1, initial=0.0)
@@ -277,7 +272,8 @@ def _chosen_rows(
 
 def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
     """Return photos, those of `others` first: their unknowns, and how their images fit, in layers."""
-    terms, fit = result._terms(), _fit_of_photos(result, result._terms())
+    terms = result._terms()
+    fit = fit_of_images(result, result.given.image_photos, len(terms.photos))
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
     rows, note = _chosen_rows("photos", np.arange(len(terms.photos)), others, orders)
     own, *_, values, sd = photos(result)
@@ -302,23 +298,26 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
 
 
 @np.errstate(all="ignore")
-def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
-    """Return (P, 6) rms x and y, mean redundancy, longest residual, largest |w|, number of images."""
+def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
+    """Return (n, 6) of n photos or points, `of` which the (m,) images are, how these fit.
+
+    Columns are rms x and y, mean redundancy, longest residual, largest |w|, number of images.
+    """
     used = result.used_images
-    photos, count = result.given.image_photos[used], len(terms.photos)
-    images = np.bincount(photos, minlength=count)
+    own = of[used]
+    images = np.bincount(own, minlength=count)
     residuals = result.residuals[used]
     found = np.full((count, 6), np.nan)
     found[:, 5] = images
     for axis in (0, 1):
-        found[:, axis] = np.sqrt(np.bincount(photos, residuals[:, axis] ** 2, count) / images)
-    found[:, 2] = np.bincount(photos, result.redundancy[used].mean(axis=1), count) / images
+        found[:, axis] = np.sqrt(np.bincount(own, residuals[:, axis] ** 2, count) / images)
+    found[:, 2] = np.bincount(own, result.redundancy[used].mean(axis=1), count) / images
     for column, values in (
         (3, np.hypot(*residuals.T)),
         (4, np.nan_to_num(np.abs(result.standardized[used])).max(axis=1, initial=0.0)),
     ):
         largest = np.zeros(count)
-        np.maximum.at(largest, photos, values)
+        np.maximum.at(largest, own, values)
         found[:, column] = np.where(images > 0, largest, np.nan)
     return found
 

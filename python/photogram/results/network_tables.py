@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.results.axes import Terms
 from photogram.results.iteration import Iteration
-from photogram.results.network import AdjustedNetwork, Observed
+from photogram.results.network import AdjustedNetwork
 from photogram.show.quantity import Axis, Link, Quantity, column
 
 _FREE = {np.inf: "free", 0.0: "fixed"}
@@ -89,28 +89,22 @@ def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
 
 def control(result: AdjustedNetwork) -> list[Quantity]:
     """Return points as observations of their own coordinates."""
-    terms, own = result._terms(), result.control
-    values = result.point_positions, result.point_sd
-    return _observed("point", terms, own, terms.point_axes, result.given.point_positions[own.rows], *values)
+    return _observed(result, "point")
 
 
 def stations(result: AdjustedNetwork) -> list[Quantity]:
     """Return photos as observations of their own unknowns."""
-    terms, own = result._terms(), result.stations
-    given = (terms.photo_values + result.photo_residuals)[own.rows]
-    return _observed("photo", terms, own, terms.photo_axes, given, terms.photo_values, result.photo_sd)
+    return _observed(result, "photo")
 
 
-def _observed(
-    kind: str,
-    terms: Terms,
-    own: Observed,
-    axes: tuple[Axis, ...],
-    given: Floats,
-    adjusted: Floats,
-    sd: Floats,
-) -> list[Quantity]:
+def _observed(result: AdjustedNetwork, kind: str) -> list[Quantity]:
     """Return prior, posterior, difference and test of observed components."""
+    terms, own = result._terms(), result.control if kind == "point" else result.stations
+    axes, adjusted, sd = terms.point_axes, result.point_positions, result.point_sd
+    given = result.given.point_positions
+    if kind == "photo":
+        axes, adjusted, sd = terms.photo_axes, terms.photo_values, result.photo_sd
+        given = adjusted + result.photo_residuals
     rows = own.rows
 
     def members(what: str) -> Any:
@@ -121,7 +115,7 @@ def _observed(
 
     return [
         names(terms, kind, rows, terms.identity),
-        Quantity(given, axes, "value", head="Given"),
+        Quantity(given[rows], axes, "value", head="Given"),
         Quantity(adjusted[rows], axes, "value", head="Adjusted"),
         difference(own.differences, axes, member=members("difference")),
         deviation(own.sd, axes, member=members("sd"), head="sd given", words=_FREE),

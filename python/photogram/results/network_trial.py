@@ -37,6 +37,7 @@ SUPPORT = 3  # Smallest number of images of a photo with a free pose
 HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
 ROBUST_ITERATIONS = 20
 
+_TESTS = ("active", "rank", "statistic", "least", "shared", "residual", "error", "error_sd")
 
 T = TypeVar("T")
 
@@ -68,7 +69,6 @@ class NetworkTrial:
         return int(self.suspects.row_starts[-1]) <= WHOLE
 
     def adjust(self, out: Out) -> Standing:
-        """Adjust without what is out, from where the last adjustment has ended."""
         tolerance = self.exact if self.whole else self.rough
         standing = self._asked(
             self.core.adjust,
@@ -118,20 +118,10 @@ class NetworkTrial:
     def tests(self) -> Tests:
         found = self._tests = self.core.tests()
         inside = ~np.isnan(found["residual"])
-        return Tests(
-            active=found["active"],
-            rank=found["rank"],
-            statistic=found["statistic"],
-            least=found["least"],
-            shared=found["shared"],
-            residual=found["residual"],
-            redundancy=np.where(inside, found["cofactors"][self._diagonal], math.nan),
-            error=found["error"],
-            error_sd=found["error_sd"],
-        )
+        redundancy = np.where(inside, found["cofactors"][self._diagonal], math.nan)
+        return Tests(**{name: found[name] for name in _TESTS}, redundancy=redundancy)
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups against the rest."""
         found = self.core.predictions(list(groups))
         return [
             None
@@ -432,7 +422,6 @@ class BlockSuspects(NamedSuspects):
         return Phrase("named.unknown", {"unknown": self.block.unknowns[subject].name})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
-        """Return the name and unit of a component; parameters and common unknowns have numbers."""
         if kind != OBSERVATION:
             return str(component), ""
         observation = self.observations[subject]

@@ -2,31 +2,56 @@
 
 Outliers are clipped and a common factor of all standard deviations is taken out first, by the median of the
 test values: what is left of them would be taken for a pattern.
+
+Residuals are not independent: ~v = R ~e. So a permutation of residuals is no null, and sums of r for the
+variances of sums make tests conservative. Here errors e of all images are drawn, and R e computed: what the
+network itself makes of errors that have no pattern. A statistic of the residuals is compared with that of
+each draw:
+
+    p = (1 + number of draws with a statistic as large) / (1 + number of draws)
+
+which is exact for any number of draws (Barnard 1963), but cannot be below 1 / (1 + draws).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import chosen, finite_rows
+from photogram.arguments.arrays import argument_error, chosen, finite_rows, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
+from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
-from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_patterns, normality, regression
+from photogram.statistics.patterns import (
+    SPEAKING,
+    Fit,
+    durbin_watson,
+    frame_pattern,
+    group_patterns,
+    moran,
+    normality,
+    regression,
+)
 from photogram.statistics.reliability import TESTABLE
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LEVEL_OF_PATTERNS = 0.001  # Low, because several patterns are tested
 NOTABLE = 0.3  # Smallest mean residual that matters, in standard deviations
 CLIPPED = 3.0  # Limit of test values
 VISIBLE = 0.1  # Smallest redundancy number in the test of normality
+TOGETHER = 20  # Draws that are projected at a time
 KURTOSIS = (-0.7, 1.0)  # Limits of excess kurtosis without a message
 
 
@@ -56,9 +81,9 @@ def patterns(
     factor = float(np.nanmedian(np.abs(w))) / MEDIAN
     if not factor > 0:
         return []
-    # ~v = w sqrt(r), of w that are clipped; 0 if nothing is tested.
+    # ~v = w sqrt(r), of clipped w; 0 if nothing is tested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
-    residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
+    residuals = _clipped(w, redundancy, factor)
     given, (axis, _) = result.given, result._terms().image_axes
     # By photo the coordinates are those that were measured: of a scanner, samples and lines.
     image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
@@ -85,6 +110,10 @@ def patterns(
     return [each for each in found if each is not None]
 
 
+def _clipped(w: Floats, redundancy: Floats, factor: float) -> Floats:
+    return np.asarray(np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy))
+
+
 def _of_camera(
     camera: CameraImages,
     image_photos: Indices,
@@ -101,17 +130,18 @@ def _of_camera(
     x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
     place = {"x": float(found.at[0]), "y": float(found.at[1])}
     fields = {"camera": camera.name, "rms": float(found.rms), "dx": float(x), "dy": float(y), "unit": unit}
-    return Systematic(
-        kind=Phrase("test.frame", {"camera": camera.name}),
-        sentence=Phrase("pattern.frame", {**fields, **place}),
-        statistic="B",
-        distribution="chi2",
-        dof=(found.dof,),
-        value=found.statistic,
-        probability=found.probability,
-        level=LEVEL_OF_PATTERNS,
-        large=found.rms > NOTABLE,
-    )
+    sentence, dof = Phrase("pattern.frame", {**fields, **place}), (found.dof,)
+    kind = Phrase("test.frame", {"camera": camera.name})
+    return _systematic(found, kind, sentence, ("B", "chi2", dof), large=found.rms > NOTABLE)
+
+
+def _systematic(
+    found: Any, kind: Phrase, sentence: Phrase, law: tuple[str, str, tuple[float, ...]], **more: Any
+) -> Systematic:
+    """Return a test by its result and its statistic, distribution and degrees of freedom."""
+    own = {"value": found.statistic, "probability": found.probability, "level": LEVEL_OF_PATTERNS}
+    names = dict(zip(("statistic", "distribution", "dof"), law, strict=True))
+    return Systematic(kind=kind, sentence=sentence, **{**own, **names, **more})
 
 
 def _of_photos(
@@ -149,18 +179,10 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
     two, three = (100 * float(share) for share in found.beyond)
     tails = "heavier" if found.excess > 0 else "lighter"
     fields = {"excess": float(found.excess), "two": two, "three": three}
-    return Systematic(
-        kind=Phrase("test.normality"),
-        sentence=Phrase(f"pattern.{tails}-tails", fields),
-        statistic="A^2",
-        distribution="Anderson-Darling",
-        dof=(),
-        value=found.statistic,
-        probability=found.probability
-        if found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
-        else max(found.probability, LEVEL_OF_PATTERNS),
-        level=LEVEL_OF_PATTERNS,
-    )
+    sentence, law = Phrase(f"pattern.{tails}-tails", fields), ("A^2", "Anderson-Darling", ())
+    notable = found.excess > KURTOSIS[1] or found.excess < KURTOSIS[0]
+    p = found.probability if notable else max(found.probability, LEVEL_OF_PATTERNS)
+    return _systematic(found, Phrase("test.normality"), sentence, law, probability=p)
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
@@ -182,13 +204,122 @@ def _of_heights(result: AdjustedNetwork) -> Systematic | None:
 def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | None:
     if found is None:
         return None
-    return Systematic(
-        kind=Phrase(f"test.{code}", fields),
-        sentence=Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)}),
-        statistic="F",
-        distribution="F",
-        dof=found.dof,
-        value=found.statistic,
-        probability=found.probability,
-        level=LEVEL_OF_PATTERNS,
-    )
+    sentence = Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)})
+    return _systematic(found, Phrase(f"test.{code}", fields), sentence, ("F", "F", found.dof))
+
+
+@dataclass(frozen=True)
+class DrawnPattern:
+    """A pattern of residuals, and how often chance makes as strong a one.
+
+    Attributes
+    ----------
+    name
+        What is looked for.
+    statistic
+        `B` of the bins of the frame, Moran's `I`, Durbin and Watson's `d`.
+    value
+        Of the residuals.
+    expected, sd
+        Mean and standard deviation over the draws.
+    probability
+        Share of draws with a pattern as strong; see the module.
+    draws
+        How many there were.
+    """
+
+    name: str
+    statistic: str
+    value: float
+    expected: float
+    sd: float
+    probability: float
+    draws: int
+
+
+_Pattern = tuple[str, str, Callable[[Floats], float]]
+"""What is looked for, its statistic, and the value of this of (m, 2) residuals ~v."""
+
+
+def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[DrawnPattern]:
+    """Test the residuals of the images of a block for patterns, against draws of residuals without any.
+
+    For every camera: mean residuals over the frame (B, as the verdict tests it), and whether residuals of
+    images near each other in the frame, on other photos, are alike (Moran's I 1950). Over the photos in
+    their order: whether the mean residuals of one and the next are alike (Durbin and Watson's d 1950).
+    Outliers are clipped at three standard deviations, in residuals and draws.
+
+    Parameters
+    ----------
+    result
+        An adjusted block, with redundancy numbers.
+    draws, seed
+        How many draws, and where their random numbers start. Each takes a solution with the factor.
+
+    Raises
+    ------
+    InputError
+        A result without redundancy numbers or with a robust loss; options that cannot be.
+    OutOfMemoryError, KeyboardInterrupt
+        As :meth:`photogram.Result.covariances`.
+    """
+    if whole_number("draws", draws) < 1:
+        raise argument_error("draws", "positive", value=draws)
+    block, used = result.block, result.used_images
+    if result.loss is not None or not np.isfinite(result.redundancy[used]).all() or not used.any():
+        raise InputError(phrase("models.patterns"))
+    redundancy = np.where(used[:, np.newaxis] & (result.redundancy > TESTABLE), result.redundancy, 0.0)
+    tests = _patterns(result, redundancy)
+
+    def values(residuals: Floats) -> Floats:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            w = np.where(redundancy > 0, residuals / np.sqrt(redundancy), math.nan)
+        clipped = _clipped(w, redundancy, float(np.nanmedian(np.abs(w))) / MEDIAN)
+        return np.array([value(clipped) for *_, value in tests])
+
+    found = values(result.residuals / block.image_sd)
+    random, core = np.random.default_rng(seed), factored(result)
+    drawn: list[Floats] = []
+    while len(drawn) < draws:
+        count = min(TOGETHER, draws - len(drawn))
+        errors = np.where(used[:, np.newaxis], random.normal(size=(count, *block.image_xy.shape)), 0.0)
+        drawn += [values(each) for each in core.project_images(errors, threads=0, progress=None)]
+    tested = []
+    for (name, statistic, _), value, by_chance in zip(tests, found.tolist(), np.array(drawn).T, strict=True):
+        if math.isfinite(value):
+            strong = int((by_chance <= value if statistic == "d" else by_chance >= value).sum())
+            sd = float(by_chance.std(ddof=1)) if draws > 1 else math.nan
+            p = (1 + strong) / (1 + draws)
+            mean = float(by_chance.mean())
+            tested.append(DrawnPattern(name, statistic, value, mean, sd, p, draws))
+    return tested
+
+
+def _patterns(result: Result, redundancy: Floats) -> list[_Pattern]:
+    block = result.block
+    photos: Indices = np.arange(len(block.photo_ids))
+    cameras = [("the camera", photos >= 0)]
+    if block.photo_cameras is not None:
+        cameras = [(each.name, block.photo_cameras == row) for row, each in enumerate(result.cameras)]
+    tested = (redundancy > 0).any(axis=1)
+    found: list[_Pattern] = []
+    for name, own_photos in cameras:
+        own = np.flatnonzero(own_photos[block.image_photos] & tested)
+        xy, on, r = focal_images(block)[own], block.image_photos[own], redundancy[own]
+
+        def bins(v: Floats, own: Indices = own, xy: Floats = xy, r: Floats = r) -> float:
+            pattern = frame_pattern(xy, v[own], r)
+            return math.nan if pattern is None else pattern.statistic
+
+        def alike(v: Floats, own: Indices = own, xy: Floats = xy, on: Indices = on) -> float:
+            return moran(xy, on, v[own])
+
+        found += [
+            (f"pattern over the frame of {name}", "B", bins),
+            (f"neighbours in the frame of {name}", "I", alike),
+        ]
+
+    def along(v: Floats) -> float:
+        return durbin_watson(block.image_photos, len(photos), v, redundancy)
+
+    return [*found, ("one photo and the next", "d", along)]

@@ -35,8 +35,6 @@ APART = 1 / (1 + LIMIT)
 
 @dataclass(frozen=True, eq=False)
 class ReliabilitySummary:
-    """The reliability of a network in a few lines."""
-
     level: float  # of the tests
     power: float
     known: bool
@@ -85,7 +83,8 @@ class ReliabilitySummary:
             sentences.append("on other points cannot be told apart:")
             sentences += [*map(str, self.pairs), *([f"and {more} more"] if more > 0 else [])]
         sentences = sentences or ["all observations of a point can be told apart"]
-        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences)]
+        errors = [self.hypotheses.tests(), self.hypotheses.external_reliability()]
+        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences), *errors]
 
     def document(self) -> dict[str, Any]:
         return {
@@ -97,6 +96,7 @@ class ReliabilitySummary:
             "inseparable": [members(pair, "first", "second", "correlation") for pair in self.pairs],
             "inseparable_found": self.pairs_found,
             "points_looked_into": self.points_looked_into,
+            "hypotheses": self.hypotheses.document(),
         }
 
 

@@ -236,11 +236,13 @@ class Result(OnFilm, AdjustedNetwork):
         core = self._core_network().trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
-    def hypothesis_facts(self) -> dict[str, Any]:
-        """Return velocities of photos, sets of positions and control, and sizes of images."""
+    def _hypothesis_facts(self) -> dict[str, Any]:
         from photogram.results.hypotheses import block_facts
 
-        return block_facts(self)
+        checks = self.check_points
+        sd = None if checks.agreement is None else np.hypot(checks.sd, checks.given_sd)
+        facts = block_facts(self.block, self.photo_positions)
+        return {**facts, "checks": checks.rows.tolist(), "check_sd": sd}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the block as it was given, but with what is free where the adjustment has ended.
@@ -414,20 +416,7 @@ class Result(OnFilm, AdjustedNetwork):
     @cached_property
     def check_points(self) -> CheckPoints:
         """Check points with their differences and standard deviations, tested one by one and together."""
-        untested = "" if self.converged else "the adjustment has not converged"
-        if not self.photo_given_sd.any():
-            untested = "all photos are fixed, and no standard deviation has their errors"
-        if self.datum.is_chosen:
-            untested = "the datum of the network is chosen, and theirs is another"
-        return check_points(
-            self,
-            self.block,
-            self.point_differences,
-            self.point_kinds,
-            second=self.freedom_of_scale,
-            untested=untested,
-            whole=self.WHOLE,
-        )
+        return check_points(self)
 
     def statement(self, **asked: Any) -> Any:
         """Return the accuracy statement that one may hand over (docs/statement.md).
@@ -446,7 +435,7 @@ class Result(OnFilm, AdjustedNetwork):
     @property
     def trajectories(self) -> dict[str, AdjustedTrajectory]:
         """The trajectories that photos and records are on, by name: coefficients, poses at any time."""
-        return adjusted_trajectories(self.block, self.unknowns, self.covariances)
+        return adjusted_trajectories(self)
 
     def project(self, photo: str, points: ArrayLike) -> Floats:
         """Return where a photo on a trajectory sees points: the row or line at whose time it sees them there.
@@ -467,7 +456,7 @@ class Result(OnFilm, AdjustedNetwork):
         InputError
             A photo that is on no trajectory; a scanner on a trajectory that has one record.
         """
-        return project(self.block, self.unknowns, self.cameras, photo, points)
+        return project(self, photo, points)
 
     def camera_table(self) -> pd.DataFrame:
         """Return adjusted cameras as a data frame: a row for each parameter, with its unit."""

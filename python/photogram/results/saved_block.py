@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,19 +10,14 @@ from typing import Any
 import numpy as np
 
 from photogram.network.block import Block
-from photogram.network.observations import Observation
-from photogram.network.passages import Passage
-from photogram.network.unknowns import Unknown
-from photogram.results.block_files import CLASSES, VALUE_CLASSES, parts_of_block
+from photogram.results.block_files import parts_of_block, saved_classes
 from photogram.results.result import Result
 from photogram.results.result_files import read_saved, rows_of
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
-    saved = read_saved(
-        folder, [*VALUE_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
-    )
+    saved = read_saved(folder, saved_classes(), document)
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}
     for kind in ("photo", "point"):
@@ -50,10 +45,3 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
         pairs = zip(members["unknowns"], block.unknowns, strict=True)
         members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
     return Result(**members, **own_arrays, block=block, state=saved.state())
-
-
-def _below(base: type) -> Iterator[type]:
-    subclasses: list[type] = base.__subclasses__()
-    for each in subclasses:
-        yield each
-        yield from _below(each)

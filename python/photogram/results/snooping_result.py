@@ -13,8 +13,8 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Brief, Documented, Rows, few
-from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section
-from photogram.show.quantity import Quantity, Table, members, of_each, records
+from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section, about
+from photogram.show.quantity import Quantity, Table, members, members_of_each, of_each, records
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
@@ -129,48 +129,36 @@ class Snooped(Brief, Documented):
 
     def document(self) -> Document:
         """Return the document of the network without the removed observations, with the log."""
-        network = self.result.document()
-        removed = Fact(
-            "Taken out", f"{len(self.removed)}", note=f"of {len(self.suspects)} groups of observations"
-        )
-        return replace(
-            network, highlights=[removed, *network.highlights], sections=[self._section(), *network.sections]
-        )
-
-    def _section(self) -> Section:
-        consequences = [f"{each.name}: {line}" for each in self.log for line in each.consequences]
+        network, log, count = self.result.document(), self.log, len(self.removed)
         remarks = [
-            *([] if self.log else ["Nothing was taken out."]),
+            *([] if log else ["Nothing was taken out."]),
             *map(str, self.outcome.remarks),
             *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
-            *consequences,
+            *(f"{each.name}: {line}" for each in log for line in each.consequences),
         ]
         parts: list[Part] = [Facts("Data snooping", self._facts())]
-        if self.log:
-            parts += [log_table(self.log), _tests_table(self.log)]
-        if remarks:
-            parts.append(Remarks(remarks))
-        intro = "The error of what was taken out is estimated from the rest of the network."
-        return Section("removed", "What was taken out", parts, intro)
+        parts += [log_table(log), _tests_table(log)] if log else []
+        parts += [Remarks(remarks)] if remarks else []
+        section = Section("removed", "What was taken out", parts, about("removed"))
+        removed = Fact("Taken out", f"{count}", note=f"of {len(self.suspects)} groups of observations")
+        highlights = [removed, *network.highlights]
+        return replace(network, highlights=highlights, sections=[section, *network.sections])
 
     def _facts(self) -> list[Fact]:
         outcome, settings = self.outcome, self.settings
         returned = sum(entry.returned is not None for entry in self.log)
         suspect = sum(bool(entry.kept) for entry in self.log)
+        level = "False discovery rate" if settings.fdr else "Family level"
+        tests = f"over {outcome.tests} tests, kept in all rounds"
         biased = f"holds after removal of {len(self.removed)} groups: it is biased low by little"
+        taken_out = f"returned {returned}, suspect but kept {suspect}"
         return [
             Fact("Unit weight", "known: chi-square tests" if settings.known else "unknown: F tests"),
-            Fact(
-                "False discovery rate" if settings.fdr else "Family level",
-                f"{settings.level:g}",
-                note=f"over {outcome.tests} tests, kept in all rounds",
-            ),
+            Fact(level, f"{settings.level:g}", note=tests),
             Fact("Unit variance before", _said(outcome.before)),
             Fact("Unit variance after", _said(outcome.standing), note=biased if self.removed else ""),
             Fact("Rounds", f"{len(outcome.rounds)}"),
-            Fact(
-                "Taken out", f"{len(self.removed)}", note=f"returned {returned}, suspect but kept {suspect}"
-            ),
+            Fact("Taken out", f"{len(self.removed)}", note=taken_out),
         ]
 
 
@@ -229,22 +217,10 @@ def log_table(log: Sequence[Removal]) -> Table:
         of_each(log, "kind", kind="name"),
         of_each(log, "name", kind="name", head="What"),
         Quantity([*map(estimated_errors, log)], kind="name", head="Estimated error"),
-        *(
-            Quantity([getattr(each, name) for each in log], member=member)
-            for name, member in {
-                "components": "components",
-                "units": "units",
-                "error": "estimated_error",
-                "error_sd": "estimated_error_sd",
-                "prediction": "prediction_T",
-                "prediction_error": "predicted_error",
-            }.items()
-        ),
+        *members_of_each(log, "components", "units", estimated_error="error", estimated_error_sd="error_sd"),
+        *members_of_each(log, prediction_T="prediction", predicted_error="prediction_error"),
         Quantity([[*map(str, each.consequences)] for each in log], member="consequences"),
-        of_each(log, "dimension"),
-        of_each(log, "first_statistic", member="first_T"),
-        of_each(log, "statistic", member="T"),
-        of_each(log, "fisher", member="F"),
+        *members_of_each(log, "dimension", first_T="first_statistic", T="statistic", F="fisher"),
         Quantity(np.exp(log_p), member="p"),
         Quantity(log_p / LN10, member="log10_p"),
         of_each(log, "limit", member="limit_p"),

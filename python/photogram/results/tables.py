@@ -72,7 +72,6 @@ def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floa
 
 
 def observations(kind: ObservedKind) -> list[Quantity]:
-    """Return the observations of one kind."""
     axes = tuple(map(component_axis, kind.components, kind.units))
     kinds, names = (np.array(texts, dtype=object) for texts in ([kind.kind] * len(kind.names), kind.names))
     return [
@@ -182,12 +181,10 @@ _GIVEN_SD: dict[str, Any] = {
 
 
 def _all(every: Sequence[Any], what: str) -> Floats:
-    """Return an array of each, one behind the other."""
     return np.concatenate([np.zeros(0), *map(attrgetter(what), every)])
 
 
 def _each(every: Sequence[Any], what: str) -> Any:
-    """Return a text of each, as often as it has numbers."""
     counts = [len(each.values) for each in every]
     return np.repeat(np.array([*map(attrgetter(what), every)], dtype=object), counts)
 

@@ -66,52 +66,31 @@ class Tests:
         def station(row: int) -> Phrase:
             return phrase("named.photo", photo=str(photos[row]))
 
-        def of_network(what: str, sd: str) -> tuple[Floats, Floats, Floats, Floats]:
-            names = (f"{what}residuals", sd, f"{what}redundancy", f"{what}standardized")
-            residuals, sd_given, shares, w = (getattr(result, name) for name in names)
-            return residuals, sd_given, shares, w
+        def of_network(
+            title: Phrase, kind: str, what: str, name: Callable[[int], Phrase], groups: Mapping[str, slice]
+        ) -> ComponentTests:
+            axes = {"image": terms.image_axes, "control": terms.point_axes, "station": terms.photo_axes}[kind]
+            names = (f"{what or 'image_'}given_sd", f"{what}redundancy", f"{what}standardized")
+            values = getattr(result, f"{what}residuals"), *(getattr(result, each) for each in names)
+            return _component_tests(title, kind, axes, name, values, groups)
 
-        return [
-            _component_tests(
-                phrase("test.image_coordinates"),
-                "image",
-                terms.image_axes,
-                image,
-                of_network("", "image_given_sd"),
-                {"images": every},
-                of_photos,
-                of_points,
-            ),
-            _component_tests(
-                phrase("test.components_of_control"),
-                "control",
-                terms.point_axes,
-                control,
-                of_network("point_", "point_given_sd"),
-                {"control": every},
-                points=np.arange(len(points)),
-            ),
-            _component_tests(
-                phrase("test.components_of_stations"),
-                "station",
-                terms.photo_axes,
-                station,
-                of_network("photo_", "photo_given_sd"),
-                {"positions": slice(3), "attitudes": slice(3, None)},
-                photos=np.arange(len(photos)),
-            ),
-            *(
-                _component_tests(
-                    phrase("test.components", kind=kind_words(each.kind)),
-                    each.kind,
-                    tuple(map(component_axis, each.components, each.units)),
-                    partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each),
-                    (each.residuals, each.sd, each.redundancy, each.standardized),
-                    {"observations": every},
-                )
-                for each in terms.kinds
-            ),
+        images = of_network(phrase("test.image_coordinates"), "image", "", image, {"images": every})
+        of_control = phrase("test.components_of_control")
+        controls = of_network(of_control, "control", "point_", control, {"control": every})
+        parts = {"positions": slice(3), "attitudes": slice(3, None)}
+        stations = of_network(phrase("test.components_of_stations"), "station", "photo_", station, parts)
+        found = [
+            replace(images, photos=of_photos, points=of_points),
+            replace(controls, points=np.arange(len(points))),
+            replace(stations, photos=np.arange(len(photos))),
         ]
+        for each in terms.kinds:
+            title = phrase("test.components", kind=kind_words(each.kind))
+            name = partial(lambda kind, row: named_observation(kind.kind, kind.names[row]), each)
+            axes = tuple(map(component_axis, each.components, each.units))
+            values = each.residuals, each.sd, each.redundancy, each.standardized
+            found.append(_component_tests(title, each.kind, axes, name, values, {"observations": every}))
+        return found
 
     @cached_property
     def components(self) -> list[ComponentTests]:
@@ -236,8 +215,6 @@ def _component_tests(
     name: Callable[[int], Phrase],
     values: tuple[Floats, Floats, Floats, Floats],
     groups: Mapping[str, slice],
-    photos: Indices | None = None,
-    points: Indices | None = None,
 ) -> ComponentTests:
     """Return the tests of one type by its residuals, standard deviations, redundancy numbers and w."""
     residuals, sd, shares, w = values
@@ -251,8 +228,6 @@ def _component_tests(
         sd=sd,
         redundancy=shares,
         groups={Phrase(f"test.{code}", title.fields): components for code, components in groups.items()},
-        photos=photos,
-        points=points,
     )
 
 

@@ -22,8 +22,6 @@ from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
-from photogram.results.cameras import AdjustedCamera
-from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.words import phrase
 
@@ -173,25 +171,17 @@ def corrections(
     return sums(of_position, position), sums(of_rotation, rotation)
 
 
-def project(
-    block: Block,
-    unknowns: Sequence[AdjustedUnknown],
-    cameras: Sequence[AdjustedCamera],
-    photo: str,
-    points: ArrayLike,
-) -> Floats:
-    """Return where a photo on a trajectory sees (n, 3) points of the object space, as adjusted.
-
-    See :meth:`photogram.Result.project`.
-    """
+def project(result: Result, photo: str, points: ArrayLike) -> Floats:
+    """Return the images of (n, 3) points on a photo on a trajectory; see :meth:`photogram.Result.project`."""
+    block = result.block
     timed = {each.photo: row for row, each in enumerate(block.timed)}
     if photo not in timed:
         raise InputError(unknown_name("photo on a trajectory", photo, timed))
     row = timed[photo]
-    adjusted = {id(each.given): (each.position, each.attitude) for each in unknowns}
+    adjusted = {id(each.given): (each.position, each.attitude) for each in result.unknowns}
     index = block.photo_ids.index(photo)
-    if cameras and block.photo_cameras is not None:
-        camera = cameras[int(block.photo_cameras[index])].camera
+    if result.cameras and block.photo_cameras is not None:
+        camera = result.cameras[int(block.photo_cameras[index])].camera
     else:
         camera = camera_of(block, index)
     places = shaped("points", points, (len(np.asarray(points)), 3))
@@ -204,15 +194,13 @@ def project(
     return projected(own, block.trajectories[row], camera, places, lambda each: adjusted[id(each)])
 
 
-def adjusted_trajectories(
-    block: Block, unknowns: Sequence[AdjustedUnknown], covariances: Callable[[], Covariances]
-) -> dict[str, AdjustedTrajectory]:
+def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
     """Return the trajectories of photos and records of a block, by their names.
 
-    `covariances` gives those of anything with anything: asked for once, and not before poses are.
+    They ask for covariances once, and not before poses are asked for.
     """
-    found = {id(each.given): each for each in unknowns}
-    once = cache(covariances)
+    found = {id(each.given): each for each in result.unknowns}
+    once = cache(result.covariances)
 
     def joint(names: list[str]) -> Floats:
         return once().covariance([("unknown", name) for name in names])
@@ -236,7 +224,7 @@ def adjusted_trajectories(
             joint=joint,
         )
 
-    return {each.name: adjusted(each) for each in block.all_trajectories}
+    return {each.name: adjusted(each) for each in result.block.all_trajectories}
 
 
 def restarted_motion(

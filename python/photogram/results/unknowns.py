@@ -16,20 +16,12 @@ if TYPE_CHECKING:
     from photogram import _photocore
 
 
-_PLACED = frozenset(
-    (
-        *("lever arm", "shift", "drift", "instrument", "level", "sensor"),
-        *("position coefficient", "rotation coefficient", "gyro bias", "clock", "readout", "bend", "knot"),
-    )
-)
-"""Types with components of `position` for values."""
-_NUMBERS = frozenset(
-    (
-        *("film placement", "film size", "film bend", "roll"),
-        *("fiducial", "pattern", "scanner", "scanner curve"),
-    )
-)
-"""Types whose values are the first of `position`."""
+# Types with components of `position` for values, and types whose values are the first of `position`.
+_PLACED = {"lever arm", "shift", "drift", "instrument", "level", "sensor", "position coefficient", "clock"}
+_PLACED |= {"rotation coefficient", "gyro bias", "readout", "bend", "knot"}
+_NUMBERS = {"film placement", "film size", "film bend", "roll"}
+_NUMBERS |= {"fiducial", "pattern", "scanner", "scanner curve"}
+_ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_former", "redundancy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +54,8 @@ class AdjustedUnknown:
 
     def __post_init__(self) -> None:
         # There may be as many as four times the photos: their fields are not looked for in each.
-        for array in (
-            self.change,
-            self.position,
-            self.attitude,
-            self.cofactors,
-            self.covariance,
-            self.with_former,
-            self.redundancy,
-        ):
-            array.flags.writeable = False
+        for name in _ARRAYS:
+            getattr(self, name).flags.writeable = False
 
     @property
     def name(self) -> str:

@@ -81,11 +81,14 @@ def written(part: Any, numeral: Callable[[str], str] = str) -> Any:
     if part.shown is not None:
         columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
     pairs = [pair for each in columns if each.head for pair in _columns(each, part.deviations)]
-    rows = [
-        [cell if cell.number is None else replace(cell, text=numeral(cell.text)) for cell in row]
-        for row in zip(*(cells for _, cells in pairs), strict=True)
-    ]
+    rows = [*zip(*(cells for _, cells in pairs), strict=True)]
+    if numeral is not str:
+        rows = [tuple(_localized(cell, numeral) for cell in row) for row in rows]
     return Table(part.title, [column for column, _ in pairs], rows, part.note)
+
+
+def _localized(cell: Cell, numeral: Callable[[str], str]) -> Cell:
+    return cell if cell.number is None else replace(cell, text=numeral(cell.text))
 
 
 def _columns(each: Quantity, by: Floats | None) -> Iterator[tuple[Column, list[Cell]]]:

@@ -18,8 +18,6 @@ from photogram.show import quantity
 from photogram.words import Phrase, words_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from photogram.show.sketch.plot import Plot
 
 Tone = Literal["", "good", "look", "bad"]
@@ -89,11 +87,6 @@ class Drawing:
     caption: str
     sketch: Callable[[], Plot | None]  # Declares the picture; None where there is nothing to draw
     kind: str = field(default="drawing", init=False)
-
-    def draw(self) -> Figure | None:
-        """Return the picture as a figure of matplotlib; None where there is nothing to draw."""
-        plot = self.sketch()
-        return None if plot is None else plot.figure()
 
 
 @dataclass(frozen=True)

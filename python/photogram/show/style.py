@@ -26,6 +26,7 @@ SOFT = "#5c5c5c"
 """Of letters that are not to stand out: 6.7 to 1 on white; FAINT, of lines, has 3.4."""
 """What is drawn as it is, what a reader should look at, and what only helps."""
 DPI = 120  # Dots per inch of PNG files
+MATPLOTLIB = "matplotlib", "plots in formats other than SVG", "plots"  # Package, its use, and its extra
 
 SETTINGS: dict[str, Any] = {
     "font.size": 9.0,
@@ -64,29 +65,21 @@ def need(package: str, user: str, extra: str) -> None:
         raise ModuleNotFoundError(message, name=package) from None
 
 
-def need_matplotlib() -> None:
-    """Raise an error with the name of the extra if matplotlib is absent."""
-    need("matplotlib", "plots in formats other than SVG", "plots")
-
-
 def styled() -> AbstractContextManager[None]:
     """Return a context in which axes, letters and legends are those of the house."""
-    need_matplotlib()
-    import matplotlib as mpl
+    need(*MATPLOTLIB)
+    from matplotlib import rc_context
 
     settings: Any = SETTINGS
-    return mpl.rc_context(settings)
+    return rc_context(settings)
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure that belongs to no window (inches)."""
-    need_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
+    need(*MATPLOTLIB)
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained", dpi=DPI)
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), layout="constrained", dpi=DPI)
 
 
 def round_length(value: float) -> float:

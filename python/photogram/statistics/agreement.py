@@ -69,7 +69,6 @@ def agreement(
 
 
 def _blocks(matrix: Floats, width: int) -> Floats:
-    """Return the (n, k, k) blocks on the diagonal."""
     count = len(matrix) // width
     return np.asarray(matrix.reshape(count, width, count, width)[range(count), :, range(count), :])
 

@@ -61,8 +61,6 @@ class Weighted(Protocol):
 
 @dataclass(frozen=True)
 class GroupsOf:
-    """Groups of observations, by name."""
-
     names: tuple[str, ...]  # (G,) of the groups
     # (G,) larger group that replaces a group whose component cannot be estimated, merged with all others of
     # the same name; empty for none
@@ -74,8 +72,6 @@ class GroupsOf:
 
 @dataclass(frozen=True)
 class Component:
-    """The variance component of a group."""
-
     name: str  # Name of the group; of the larger group after merging
     members: tuple[str, ...]
     count: int  # observations; q and r with the last weights
@@ -107,8 +103,6 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Variance components of groups."""
-
     components: tuple[Component, ...]  # Estimated and fixed ones
     factors: Floats  # (G,) theta of every given group
     matrix: Floats  # (k, k) Helmert matrix of the components at the end
@@ -407,7 +401,6 @@ class _Run:
         return math.log(factors[members[0]])
 
     def finished(self, level: float, equality: tuple[float, int, float] | None) -> Estimate:
-        """Return the estimate."""
         free = self.free
         deviations = np.full(len(self.units), np.nan)
         if free:

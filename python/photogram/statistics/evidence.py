@@ -40,8 +40,6 @@ Beyond = tuple[float, Tested, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Test:
-    """One test."""
-
     kind: Text  # type of the tested observations
     subject: Text
     statistic: str  # Its symbol: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
@@ -79,7 +77,6 @@ class Evidence:
 
     @cached_property
     def number(self) -> int:
-        """Number of single tests."""
         return sum(self._count(each) for each in self.found.observations)
 
     @staticmethod
@@ -254,7 +251,6 @@ class Evidence:
         return factor_of(self.test)
 
     def named(self, tests: list[Beyond]) -> list[Phrase]:
-        """Return the names of tests with their values."""
         return [
             part_of(each.name(place), each.statistic, float(each.values[place])) for _, each, place in tests
         ]

@@ -41,7 +41,6 @@ class Tested:
     )
 
     def at(self, place: tuple[int, ...]) -> Tested:
-        """Return the test of one observation."""
         shape = np.shape(self.values)
         dimension, second = (
             np.broadcast_to(np.asarray(each), shape) for each in (self.dimension, self.second)
@@ -136,8 +135,6 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Systematic:
-    """A test of the pattern of residuals."""
-
     kind: Text  # observation type
     sentence: Text  # result of the test: pattern, size, effect
     statistic: str
@@ -154,14 +151,11 @@ class Systematic:
 
     @property
     def significant(self) -> bool:
-        """Whether the test rejects."""
         return self.probability < self.level
 
 
 @dataclass(frozen=True)
 class GroupFactor:
-    """The estimated variance component of a group of observations."""
-
     group: Text
     factor: float  # Required factor of the standard deviations: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
@@ -202,6 +196,9 @@ class Findings:
     changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
     systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
+    # Detected common errors of sets of observations, and whether they forbid the use
+    common: Sequence[Text] = ()
+    common_is_harmful: bool = False
     # Undetectable errors that affect many points, the worst first
     unchecked: Sequence[Text] = ()
     snooped: Removed | None = None

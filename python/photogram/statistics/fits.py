@@ -57,7 +57,6 @@ class Fit:
 
     @property
     def omega(self) -> float:
-        """The weighted sum of squares."""
         return float(self.whitened @ self.whitened)
 
     @property

@@ -41,8 +41,6 @@ MOST = 3  # Largest number of changes of one quantity
 
 @dataclass(frozen=True)
 class Change:
-    """An accepted hypothesis on one quantity."""
-
     kind: str  # `drift`, `step`, `single`, or the name of a regressor
     # size, sd: per unit of time, after minus before, off, or per unit of the regressor
     size: float

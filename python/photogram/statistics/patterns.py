@@ -31,8 +31,6 @@ CELLS = 10  # Cells of the frame in each direction; observations in one cell are
 
 @dataclass(frozen=True)
 class Normality:
-    """Distribution of residuals."""
-
     values: int  # Number of values
     excess: float  # Excess kurtosis; 0 of the normal distribution
     # Shares of values beyond 2 and 3 standard deviations; 0.0455 and 0.0027 if normal

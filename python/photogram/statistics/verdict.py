@@ -228,13 +228,21 @@ def _gross_errors(e: Evidence) -> Phrase | None:
             if e.single
             else Phrase(code, fields)
         )
-    if not e.rejected or e.found.snooped or not e.gross or e.lens:
+    if not e.rejected or e.found.snooped or not e.gross or e.lens or "common-error" in e.codes:
         return None
     # A few gross errors increase s but not the median; a wrong model increases all residuals.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
     suspects = [*e.found.exchanged, Phrase("part.tests", {"tests": e.named(e.gross)})]
     return Phrase("verdict.gross-errors", {"suspects": suspects, "remedy": _remedy(e)})
+
+
+def _common_error(e: Evidence) -> Phrase | None:
+    """Return the errors that sets of observations have in common; hints and patterns of a lens are better."""
+    if not e.found.common or "hint" in e.codes or e.lens:
+        return None
+    code = "verdict.common-error" if e.found.common_is_harmful else "verdict.common-error.look"
+    return Phrase(code, {"errors": list(e.found.common)})
 
 
 def _remedy(e: Evidence) -> Phrase | str:
@@ -400,6 +408,7 @@ _WITH_CHECK = frozenset(
 
 _EXPLAINING = frozenset(
     {
+        "common-error",
         "gross-errors",
         "too-much-removed",
         "usable-after-removal",
@@ -432,6 +441,14 @@ RULES = (
         _listing("changed", "names", "changed"),
         EXIT_NOT_USABLE,
         ("before-and-after", "cause-of-change"),
+    ),
+    Rule(
+        "common-error",
+        _common_error,
+        EXIT_NOT_USABLE,
+        ("correct-common",),
+        warning=True,
+        grave=lambda e: e.found.common_is_harmful,
     ),
     Rule("gross-errors", _gross_errors, EXIT_NOT_USABLE, ("look-at-gross-errors", "lens", "take-out")),
     Rule("too-much-removed", _too_much_removed, EXIT_NOT_USABLE, ("common-of-observations",)),
@@ -470,6 +487,7 @@ RULES = (
         0,
         ("check-undetected",),
         warning=True,
+        also=True,
     ),
     Rule("accepted", _accepted, 0, ()),
     Rule("not-tested", _not_tested, 0, ("compare",)),

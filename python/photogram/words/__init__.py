@@ -1,16 +1,15 @@
-"""Messages as codes with fields, and the files of words that make sentences of them.
+"""Messages as codes with fields, and the files of words with their sentences.
 
 A :class:`Phrase` is a code with fields until it is printed. Each language has one file, `en.toml` or
-`de.toml`, with a sentence for each code. A field is a name in braces, and may have a form behind a colon:
+`de.toml`, with a sentence for each code. A field is a name in braces, and may have a form after a colon:
 
-* that of a number, such as `{factor:.3g}`;
-* that of a list: the greatest number of its parts (`{names:5}`), `;`, `&` (and) or `|` (or) between them in
-  place of commas, and `#` for parts with numbers;
-* `^` begins with a capital letter, `+` puts `; ` before a text that is not empty;
-* `'` quotes a text of the input: escaped, and shortened if it is long. Numbers, lists and phrases have no
-  quotation marks.
+* a number format, such as `{factor:.3g}`;
+* a list format: the largest number of parts (`{names:5}`), `;`, `&` (and) or `|` (or) as separator instead of
+  commas, and `#` for parts with numbers;
+* `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
+* `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
-`code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1, and `code.cli` the
+`code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is the
 sentence on the command line: it names options, the other one functions of Python.
 """
 
@@ -28,9 +27,9 @@ from typing import Any
 
 from photogram.lazy_dataclasses import dataclass, field
 
-MAX_NAMES = 12  # Names that a list has at most
+MAX_NAMES = 12  # Largest number of names in a list
 
-MAX_QUOTED = 40  # Characters of a field that a message quotes at most
+MAX_QUOTED = 40  # Largest number of characters of a field that a message quotes
 
 _on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
 _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
@@ -38,7 +37,7 @@ _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
 
 @dataclass(frozen=True, repr=False)
 class Phrase:
-    """A message, or the name of a thing in one: a code with fields, in English when it is printed.
+    """A message, or a name in one: a code with fields, printed in English.
 
     Attributes
     ----------
@@ -64,12 +63,12 @@ class Phrase:
         return hash(self.code)
 
     def document(self) -> dict[str, Any]:
-        """Return code, fields and sentence as JSON documents have them."""
+        """Return code, fields and sentence in the form of JSON documents."""
         return {"code": self.code, "fields": self.fields, "text": str(self)}
 
 
 def quoted(text: str) -> str:
-    """Return a field of the input between quotation marks: escaped, and shortened if it is long."""
+    """Return a quoted field of the input, escaped and shortened."""
     rest = "" if len(text) <= MAX_QUOTED else f"... ({len(text)} characters)"
     return f"{text[:MAX_QUOTED]!r}{rest}"
 
@@ -80,16 +79,16 @@ def phrase(code: str, /, **fields: Any) -> Phrase:
 
 
 def option_sd(kind: str) -> Phrase:
-    """Return the option that gives standard deviations of `images`, `control`, `gnss` or another kind."""
+    """Return the option for standard deviations of a type of data."""
     return Phrase("option.sd", {"kind": kind})
 
 
-OPTIONS_OF_CONTROL = (Phrase("option.control"), Phrase("option.datum"))  # Options that give control
+OPTIONS_OF_CONTROL = (Phrase("option.control"), Phrase("option.datum"))  # Options that add control
 
 
 @contextmanager
 def on_command_line() -> Iterator[None]:
-    """Have sentences name options of commands in place of functions of Python."""
+    """Use sentences that name command-line options instead of functions of Python."""
     token = _on_command_line.set(True)
     try:
         yield
@@ -100,7 +99,7 @@ def on_command_line() -> Iterator[None]:
 @cache
 def table_of(language: str) -> Mapping[str, str]:
     """Return the sentences of a language by code."""
-    import json  # with the first sentence
+    import json  # Imported with the first sentence
 
     source = Path(__file__).with_name(f"{language}.toml").read_text(encoding="utf-8")
     # tomllib takes four times as long.
@@ -118,19 +117,19 @@ def words_of(language: str) -> Words:
 
 @cache
 def _parts(sentence: str) -> list[tuple[str, str | None, str]]:
-    """Return the texts of a sentence, each with the field behind it and its form."""
+    """Return the texts of a sentence, each with the following field and its form."""
     return [(text, name, form or "") for text, name, form, _ in Formatter().parse(sentence)]
 
 
 class Words:
-    """Sentences in a language, with numbers as the language writes them.
+    """Sentences in a language, with its number format.
 
     Parameters
     ----------
     language
         `en` or `de`; codes without a sentence in it are in English.
     own
-        Sentences by code that replace those of the language.
+        Sentences by code that replace the sentences of the language.
     """
 
     def __init__(self, language: str = "en", own: Mapping[str, str] | None = None) -> None:
@@ -161,17 +160,17 @@ class Words:
         return code in self._table
 
     def listed(self, names: Sequence[str], most: int = MAX_NAMES) -> str:
-        """Name all of a few, and some of many."""
+        """List all names, or the first `most` of them."""
         shown = ", ".join(names[:most])
         return shown if len(names) <= most else self("word.more", names=shown, count=len(names) - most)
 
     def numeral(self, written: str) -> str:
-        """Return a number that is written with a point as the language writes it."""
+        """Convert a number with a decimal point to the format of the language."""
         return written.replace(".", self._table["number.decimal"])
 
     def _composed(self, code: str, fields: Mapping[str, Any]) -> str:
         sentence = self._table.get(self._variant(code, fields))
-        if sentence is None:  # names of own types of observations, units and components
+        if sentence is None:  # Names of user-defined types of observations, units and components
             return code.partition(".")[2] or code
         return "".join(
             text if name is None else text + self.text(fields.get(name, ""), form)
@@ -179,14 +178,14 @@ class Words:
         )
 
     def _variant(self, code: str, fields: Mapping[str, Any]) -> str:
-        """Return the code of the sentence for the reader and for the counts of the fields."""
+        """Return the code of the sentence for reader and counts."""
         if _on_command_line.get() and f"{code}.cli" in self._table:
             code = f"{code}.cli"
         ones = [name for name, value in fields.items() if isinstance(value, int) and value == 1]
-        # One of what a sentence counts first leaves no other count in it.
+        # The singular of the first count leaves no other count in the sentence.
         for name in sorted(ones, key=lambda name: name != "n"):
             variant = f"{code}.one" if name == "n" else f"{code}.one.{name}"
-            # An own sentence is meant for every count.
+            # A user-defined sentence applies to every count.
             if variant in self._own or (variant in self._table and code not in self._own):
                 return variant
         return code

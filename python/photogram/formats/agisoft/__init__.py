@@ -15,7 +15,7 @@ TITLE = "Agisoft camera XML"
 
 def _recognises(path: Path) -> bool:
     root, attributes = root_of(path) if path.is_file() else ("", {})
-    # Scripts and cameras of DBAT have a root of this name, too.
+    # Scripts and cameras of DBAT have the same root element.
     return root == "document" and not any(name.startswith("dbat") for name in attributes)
 
 

@@ -1,4 +1,4 @@
-"""From the camera XML of Metashape to a project: poses, references and markers; it has no tie points."""
+"""Reader of Metashape camera XML: poses, references and markers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from photogram.network.observations import Observation, Position
 from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
-GEOCENTRIC = 1e6  # Metres from the origin beyond which a world is geocentric
+GEOCENTRIC = 1e6  # Distance from the origin (m) beyond which a world is geocentric
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
 
 
@@ -44,7 +44,7 @@ class _Similarity(NamedTuple):
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the first chunk of a document, or the one that is asked for; PhotoScan has a list of them."""
+    """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
     messages: list[Message] = []
     chunk = _chunk(root, wishes.model, messages)
@@ -92,7 +92,7 @@ def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Elemen
 
 
 def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
-    """Return standard deviations where references have none: those of a user, else of the settings."""
+    """Return default standard deviations of the user, else of the settings."""
     settings = _properties(_members(chunk, "settings", "property"), "accuracy_cameras", "accuracy_markers")
     return {
         kind: np.broadcast_to(wishes.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
@@ -101,7 +101,6 @@ def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
 
 
 def _properties(elements: Iterable[Element], *names: str) -> dict[str, float]:
-    """Return the values of properties of some names."""
     own = ((each.attributes.get("name", ""), each) for each in elements)
     return {name: each.attribute("value") for name, each in own if name in names}
 
@@ -174,7 +173,7 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
 
 
 def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message]) -> list[Element]:
-    """Return cameras with a pose; the others cannot show anything."""
+    """Return cameras with a pose; the others are unusable."""
     found, lost, seen = [], [], set()
     for each in _members(chunk, "cameras", "camera"):
         label = each.attributes.get("label", "")
@@ -217,7 +216,7 @@ def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats]:
 
 
 def _similarity(element: Element | None) -> _Similarity | None:
-    """Return the similarity of a transform; None of one without a rotation."""
+    """Return the similarity of a transform; None without a rotation."""
     rotation = None if element is None else element.child("rotation")
     if element is None or rotation is None:
         return None
@@ -231,14 +230,14 @@ def _similarity(element: Element | None) -> _Similarity | None:
 
 @dataclass
 class _Positions:
-    """What carries references into the frame; `known`: whether a way leads there."""
+    """Transformation of references into the frame; `known` is False if none exists."""
 
     frame: Frame
     crs: str
     known: bool = True
 
     def reference(self, element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-        """Return a reference and its standard deviations; None without, or where no way leads to it."""
+        """Return a reference with standard deviations; None if it is unusable."""
         return _reference(element, default) if self.known else None
 
     def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
@@ -253,7 +252,7 @@ class _Positions:
 
 
 def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
-    """Return whether a world is geocentric: not if its references are local, or, unnamed, no degrees."""
+    """Return whether a world is geocentric, judged by size and references."""
     if np.linalg.norm(centres.mean(axis=0)) < GEOCENTRIC or reference.upper().startswith(LOCAL):
         return False
     return bool(reference or (np.abs(references[:, :2]) <= (360.0, 90.0)).all())
@@ -262,7 +261,7 @@ def _is_geocentric(reference: str, centres: Floats, references: Floats) -> bool:
 def _frame(
     chunk: Element, centres: Floats, matrices: Floats, marked: list[Element], messages: list[Message]
 ) -> tuple[Frame, _Positions]:
-    """Turn poses from geocentric axes into a topocentric frame, in place."""
+    """Transform poses from geocentric axes into a topocentric frame, in place."""
     reference = chunk.word("reference")
     given = [own[0] for each in marked if (own := _reference(each, np.ones(3))) is not None]
     if not _is_geocentric(reference, centres, np.array(given).reshape(-1, 3)):
@@ -284,13 +283,13 @@ def _frame(
 
 
 def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-    """Return the reference of a camera or marker, and its standard deviations; None without."""
+    """Return a reference and its standard deviations; None if missing."""
     own = element.child("reference")
     if own is None or any(axis not in own.attributes for axis in "xyz"):
         return None
     position = np.array([own.attribute(axis) for axis in "xyz"])
     sd = default.copy()
-    # One for all, one for both coordinates of the plan, or one for each: the finer one counts.
+    # One for all axes, one for both horizontal coordinates, or one for each: the most detailed one is used.
     for name, axes in (("sxyz", 3), ("sxy", 2)):
         if name in own.attributes:
             sd[:axes] = own.attribute(name)
@@ -348,7 +347,7 @@ def _markers(positions: _Positions, markers: list[Element], default: Floats) -> 
 def _locations(
     chunk: Element, rows: dict[str, int], markers: dict[str, int]
 ) -> tuple[Indices, Indices, Floats]:
-    """Return what was measured by hand: predicted locations are no observations."""
+    """Return manual measurements; predicted locations are not observations."""
     photos, points, xy = [], [], []
     for frame in _members(chunk, "frames", "frame"):
         for marker in _members(frame, "markers", "marker"):

@@ -1,4 +1,4 @@
-"""From a project to the camera XML of Metashape: sensors, poses, references, and markers of control."""
+"""Writer of Metashape camera XML: sensors, poses, references, markers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the file; a topocentric frame is written with its place on the earth."""
+    """Return the file; a topocentric frame is written with its position on the earth."""
     block = project.block
     if not posed(block).any():
         raise InputError(phrase("format.poses"))
@@ -73,7 +73,7 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 @dataclass(frozen=True)
 class _World:
-    """Where the chunk, which is the frame of the project, lies: X_world = R X + T; and its references."""
+    """The transformation X_world = R X + T of the chunk, and the reference system."""
 
     rotation: Floats
     translation: Floats
@@ -82,7 +82,7 @@ class _World:
     frame: Frame
 
     def references(self, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions in the system of references, and standard deviations along its axes."""
+        """Return positions and standard deviations in the reference system."""
         if self.crs and len(xyz):
             from photogram.formats.crs import from_frame
 
@@ -122,7 +122,7 @@ def _sensor(row: int, camera: Camera, size: Size | None, pixel: float | None) ->
 
 
 def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, float]]:
-    """Return type and parameters of a sensor: none of a spherical one."""
+    """Return type and parameters of a sensor, without parameters for a spherical one."""
     if camera.model == "equirectangular":
         return "spherical", {}
     if camera.model.startswith("agisoft_"):
@@ -131,7 +131,7 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     lens = lens_of(camera, size)
     if lens is None or size is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
         raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="Metashape"))
-    # p1 belongs to r^2 + 2 x^2 there.
+    # p1 is the coefficient of r^2 + 2 x^2 in Metashape.
     return "frame", {
         "f": lens.fy,
         "cx": lens.cx - size[0] / 2,
@@ -175,7 +175,7 @@ def _shots(project: Project, world: _World, which: list[int]) -> list[str]:
 
 
 def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
-    """Return a reference; that of a check point is disabled, and need not have standard deviations."""
+    """Return a reference; the reference of a check point is disabled."""
     values = dict(zip("xyz", position.tolist(), strict=True))
     if not check or (sd > 0).all():
         values |= dict(zip(("sx", "sy", "sz"), sd.tolist(), strict=True))
@@ -184,7 +184,7 @@ def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
 
 
 def _marked(project: Project) -> Bools:
-    """Return which points are markers: control that is held in all coordinates, and check points."""
+    """Return which points are markers: complete control, and check points."""
     block, full = project.block, correlated_control(project.block)
     known = np.isfinite(block.point_positions).all(axis=1)
     held = np.isfinite(block.point_sd)

@@ -1,4 +1,4 @@
-"""From BlocksExchange XML to a project."""
+"""Reader of BlocksExchange XML."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ ORIENTATIONS = {
     "XUpYRight": ((0, 1, 0), (1, 0, 0), (0, 0, -1)),
     "XUpYLeft": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
 }
-"""Rows: the axes of a camera orientation in those of the house, x right, y up, z back."""
-CENTER = 0.5  # The middle of the first pixel is 0, 0: what is added to count from the corner
+"""Rows: the axes of a camera orientation in the axes of photogram: x right, y up, z back."""
+CENTER = 0.5  # Shift from the centre of the first pixel (0, 0) to coordinates from its corner
 _TERMS = ("K1", "K2", "K3", "P1", "P2")
 _READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
     "P1 and P2 exchanged": lambda own: {"p1": own["p2"], "p2": own["p1"]},
     "K1, K2, K3 with the other sign": lambda own: {name: -own[name] for name in ("k1", "k2", "k3")},
 }
-"""What programs may mean by the terms of a distortion otherwise."""
+"""Alternative definitions of the distortion terms in other programs."""
 BETTER, NOTICED = 3.0, 0.1
-"""How much better another reading of the distortion must be to refuse a file, and above which median."""
+"""Ratio of agreement for another definition that rejects a file, and the smallest median for it."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ class _Group:
 
 @dataclass
 class _Found:
-    """What was found in a file, as it comes."""
+    """Contents of a file in the order of reading."""
 
     wishes: Wishes
     systems: dict[str, str] = field(default_factory=dict)
@@ -333,7 +333,7 @@ def _corner(found: _Found, images: list[tuple[int, int, float, float, bool]], gr
 
 
 def _checked(project: Project) -> Project:
-    """Refuse a file whose lens terms fit better in another reading."""
+    """Reject a file whose distortion terms fit better under another definition."""
     as_read = agreement(project).median
     if not as_read > NOTICED:
         return project

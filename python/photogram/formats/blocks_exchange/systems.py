@@ -1,4 +1,4 @@
-"""Systems of coordinates of a BlocksExchange file: all is carried into one cartesian frame."""
+"""Coordinate systems of a BlocksExchange file, transformed into one frame."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOCAL = "local"
 
 @dataclass
 class PhotoRecord:
-    """A photo as a file has it: its pose in the axes of the house, and the ids of its systems."""
+    """A photo of a file: its pose (y up, z back) and the ids of its systems."""
 
     path: str
     group: int
@@ -37,7 +37,7 @@ class PhotoRecord:
 
 @dataclass
 class PointRecord:
-    """A point as a file has it; ties have no standard deviations."""
+    """A point of a file, with standard deviations unless it is a tie point."""
 
     name: str
     place: Element
@@ -48,7 +48,7 @@ class PointRecord:
 
 
 class Systems:
-    """Positions in the systems of a file, carried into one cartesian frame."""
+    """Positions in the systems of a file, transformed into one cartesian frame."""
 
     def __init__(
         self, systems: Mapping[str, str], srs: str, photos: list[PhotoRecord], messages: list[Message]
@@ -75,7 +75,7 @@ class Systems:
         self.same = definition
 
     def definition(self, srs: str) -> str:
-        """Return the system of an id: what PROJ or this reader takes, or `local`."""
+        """Return the definition of an id for PROJ or this reader, or `local`."""
         text = self.systems.get(srs or self.main, "").strip()
         return LOCAL if not text or text.upper().startswith("LOCAL_CS") else text
 
@@ -93,7 +93,7 @@ class Systems:
         return found, turned
 
     def poses(self, photos: list[PhotoRecord], centres: Floats, matrices: Floats) -> tuple[Floats, Floats]:
-        """Return centres and attitudes, which refer to the local axes of their systems, in the frame."""
+        """Transform centres and attitudes, which refer to local axes, into the frame."""
         centres, matrices = centres.copy(), matrices.copy()
         for srs in dict.fromkeys(each.srs for each in photos):
             definition = self.definition(srs)
@@ -132,7 +132,7 @@ class Systems:
         return points
 
     def gnss(self, photos: list[PhotoRecord], names: list[str], wishes: Wishes) -> list[Observation]:
-        """Return positions that photos were given as observations, where there are standard deviations."""
+        """Return photo positions as observations, if they have standard deviations."""
         rows = [row for row, each in enumerate(photos) if each.gnss is not None]
         if not rows:
             return []

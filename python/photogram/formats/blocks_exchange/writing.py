@@ -1,4 +1,4 @@
-"""From a project to BlocksExchange XML, version 2.1: matrices, pixels, y down."""
+"""Writer of BlocksExchange XML, version 2.1: matrices, pixels, y down."""
 
 from __future__ import annotations
 

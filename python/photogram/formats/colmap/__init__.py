@@ -28,4 +28,4 @@ TEXT = Format(
     cannot_hold=cannot_hold,
     pixels=True,
 )
-"""For writing: what is text is read, and recognised, by the other one."""
+"""Formats for writing only: text is read and recognised by the other format."""

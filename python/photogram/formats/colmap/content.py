@@ -83,7 +83,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig: its reference sensor, and the other sensors with their poses, sensor from rig."""
+    """A rig: its reference sensor, and others with poses sensor from rig."""
 
     number: int
     reference: tuple[str, int] | None
@@ -104,7 +104,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Model:
-    """A whole model; without rigs and frames each camera is a rig, and each image a frame."""
+    """A model; without rigs and frames each camera is a rig."""
 
     path: Path
     cameras: list[Camera]

@@ -1,4 +1,4 @@
-"""Files of COLMAP models: one layout of records, as text and binary (little endian, without padding)."""
+"""Files of COLMAP models: records as text and little-endian binary."""
 
 from __future__ import annotations
 
@@ -75,12 +75,10 @@ class _Record(ABC):
         """Return the features of an image."""
 
     def pose(self) -> Pose:
-        """Return a quaternion and a translation."""
         values = self.take("7d", *_POSE)
         return Pose(values[:4], values[4:])
 
     def sensor(self) -> tuple[str, int]:
-        """Return the type and the number of a sensor."""
         return self.word("SENSOR_TYPE", SENSORS), self.take("I", "SENSOR_ID")[0]
 
 
@@ -144,7 +142,7 @@ class _Bytes(_Record):
         return Place(self.path, self.record or None, f"byte {self.at}")
 
     def skip(self, size: int) -> int:
-        """Return the first of the next bytes, and go behind them."""
+        """Return the index of the next bytes and move past them."""
         if size > len(self.data) - self.at:
             raise self.place.error(phrase("colmap.bytes", n=size - (len(self.data) - self.at)))
         self.at += size
@@ -158,7 +156,7 @@ class _Bytes(_Record):
         return known[number] if 0 <= number < len(known) else str(number)
 
     def count(self, least: int) -> int:
-        """Return the number of records that follow, each of so many bytes at least."""
+        """Return the number of records that follow, each with a minimum size in bytes."""
         number: int = self.take("Q")[0]
         if number * least > len(self.data) - self.at:
             left = len(self.data) - self.at
@@ -293,7 +291,7 @@ def _points(table: Table, places: Sequence[Place]) -> Points:
 
 
 class _Places(Sequence[Place]):
-    """Places of records, which are made when they are needed."""
+    """Locations of records, created on demand."""
 
     def __init__(self, path: Path, number: int) -> None:
         self.path, self.number = path, number
@@ -344,7 +342,7 @@ def binary_files(model: Model) -> dict[str, bytes]:
 
 
 def text_files(model: Model) -> dict[str, bytes]:
-    """Return the text files of a model; names have underscores for blanks, at which COLMAP ends them."""
+    """Return the text files of a model; underscores replace blanks in names."""
 
     def words(form: str, values: Any) -> str:
         if form == "word":

@@ -1,4 +1,4 @@
-"""From a COLMAP model to a project."""
+"""Reader of COLMAP models."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _camera(camera: Camera) -> HouseCamera:
 
 
 def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
-    """Reject names without text, unknown cameras, repeated names, and numbers that are not finite."""
+    """Reject invalid names, cameras and numbers."""
     images, points = model.images, model.points
     for name, camera, place in zip(images.names, images.cameras.tolist(), images.places, strict=True):
         if not name.strip() or not name.isprintable():
@@ -133,7 +133,7 @@ def _check_model(model: Model, cameras: Mapping[int, int]) -> None:
 
 
 def _rotations(quaternions: Floats, places: Sequence[Place]) -> tuple[Floats, Indices]:
-    """Return (n, 3, 3) matrices of quaternions w, x, y, z, and rows whose length differs from 1."""
+    """Return (n, 3, 3) matrices of quaternions, and rows without unit length."""
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(quaternions, axis=1)
         differences = np.abs(lengths - 1)
@@ -160,7 +160,7 @@ def _rigid(pose: Pose, place: Place) -> tuple[Floats, Floats]:
 def _composed(
     model: Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
-    """Put the poses of frames and rigs into the poses of images; return frames of several images."""
+    """Compose poses of frames and rigs to poses of images."""
     if not model.frames:
         return []
     cameras = {camera.number: str(camera.number) for camera in model.cameras}
@@ -201,7 +201,7 @@ def _composed(
 def _mounted_sensors(
     model: Model, cameras: Mapping[int, str]
 ) -> tuple[dict[tuple[int, int], tuple[Floats, Floats] | None], dict[int, Rig]]:
-    """Return the poses of cameras on rigs, None if unknown, and the rigs whose frame is a camera."""
+    """Return poses of cameras on rigs (None: unknown), and rigs by frame camera."""
     poses: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
     rigs: dict[int, Rig] = {}
     for rig in model.rigs:

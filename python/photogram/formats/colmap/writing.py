@@ -1,4 +1,4 @@
-"""From a project to a COLMAP model, and the covariances of a result beside it."""
+"""Writer of COLMAP models, and of the covariances of a result."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def cannot_hold(project: Project) -> list[Phrase]:
 
 
 def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> bool:
-    """Return whether each camera is one sensor of one rig, or a rig of its own, as COLMAP wants it."""
+    """Return whether each camera belongs to one sensor or rig, as required."""
     sensors: dict[int, tuple[int, int]] = {}
     for mount in mounts:
         own = cameras[mount.frame], id(mount.sensor)
@@ -63,7 +63,7 @@ def write_as_text(project: Project) -> Mapping[str, bytes]:
 
 @dataclass(frozen=True)
 class _Written:
-    """A model with the numbers of photos, points and cameras in it, and rows of image observations."""
+    """A model with the numbers of photos, points and cameras."""
 
     model: content.Model
     photos: dict[str, int]
@@ -151,7 +151,7 @@ def _rigs(
     cameras: Mapping[str, int],
     numbers: Mapping[str, int],
 ) -> tuple[list[content.Rig], list[content.Frame]]:
-    """Return rigs and frames: those of mounts, and of each other camera and photo one of its own."""
+    """Return rigs and frames: of mounts, and one for each other camera and photo."""
     sensors: dict[int, dict[int, content.Pose]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
     mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
@@ -189,7 +189,7 @@ def _sensor_pose(position: Floats, axes: Floats) -> content.Pose:
 
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
-    """Return the covariances of a result in the order of the model's files: docs/formats/colmap.md."""
+    """Return the covariances of a result: docs/formats/colmap.md."""
     model = _written(project)
     block = result.block
     rows = {name: row for row, name in enumerate(block.photo_ids)}
@@ -228,7 +228,7 @@ def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
 
 
 def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> bytes:
-    """Return covariances, whose rows stand at their numbers, in the order of these."""
+    """Return covariances, stored by row, in the order of their numbers."""
     own = sorted(rows.items())
     lower = _lower(covariances[[row for _, row in own]])
     table = np.empty(len(own), [("id", number), ("c", "<f8", lower.shape[1])])
@@ -237,7 +237,7 @@ def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> byt
 
 
 def _quality(model: _Written, result: Result) -> bytes:
-    """Return residuals, redundancy numbers and test values of images, by image and feature."""
+    """Return residuals, redundancy numbers and test values by image."""
     images = model.model.images
     counts = np.asarray(images.counts)
     table = np.empty(len(model.rows), [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)])
@@ -269,7 +269,7 @@ def _lower(matrices: Floats) -> Floats:
 
 
 def _centre_and_rotation(result: Result) -> Floats:
-    """Return (P, 6, 6) covariances of centres and of rotations in the axes of the cameras.
+    """Return (P, 6, 6) covariances of centres and rotations in camera axes.
 
     A Exp(rho) is F A' before: r = -F rho.
     """

@@ -1,4 +1,4 @@
-"""Support data of images (ISDs of the Community Sensor Model), labels of ISIS cubes, as photos that move."""
+"""Support data of images (CSM ISDs, labels of ISIS cubes) as moving photos."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""ISIS cubes after spiceinit as support data, and lists of images."""
+"""Support data of ISIS cubes after spiceinit, and lists of images."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ _POLYNOMIALS = (("J2000SVX", "J2000SVY", "J2000SVZ"), ("J2000Ang1", "J2000Ang2",
 _LRO, _APOLLO = "LUNAR RECONNAISSANCE ORBITER", re.compile(r"APOLLO[ _]?(1[567])")
 _NAC = ("NACL", "NACR")
 _CHANGED = ("AlphaCube", "Mapping")
-"""Groups of cubes whose samples and lines are not those of their camera: parts of other cubes, and maps."""
+"""Groups of cubes with other samples and lines than their camera: sub-areas, and maps."""
 
 
 def is_cube(path: Path) -> bool:
-    """Whether a file is an ISIS cube."""
+    """Return whether a file is an ISIS cube."""
     with reading(path), path.open("rb") as file:
         return file.read(len(_MARK)).lower() == _MARK.lower()
 
@@ -68,7 +68,7 @@ def read_label(path: Path) -> Group:
 
 
 def _group(within: Group, name: str, path: Path) -> Group:
-    """Return the group of a name; an error where there is none."""
+    """Return the group of a name; raise an error if it is missing."""
     found = within.groups(name)
     if not found:
         raise InputError(phrase("format.member", name=name), file=path, record=within.line)
@@ -76,7 +76,7 @@ def _group(within: Group, name: str, path: Path) -> Group:
 
 
 def _members(group: Group, path: Path) -> Tree:
-    """Return the keys of a group with their values, without units, as a tree whose errors name them."""
+    """Return the values of a group by key, without units."""
     return Tree({key: _plain(value) for key, value in group.items}, path, group.name)
 
 
@@ -87,7 +87,7 @@ def _plain(value: Value) -> Any:
 
 
 class _Table:
-    """A table of a cube: numbers by the names of their columns."""
+    """A table of a cube: numbers by column name."""
 
     def __init__(self, label: Group, name: str, path: Path) -> None:
         own = [each for each in label.groups("Table") if each.get("Name") == name]
@@ -146,7 +146,7 @@ class _Table:
             return increasing(_TIME, self.of([_TIME])[:, 0])
 
     def sampled(self, columns: Sequence[str], kernel: str) -> tuple[Floats, Floats]:
-        """Return (k,) times and (k, 3) values of polynomials, on records that join without loss."""
+        """Return (k,) times and (k, 3) values of polynomials, sampled without loss."""
         coefficients = self.of(columns)
         (reference, scale, degree), own = coefficients[-1], coefficients[:-1]
         if len(own) != degree + 1 or not scale:
@@ -158,7 +158,7 @@ class _Table:
 
     @property
     def constant(self) -> Floats:
-        """The constant rotation behind that of the records."""
+        """The constant rotation after the rotation of the records."""
         if "ConstantRotation" not in self.keys:
             return np.eye(3)
         given = self.keys["ConstantRotation"].numbers(9)
@@ -194,12 +194,11 @@ def read_turns(label: Group, name: str, path: Path) -> Turns:
 
 
 def _named(instrument: Tree) -> tuple[str, str]:
-    """Return spacecraft and instrument."""
     return instrument["SpacecraftName"].text().upper(), instrument["InstrumentId"].text().upper()
 
 
 def serial_number(label: Group, path: Path) -> str:
-    """Return what control networks call the image of a cube; an error where no rule for it is known."""
+    """Return the serial number of a cube in control networks."""
     instrument = _members(_group(_group(label, "IsisCube", path), "Instrument", path), path)
     spacecraft, name = _named(instrument)
     if spacecraft == _LRO and name in _NAC:
@@ -211,10 +210,9 @@ def serial_number(label: Group, path: Path) -> str:
 
 
 def read_cube(path: Path) -> Isd:
-    """Return what the label and the tables of a cube say of its image.
+    """Return the support data in the label and the tables of a cube.
 
-    A part of another cube or a map is refused, and an instrument that is not known by its label: it needs an
-    ISD.
+    Sub-areas, maps and unknown instruments are rejected. An unknown instrument requires an ISD.
     """
     label = read_label(path)
     cube = _group(label, "IsisCube", path)
@@ -230,7 +228,7 @@ def read_cube(path: Path) -> Isd:
 
 
 def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
-    """Return a narrow angle camera of the Lunar Reconnaissance Orbiter."""
+    """Return support data of the LRO Narrow Angle Camera."""
     keywords = _members(_group(label, "NaifKeywords", path), path)
     code = f"INS{_members(_group(cube, 'Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
     size = _members(_group(_group(cube, "Core", path), "Dimensions", path), path)
@@ -258,7 +256,7 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
 
 
 def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
-    """Return the detector of a scanner whose images are summed along lines alone."""
+    """Return the detector of a scanner whose images are summed only along lines."""
     summing = instrument["SpatialSumming"].number()
     centre = [keywords[f"{code}_BORESIGHT_{axis}"].number() for axis in ("SAMPLE", "LINE")]
     if not summing > 0:
@@ -270,7 +268,7 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
         np.array([instrument["SampleFirstPixel"].number(), 0.0]),
         np.array([summing, 1.0]),
         {
-            # What instruments call ITRANSS, ITRANSL are focal2pixel of an ISD.
+            # ITRANSS and ITRANSL of instruments are focal2pixel of an ISD.
             "csm": from_pixels(keywords[f"{code}_ITRANSS"], keywords[f"{code}_ITRANSL"]),
             "isis": transformed(keywords, code),
         },
@@ -278,7 +276,6 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
 
 
 def _radii(keywords: Tree) -> tuple[float, float]:
-    """Return semi-axes of the body in metres."""
     name = f"BODY{keywords['BODY_CODE'].whole()}_RADII"
     a, other, b = KM * keywords[name].numbers(3)
     if a != other or not 0 < b <= a:
@@ -287,9 +284,9 @@ def _radii(keywords: Tree) -> tuple[float, float]:
 
 
 def _start(instrument: Tree, keywords: Tree) -> float:
-    """Return the ephemeris time of the clock at which reading begins, which spiceinit has computed.
+    """Return the ephemeris time of the start of reading, from spiceinit.
 
-    Its bytes stand there as hexadecimal digits, the least significant first.
+    The label contains its bytes as hexadecimal digits, the least significant first.
     """
     known = re.compile(r"CLOCK_ET_.*_COMPUTED")
     names = [name for name, _ in keywords.items() if known.fullmatch(name)]
@@ -307,33 +304,33 @@ def _start(instrument: Tree, keywords: Tree) -> float:
 _CAMERAS: dict[tuple[str, str], Callable[[Group, Group, Tree, Path], Isd]] = {
     (_LRO, name): _nac for name in _NAC
 }
-"""How cubes are read, by spacecraft and instrument."""
+"""Readers of cubes by spacecraft and instrument."""
 
 
 def read_support(path: Path) -> Isd:
-    """Read the support data of an image, of a cube or an ISD.
+    """Read the support data of an image from an ISIS cube or an ISD.
 
     Raises
     ------
     InputError
-        As :func:`read_cube` and :func:`read_isd` have it.
+        If the file is not a valid cube or ISD, or its instrument is unknown.
     """
     return read_cube(path) if is_cube(path) else read_isd(path)
 
 
 def read_list(path: Path) -> dict[str, Path]:
-    """Return the files of a list of images by the serial numbers of these.
+    """Return the files of a list of images by serial number.
 
     Parameters
     ----------
     path
-        A line an image: a path, or its serial number, a comma and a path; relative ones are within the
-        folder of the list. Empty lines and those that begin with # do not count.
+        List with one image per line: a path, or serial number, comma and path. Relative paths refer to the
+        folder of the list. Empty lines and lines that begin with # are ignored.
 
     Raises
     ------
     InputError
-        Files that are not there; ISDs without a serial number; one that stands there twice; an empty list.
+        If a file is missing, an ISD lacks a serial number, a serial number is repeated, or the list is empty.
     """
     found: dict[str, Path] = {}
     for place in filled_lines(path):

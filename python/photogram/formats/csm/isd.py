@@ -1,4 +1,4 @@
-"""What support data say of an image: detector, lens, times, pose and body as tables."""
+"""Support data of an image: detector, lens, times, poses, body rotation."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from photogram.network.trajectories import Interpolation
 from photogram.words import Phrase
 
 Pixels = Literal["isis", "csm"]
-"""How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
-HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}  # What the corner of the first pixel is counted as
+"""Pixel counting: the centre of the first pixel is 1 (ISIS) or 0.5, a shift of half a detector pixel."""
+HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}  # Coordinate of the corner of the first pixel
 
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Where a camera was: (k,) seconds, (k, 3) metres from the body's centre, inertial, (k, 3) m/s.
+    """Camera positions (k, 3), metres, and velocities, inertial, at (k,) seconds.
 
-    `interpolation` is that which the records ask for; None: whoever uses them says it.
+    `interpolation` is specified by the records; None: by the user.
     """
 
     times: Floats
@@ -37,7 +37,7 @@ class Positions:
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """How axes were turned: (k,) seconds, (k, 3, 3) matrices from the inertial axes, constant ones included.
+    """Rotations (k, 3, 3) from inertial axes at (k,) seconds.
 
     `interpolation` as for :class:`Positions`.
     """
@@ -49,27 +49,27 @@ class Turns:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """From the detector to the focal plane: offset + matrix (sample, line), from the centre, millimetres."""
+    """Detector to focal plane: offset + matrix (sample, line), millimetres."""
 
     offset: Floats
     matrix: Floats
 
     def places(self, detector: Floats) -> Floats:
-        """Return (n, 2) x, y in the axes of the camera, y down, of (n, 2) sample, line from the centre."""
+        """Return (n, 2) x, y in camera axes of (n, 2) centred sample, line."""
         return self.offset + detector @ self.matrix.T
 
     def detector(self, places: Floats) -> Floats:
-        """Return what :meth:`places` makes these of."""
+        """Return the inverse of :meth:`places`."""
         return np.asarray(np.linalg.solve(self.matrix, (places - self.offset).T).T, dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
 class Detector:
-    """How an image lies on its detector; pairs are (sample, line).
+    """Position of an image on its detector; pairs are (sample, line).
 
-    The axis of the camera meets the detector in `centre`, in its pixels; the image begins at the pixel
-    `first`, from 0; `summing` pixels of the detector are one of the image; `planes` lead to the focal plane,
-    as the Community Sensor Model has it, and as ISIS does.
+    The camera axis meets the detector in `centre`, in detector pixels. The image begins at the pixel `first`,
+    from 0. `summing` detector pixels form an image pixel. `planes` transform to the focal plane, as in the
+    Community Sensor Model and in ISIS.
     """
 
     centre: Floats
@@ -78,30 +78,30 @@ class Detector:
     planes: Mapping[Pixels, Plane]
 
     def from_centre(self, image: Floats, pixels: Pixels) -> Floats:
-        """Return (n, 2) pixels of the detector, from its centre, of (n, 2) sample, line from the corner.
+        """Return (n, 2) detector pixels, centred, of (n, 2) image sample, line.
 
-        Image coordinates are 0.5 in the middle of the first pixel however pixels are counted; ISIS has them
-        half a pixel of the detector farther on.
+        Image coordinates are 0.5 in the centre of the first pixel for any pixel counting. In ISIS they are
+        half a detector pixel larger.
         """
         return image * self.summing + self.first + HALF[pixels] - self.centre
 
     def image(self, from_centre: Floats, pixels: Pixels) -> Floats:
-        """Return what :meth:`from_centre` makes these of."""
+        """Return the inverse of :meth:`from_centre`."""
         return (from_centre + self.centre - self.first - HALF[pixels]) / self.summing
 
 
 @dataclass(frozen=True, eq=False)
 class Jitter:
-    """What moved the lines of a frame: pixels, as polynomials of the (n,) times at which each was read.
+    """Line shifts of a frame, pixels: polynomials of (n,) line times.
 
-    `coefficients` are (2, k), of samples and of lines, the highest power first, down to the first.
+    `coefficients` are (2, k), of samples and of lines, from the highest power to the first.
     """
 
     coefficients: Floats
     times: Floats
 
     def shifts(self, lines: Floats) -> Floats:
-        """Return (m, 2) samples and lines by which what is measured at (m,) lines is too far."""
+        """Return (m, 2) corrections to subtract from samples and lines."""
         rows = np.clip(np.floor(lines + 0.5), 1, len(self.times)).astype(int) - 1
         powers = self.times[rows, np.newaxis] ** np.arange(self.coefficients.shape[1], 0, -1)
         return np.asarray(powers @ self.coefficients.T)
@@ -109,10 +109,10 @@ class Jitter:
 
 @dataclass(frozen=True)
 class Framelets:
-    """The framelets of a push frame camera: `count` of `height` lines, each at one time.
+    """Framelets of a push frame camera: `count` of `height` lines.
 
-    The earliest is at `first` seconds, the next `every` seconds later; `backwards`: the last of the image is
-    the earliest; `flipped`: the first line of each is the last of the detector.
+    The earliest is at `first` seconds, the next `every` seconds later. If `backwards`, the last framelet of
+    the image is the earliest. If `flipped`, the first line of each is the last of the detector.
     """
 
     height: float
@@ -127,11 +127,11 @@ class Framelets:
         return self.first + self.every * (self.count - 1 - number if self.backwards else number)
 
     def numbers(self, lines: Floats) -> Floats:
-        """Return the framelets of lines from the upper edge; the last one has the lower edge."""
+        """Return the framelets of lines from the upper edge."""
         return np.clip(np.floor(lines / self.height), 0, self.count - 1)
 
     def rows(self, lines: Floats, numbers: Floats) -> Floats:
-        """Return the rows of framelets, from their edge, of lines."""
+        """Return the rows in framelets, from their edge, of lines."""
         own = lines - numbers * self.height
         return self.height - own if self.flipped else own
 
@@ -149,20 +149,20 @@ class Isd:
     size
         Samples and lines.
     radii
-        Of the body's spheroid, a and b in metres.
+        Semi-axes a and b of the body's spheroid, metres.
     focal_length
         Millimetres.
     lens
-        Before the detector; None: a perfect one.
+        Lens distortion; None: no distortion.
     position, pointing, body
-        Tables of the camera's places, of inertial axes to those of the camera (x along samples as the plane
-        has it, looking along z as `look` has it), and to those of the body.
+        Tables of camera positions, of rotations from inertial axes to the camera (x along samples as in the
+        plane, viewing direction along z as in `look`), and to the body.
     time
-        Of a frame; the middle of others.
+        Time of a frame; centre time of others.
     lines
-        The times of the lines of a scanner, by lines from the upper edge (0).
+        Times of the lines of a scanner, by lines from the upper edge (0).
     remarks
-        What the file contradicts itself in, and what was made of it, in sentences.
+        Contradictions in the file and their resolution, in sentences.
     look
         1: the camera looks along +z of its axes; -1: along -z.
     """
@@ -188,7 +188,7 @@ class Isd:
 
     @property
     def axes(self) -> Floats:
-        """(3,) factors from the axes of the camera to those of photos, which look along -z; and back."""
+        """(3,) factors between camera axes and photo axes (looking along -z)."""
         return np.array([1.0, -self.look, -self.look])
 
     def error(self, message: str | Phrase) -> InputError:
@@ -197,6 +197,6 @@ class Isd:
 
 
 def check_choice(pixels: Any, interpolation: Any) -> None:
-    """Refuse other ways to count pixels, and other interpolations, than there are."""
+    """Reject unknown pixel counting and interpolation."""
     one_of("pixels", pixels, get_args(Pixels))
     one_of("interpolation", interpolation, get_args(Pixels))

@@ -1,4 +1,4 @@
-"""An image with support data as photos on a trajectory, and where its pixels lie on the ground."""
+"""Images with support data as photos on a trajectory."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from photogram.words import phrase
 
 _DOWN = np.array([1.0, -1.0])  # Factors of x, y, between y up and y down
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
-"""How records are joined where they do not say it themselves."""
-_STEPS = 5  # Until a shift no longer changes the line that it is of: shifts are less than a line
-_EDGE = 1e-6  # Rows beyond a framelet that are rounding at its edge
+"""Interpolation of records that do not specify it."""
+_STEPS = 5  # Iterations until a shift and the line of the shift agree: shifts are less than a line
+_EDGE = 1e-6  # Tolerance for rounding at the edge of a framelet, rows
 
 
 def trajectory_of(
@@ -34,12 +34,11 @@ def trajectory_of(
     position: Basis | None = None,
     rotation: Basis | None = None,
 ) -> Trajectory:
-    """Return the trajectory of a camera: inertial records in metres, under which its body turns.
+    """Return the trajectory of a camera: inertial records, metres, body rotation.
 
-    Records are joined as `interpolation` says, those of cubes as they say themselves. `csm`: polynomials
-    through eight records, of positions and quaternions, at their own times however far apart these are;
-    `isis`: positions straight, attitudes uniformly from record to record. Corrections are as for
-    :class:`Trajectory`.
+    `interpolation` applies to records that do not specify it; records of cubes do. `csm`: polynomials
+    through eight records of positions and quaternions, at any spacing in time; `isis`: linear positions, and
+    attitudes with uniform rotation between records. Corrections are as for :class:`Trajectory`.
     """
     check_choice("csm", interpolation)
     places, pointing, joined = isd.position, isd.pointing, _JOINED[interpolation]
@@ -59,14 +58,14 @@ def trajectory_of(
 
 
 def to_camera(isd: Isd, attitudes: Floats) -> Floats:
-    """Return (n, 3, 3) matrices from inertial axes to those of a camera, of attitudes photo to inertial."""
+    """Return (n, 3, 3) matrices inertial to camera of photo attitudes."""
     return np.asarray(np.swapaxes(attitudes * isd.axes, 1, 2))
 
 
 def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
-    """Return support data whose pointing is polynomials fitted to its three angles, as jigsaw has it.
+    """Return support data with pointing as polynomials, as in jigsaw.
 
-    `degree` is its CKDEGREE; there have to be as many records as coefficients.
+    `degree` is CKDEGREE of jigsaw; the number of records must not be less than the number of coefficients.
     """
     own = isd.pointing
     if not 0 <= degree < len(own.times):
@@ -85,26 +84,27 @@ class SupportedImage:
     isd
         The support data.
     name
-        Of the photo; the framelets of a push frame camera are photos `name/0`, `name/1` ..
+        Name of the photo; the framelets of a push frame camera are photos `name/0`, `name/1` ..
     pixels
-        How its samples and lines are counted, here and in the support data: from 1 in the middle of the first
-        pixel (`isis`), or from 0.5 there (`csm`).
+        Pixel counting, here and in the support data: from 1 in the centre of the first pixel (`isis`), or
+        from 0.5 there (`csm`).
     interpolation
         As for :func:`trajectory_of`.
     trajectory
-        That it is on, which other images may share; None: that of its support data, without corrections.
+        Trajectory of the image, which other images may share; None: from the support data, without
+        corrections.
 
     Attributes
     ----------
     camera
-        Behind the corrected focal plane, in millimetres: nothing but its principal distance.
+        Camera for the corrected focal plane, millimetres; principal distance only.
     timed
-        Its photos on the trajectory: one, or each framelet.
+        Photos on the trajectory: one, or each framelet.
 
     Raises
     ------
     InputError
-        Other pixels or interpolations.
+        If `pixels` or `interpolation` is unknown.
     """
 
     isd: Isd
@@ -122,7 +122,7 @@ class SupportedImage:
         if own is None:
             own = trajectory_of(self.isd, self.name, interpolation=self.interpolation)
         object.__setattr__(self, "flown", own)
-        # Many sensors have the name of their platform before their own.
+        # Many sensor names begin with the name of their platform.
         platform, sensor = self.isd.platform, self.isd.sensor
         name = sensor if sensor.startswith(platform) else f"{platform} {sensor}"
         camera = Camera("perspective", {"c": -self.isd.focal_length}, name=name)
@@ -139,7 +139,7 @@ class SupportedImage:
         return (Timed(self.name, on, time=isd.time),)
 
     def _line_sensor(self) -> LineSensor:
-        """Return the line of sensors: its line of the detector is that at which the image begins."""
+        """Return the sensor line: the detector line at the start of the image."""
         isd, middle = self.isd, self.isd.size[0] / 2
         detector = isd.detector.from_centre(np.array([[middle, 0.0]]), self.pixels)
         detector[:, 1] = isd.detector.first[1] - isd.detector.centre[1]
@@ -149,22 +149,22 @@ class SupportedImage:
         return LineSensor((float(pitch[0]), -float(pitch[1])), middle, float(x), -float(y), isd.lens)
 
     def coordinates(self, samples: ArrayLike, lines: ArrayLike) -> tuple[Indices, Floats]:
-        """Return image coordinates for a block.
+        """Convert samples and lines to image coordinates for a block.
 
         Parameters
         ----------
         samples, lines
-            (n,) counted as `pixels` says.
+            (n,) counted as in `pixels`.
 
         Returns
         -------
-        (n,) which photo of `timed` each is in, and (n, 2): of scanners samples and lines from the corner, of
-        others x, y in the focal plane of a perfect lens, millimetres.
+        (n,) index in `timed` of the photo of each pixel, and (n, 2) coordinates. Coordinates of scanners are
+        samples and lines from the corner; of others x, y in the focal plane without distortion, millimetres.
 
         Raises
         ------
         InputError
-            Arrays of different lengths, what is no number.
+            If the arrays have different lengths or contain values that are not numbers.
         """
         own = [np.atleast_1d(numbers(name, each)) for name, each in (("samples", samples), ("lines", lines))]
         if own[0].ndim != 1 or own[0].shape != own[1].shape:
@@ -185,7 +185,7 @@ class SupportedImage:
         return photos, self._corrected(image)
 
     def _corrected(self, image: Floats) -> Floats:
-        """Return (n, 2) places behind a perfect lens, in the axes of photos, of samples and lines."""
+        """Return (n, 2) undistorted positions of samples and lines, photo axes."""
         detector, lens = self.isd.detector, self.isd.lens
         places = detector.planes[self.pixels].places(detector.from_centre(image, self.pixels))
         if lens is not None:
@@ -193,7 +193,7 @@ class SupportedImage:
         return places * self.isd.axes[:2]
 
     def _measured(self, corrected: Floats) -> Floats:
-        """Return what :meth:`_corrected` makes these of."""
+        """Return the inverse of :meth:`_corrected`."""
         detector, lens = self.isd.detector, self.isd.lens
         places = corrected * self.isd.axes[:2]
         if lens is not None:
@@ -201,24 +201,24 @@ class SupportedImage:
         return detector.image(detector.planes[self.pixels].detector(places), self.pixels)
 
     def to_ground(self, lines: ArrayLike, samples: ArrayLike, height: float = 0.0) -> Floats:
-        """Return where pixels lie on the spheroid of the body, its semi-axes longer by a height.
+        """Intersect pixel rays with the spheroid of the body, enlarged by a height.
 
         Parameters
         ----------
         lines, samples
-            (n,) counted as `pixels` says.
+            (n,) counted as in `pixels`.
         height
-            Metres.
+            Addition to the semi-axes, metres.
 
         Returns
         -------
-        (n, 3) X, Y, Z from the body's centre, fixed to the body, metres: of the two points of a ray that
-        which is nearer to the camera, and of a ray that misses the body its nearest.
+        (n, 3) X, Y, Z from the body's centre, fixed to the body, metres: the intersection nearer to the
+        camera. If a ray misses the body, the result is its nearest point.
 
         Raises
         ------
         InputError
-            Lines at times that the tables do not reach, arrays as for :meth:`coordinates`.
+            If lines are at times outside the tables, or for arrays as in :meth:`coordinates`.
         """
         photos, xy = self.coordinates(samples, lines)
         if self.isd.lines is None:
@@ -234,7 +234,7 @@ class SupportedImage:
         return _nearest_intersection(places, rays, a + height, b + height)
 
     def _check_reached(self, times: Floats, lines: Floats) -> None:
-        """Refuse times at which nothing is known of the pose."""
+        """Reject times outside the tables of poses."""
         first, last = self.flown.reach
         beyond = (times < first) | (times > last)
         if beyond.any():
@@ -251,7 +251,7 @@ class SupportedImage:
             )
 
     def to_image(self, xyz: ArrayLike) -> Floats:
-        """Return the line and the sample at which points appear.
+        """Project points to lines and samples of the image.
 
         Parameters
         ----------
@@ -260,8 +260,8 @@ class SupportedImage:
 
         Returns
         -------
-        (n, 2) lines and samples, counted as `pixels` says, beyond the edges as if the image went on; NaN for
-        points that are not seen at any time.
+        (n, 2) lines and samples, counted as in `pixels`, extrapolated beyond the edges; NaN for points that
+        are not visible at any time.
         """
         points = np.atleast_2d(numbers("xyz", xyz))
         seen = [projected(each, self.flown, self.camera, points) for each in self.timed]
@@ -273,7 +273,7 @@ class SupportedImage:
         return self._jittered(found)[:, ::-1] + HALF[self.pixels]
 
     def _jittered(self, image: Floats) -> Floats:
-        """Return where samples and lines are measured that jitter has shifted."""
+        """Add the shifts of jitter to samples and lines."""
         jitter = self.isd.jitter
         if jitter is None:
             return image
@@ -284,9 +284,9 @@ class SupportedImage:
 
 
 def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
-    """Return (n, 2) samples and lines of points in the framelet that sees them nearest to its middle.
+    """Return (n, 2) samples and lines in the framelet nearest to its centre.
 
-    `images` are (framelets, n, 2) samples and rows as each sees them; NaN where none does.
+    `images` are (framelets, n, 2) samples and rows in each framelet; NaN for points not visible in any.
     """
     off = np.abs(images[:, :, 1] - framelets.height / 2)
     off = np.where(np.isnan(off), np.inf, off)
@@ -298,16 +298,15 @@ def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
 
 
 def _nearest_intersection(origins: Floats, rays: Floats, a: float, b: float) -> Floats:
-    """Return (n, 3) where lines meet a spheroid about the origin, nearest to where they begin.
+    """Return (n, 3) nearest intersections of lines with a spheroid.
 
-    Of a line that misses it: where the spheroid, enlarged, would touch it. `a` is the semi-axis along X and
-    Y.
+    If a line misses the spheroid, the enlarged spheroid touches it there. `a` is the semi-axis along X and Y.
     """
     stretch = np.array([1.0, 1.0, a / b])
     from_centre, along = origins * stretch, rays * stretch
     square = np.einsum("ni,ni->n", along, along)
     middle = -np.einsum("ni,ni->n", from_centre, along) / square
-    # |o + (m + s) d|^2 = a^2 about the middle of the chord, where o + m d is square to d.
+    # |o + (m + s) d|^2 = a^2 about the centre of the chord; o + m d is perpendicular to d.
     foot = from_centre + middle[:, np.newaxis] * along
     half = np.sqrt(np.maximum(a * a - np.einsum("ni,ni->n", foot, foot), 0.0) / square)
     ends = np.stack([middle - half, middle + half])

@@ -1,4 +1,4 @@
-"""Support data in JSON (ISDs, as ALE writes them for the Community Sensor Model), and missing values."""
+"""Reader of support data in JSON: ISDs, as written by ALE."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KINDS = {
     "USGS_ASTRO_FRAME_SENSOR_MODEL": "frame",
     "USGS_ASTRO_PUSH_FRAME_SENSOR_MODEL": "push frame",
 }
-FRAMELETS = 100_000  # At most in an image: each is a photo
+FRAMELETS = 100_000  # Largest number in an image: each is a photo
 _MEMBERS = {
     "radial": ("coefficients",),
     "transverse": ("x", "y"),
@@ -35,9 +35,9 @@ _MEMBERS = {
     "cahvor": ("coefficients",),
     "radtan": ("coefficients",),
 }
-"""Where the coefficients of each lens are; all of them may also stand in `coefficients`."""
-UNITS = {"m": 1.0, "km": 1000.0}  # Metres; km where nothing is said
-APART = 0.01  # Of the span of a table: by how much that of the lines may differ
+"""Keys of the coefficients of each lens; `coefficients` may contain all of them."""
+UNITS = {"m": 1.0, "km": 1000.0}  # Metres; default km
+APART = 0.01  # Largest difference of the time tables, relative to the span
 
 
 def read_isd(path: Path) -> Isd:
@@ -104,7 +104,7 @@ def _look(
 
 
 def _check_frames(tree: Tree) -> None:
-    """Refuse tables whose inertial axes are not the same."""
+    """Reject tables with different inertial axes."""
     tables = [tree[name] for name in ("instrument_position", "instrument_pointing", "body_rotation")]
     frames = {each["reference_frame"].whole(-(2**31)) for each in tables if "reference_frame" in each}
     if len(frames) > 1:
@@ -119,7 +119,6 @@ def _unit(tree: Tree) -> float:
 
 
 def _radii(tree: Tree) -> tuple[float, float]:
-    """Return semi-axes in metres."""
     a, b = (tree[name].number() * _unit(tree) for name in ("semimajor", "semiminor"))
     if not 0 < b <= a:
         raise tree.error(phrase("csm.radii", a=a, b=b))
@@ -133,7 +132,7 @@ def _rows(tree: Tree, width: int) -> Floats:
     except (TypeError, ValueError):
         found = np.empty(0)
     if found.ndim != 2 or found.shape[1] != width or not np.isfinite(found).all():
-        # Row by row, so that the message names the one that is at fault.
+        # Row by row, so that the message names the invalid row.
         found = np.array([row.numbers(width) for row in tree])
     if not len(found):
         raise tree.error(phrase("format.empty"))
@@ -141,7 +140,7 @@ def _rows(tree: Tree, width: int) -> Floats:
 
 
 def _times(tree: Tree, count: int) -> Floats:
-    """Return as many times as there are records."""
+    """Return one time for each record."""
     times = tree["ephemeris_times"]
     with at_place(times):
         return increasing("ephemeris_times", times.numbers(count))
@@ -170,7 +169,7 @@ def _turns(tree: Tree, name: str) -> Turns:
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
-    """Return the framelets of a push frame camera: each is exposed about its own time."""
+    """Return the framelets of a push frame camera, each exposed around its own time."""
     height = tree["framelet_height"].number() / summing
     every = tree["interframe_delay"].number()
     if not (height > 0 and every > 0):
@@ -198,7 +197,7 @@ def _jitter(tree: Tree) -> Jitter:
 
 
 def _lens(tree: Tree, focal_length: float) -> Lens | None:
-    """Return the lens; None where it is perfect."""
+    """Return the lens; None without distortion."""
     optics = tree["optical_distortion"]
     models = [name for name, _ in optics.items()]
     if len(models) != 1:
@@ -216,12 +215,12 @@ def _lens(tree: Tree, focal_length: float) -> Lens | None:
 
 
 def _flat(tree: Tree) -> list[float]:
-    """Return the numbers of a list, or a number that stands alone."""
+    """Return the numbers of a list, or a single number as a list."""
     return [each.number() for each in tree] if isinstance(tree.value, list) else [tree.number()]
 
 
 def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
-    """Return the detector; ISIS has its own way from pixels to millimetres in the keywords of NAIF."""
+    """Return the detector; ISIS uses its own transformation to millimetres."""
 
     def pair(form: str) -> Floats:
         return np.array([tree[form.format(axis)].number() for axis in ("sample", "line")])
@@ -245,7 +244,7 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
 
 
 def from_pixels(samples: Tree, lines: Tree) -> Plane:
-    """Return the inverse of the transformation from millimetres to samples and lines of the detector."""
+    """Return the inverse of a transformation from millimetres to detector pixels."""
     rows = _affine(samples, lines)
     inverse: Floats = np.asarray(np.linalg.inv(rows[:, 1:]), dtype=float)
     return Plane(-inverse @ rows[:, 0], inverse)
@@ -259,7 +258,7 @@ def _affine(first: Tree, second: Tree) -> Floats:
 
 
 def _instrument(tree: Tree, keywords: Tree) -> str | None:
-    """Return the prefix of an instrument's keywords, as `INS-85600`; None where there are none."""
+    """Return the prefix of keywords, as `INS-85600`; None without keywords."""
     codes = sorted({own[1] for name, _ in keywords.items() if (own := _TRANSX.fullmatch(name))})
     frames = tree["instrument_pointing"].get("time_dependent_frames", []).value
     named = [code for code in codes if isinstance(frames, list) and frames and code == f"INS{frames[0]}"]
@@ -284,7 +283,7 @@ def not_zero(tree: Tree) -> float:
 
 @dataclass(frozen=True)
 class Drift:
-    """What times lack: the rate is dt (1 + factor) + further, the first line so many lines later."""
+    """Corrections of line times: rate dt (1 + factor) + further, shift `lines`."""
 
     factor: float
     further: float
@@ -299,7 +298,7 @@ class Drift:
 
 
 def read_lines(tree: Tree, center: float) -> Lines:
-    """Return the times of lines from the upper edge: ISIS counts 1 in the middle of the first."""
+    """Return the times of lines from the upper edge."""
     rates = tree["line_scan_rate"]
     rows = np.array([row.numbers(3) for row in rates])
     if not len(rows):
@@ -309,7 +308,7 @@ def read_lines(tree: Tree, center: float) -> Lines:
 
 
 def read_drift(keywords: Tree, code: str | None) -> Drift | None:
-    """Return the corrections that an instrument's keywords have; None where they have none."""
+    """Return the corrections in an instrument's keywords; None without corrections."""
     names = [
         f"{code}_{name}" for name in ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
     ]
@@ -319,10 +318,10 @@ def read_drift(keywords: Tree, code: str | None) -> Drift | None:
 
 
 def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[Phrase, ...]]:
-    """Return the times of lines that fit the pointing of the same file, and what there is to say of them.
+    """Return line times consistent with the pointing of the file, and remarks.
 
-    `drift` is added where the lines then begin and end nearer to the ends of `table`, the (k,) times of the
-    pointing: newer files have it in their rates already.
+    `drift` is applied if it improves the agreement with the ends of `table`, the (k,) times of the pointing:
+    rates of newer files include it.
     """
     ends = table[[0, -1]]
 
@@ -348,7 +347,7 @@ _PLANE = "three numbers: the {} of the detector at x = y = 0 mm, and its change 
 
 
 def _middle(axis: str) -> Callable[[Tree], float | None]:
-    """Return what derives the middle of a whole frame; of a part of a frame there is none."""
+    """Return a function that derives the centre of a whole frame."""
 
     def derive(tree: Tree) -> float | None:
         if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
@@ -359,7 +358,7 @@ def _middle(axis: str) -> Callable[[Tree], float | None]:
 
 
 def _only_time(tree: Tree) -> Any:
-    """Return the time of the only record of the pointing."""
+    """Return the time of the only pointing record."""
     times = tree["instrument_pointing"].get("ephemeris_times", []).value
     return times[0] if isinstance(times, list) and len(times) == 1 else None
 
@@ -380,11 +379,11 @@ _RULES: tuple[tuple[str, str, Callable[[Tree], Any], str], ...] = (
     ("detector_center/line", "BORESIGHT_LINE", _middle("line"), _CENTER.format("line")),
     ("center_ephemeris_time", "", _only_time, "the time of the exposure in ephemeris seconds"),
 )
-"""Path of a value, keyword of the instrument that has it, derivation from other fields, meaning."""
+"""Path of a value, keyword of the instrument, derivation from other fields, meaning."""
 
 
 def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple[Phrase, ...]]:
-    """Return support data with the values that other fields determine, and remarks on these.
+    """Return support data completed from other fields, and remarks.
 
     `code` is the prefix of the instrument's keywords.
     """
@@ -408,7 +407,7 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
 
 
 def _center_in_corner(tree: Tree) -> list[Phrase]:
-    """Return a remark on a whole frame whose axis meets the detector in its corner."""
+    """Return a remark on a frame whose camera axis meets a corner."""
     offsets = (tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line"))
     middle = _middle("sample")(tree), _middle("line")(tree)
     center = tree["detector_center"]

@@ -43,7 +43,7 @@ def _recognises(path: Path) -> bool:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read an export file of PhotoModeler, its tables of measurements, a script of DBAT or its tables."""
+    """Read an export file or tables of PhotoModeler, a DBAT script or its tables."""
     if path.is_dir():
         path = _the_file(path) or path
     if path.is_dir():

@@ -1,9 +1,8 @@
-"""What files of PhotoModeler and DBAT hold, and the project that it makes.
+"""Contents of PhotoModeler and DBAT files, and their conversion to a project.
 
 Pixels count from the upper-left corner, columns to the right and rows down. Cameras are backward in
-millimetres, y up: (column h - px, py - row h) with the terms of the lens added is -c u/w. Here they count
-from the middle of the picture, in square pixels of the height of a row; what differs along columns is an
-affinity.
+millimetres, y up: (column h - px, py - row h) plus the distortion terms is -c u/w. A project counts from the
+image centre, in square pixels of the height of a row. An affinity contains the difference along columns.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ from photogram.words import Phrase, option_sd, phrase
 
 @dataclass(frozen=True)
 class Sensor:
-    """A camera, with the size of its pictures and the side of its pixels in millimetres."""
+    """A camera, its image size, and the side of its pixels in millimetres."""
 
     camera: Camera
     size: Size
     pixel: float
 
     def images(self, pixels: Floats) -> Floats:
-        """Return (m, 2) millimetres from the middle of the picture, y up, of columns and rows."""
+        """Convert columns and rows to (m, 2) millimetres from the image centre, y up."""
         width, height = self.size
         found: Floats = (pixels - [width / 2, height / 2]) * [self.pixel, -self.pixel]
         return found
@@ -49,7 +48,7 @@ def sensor_of(
     terms: dict[str, float],
     skew: float = 0.0,
 ) -> Sensor:
-    """Return a camera as PhotoModeler and DBAT describe it, in millimetres.
+    """Return a camera from parameters of PhotoModeler and DBAT in millimetres.
 
     `sides` are width and height of a pixel; `principal` is c, and the principal point from the upper-left
     corner, to the right and down; `terms` are K1, K2, K3, P1, P2.
@@ -83,7 +82,7 @@ def sensors_of_table(
 
 @dataclass
 class Content:
-    """What the files hold: photos and points are known by their numbers."""
+    """The contents of the files; photos and points have numbers."""
 
     path: Path
     title: str
@@ -92,18 +91,17 @@ class Content:
     photos: dict[int, str] = field(default_factory=dict)
     cameras: dict[int, str] = field(default_factory=dict)
     poses: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
-    # Position and standard deviations of control points, those of check points, and positions of others
-    # as they were computed before
+    # Position and standard deviations of control points, of check points, and computed positions of others
     control: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
     checks: dict[int, Floats] = field(default_factory=dict)
     check_sd: dict[int, Floats] = field(default_factory=dict)
     starts: dict[int, Floats] = field(default_factory=dict)
     image_photos: list[int] = field(default_factory=list)
     image_points: list[int] = field(default_factory=list)
-    # (m, 2) columns and rows from the corner, and their standard deviations; NaN where none is said
+    # (m, 2) columns and rows from the corner, and their standard deviations; NaN without
     pixels: Floats = field(default_factory=lambda: np.empty((0, 2)))
     image_sd: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    # Photos whose pose is held, and parameters of cameras that are unknown
+    # Photos with fixed poses, and free parameters of cameras
     held: set[int] = field(default_factory=set)
     free: set[str] = field(default_factory=set)
     options: Options = field(default_factory=Options)
@@ -112,7 +110,7 @@ class Content:
 
 
 def project_of(content: Content, wishes: Wishes) -> Project:
-    """Return the project; standard deviations of measurements that a user gives are in pixels, as these."""
+    """Return the project; user-defined standard deviations are in pixels."""
     if not content.image_photos:
         raise InputError(phrase("format.missing", what="image observations"), file=content.path)
     order = {number: row for row, number in enumerate(content.photos)}
@@ -173,7 +171,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
 
 
 def _names(content: Content) -> list[str]:
-    """Return the names of photos: those of their files, with folders where they are needed to tell them."""
+    """Return unique names of photos: file names, with folders if necessary."""
     whole = [name.replace("\\", "/").strip() for name in content.photos.values()]
     short = [name.rpartition("/")[2] for name in whole]
     if all(short) and len(set(short)) == len(short):

@@ -1,8 +1,8 @@
-"""The export file of PhotoModeler (`NAME-pmexport.txt`): cameras, poses, control, points and measurements.
+"""The export file of PhotoModeler, `NAME-pmexport.txt`.
 
-Lines 1 to 5 are a title; tolerance, iterations and the size of the pictures; nine standard deviations; the
-camera `c px py width height K1 K2 K3 P1 P2` in mm, and its standard deviations. Six lines a photo follow,
-then control, points and measurements, each list ended by an empty line; what comes after is not read.
+Lines 1 to 5 are a title; tolerance, iterations and image size; nine standard deviations; the camera
+`c px py width height K1 K2 K3 P1 P2` in mm, and its standard deviations. Then six lines for each photo,
+control, points and observations follow, with an empty line after each list. Later lines are not read.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from photogram.messages import Message
 from photogram.words import Phrase, option_sd, phrase
 
 TITLE = "PhotoModeler export"
-_HEAD = (2, 9, 10, 10)  # Numbers of lines 2 to 5, at least
+_HEAD = (2, 9, 10, 10)  # Minimum number of values in lines 2 to 5
 _PHOTO = ("centre and angles", "standard deviations", "covariances", "camera", "standard deviations of it")
 _CAMERA = "c px py width height K1 K2 K3 P1 P2"
 
 
 def is_export(path: Path) -> bool:
-    """Whether a file begins as an export does: a title, and four lines of so many numbers."""
+    """Return whether a file begins as an export: a title, and four lines of numbers."""
     try:
         lines = read_beginning(path).splitlines()
     except InputError:
@@ -55,20 +55,19 @@ def _is_number(word: str) -> bool:
 
 
 class _Lines:
-    """The lines of the file, one after the other."""
+    """A reader of consecutive lines of the file."""
 
     def __init__(self, path: Path) -> None:
         self.path, self._lines, self._next = path, read_lines(path), 0
 
     def take(self, what: str) -> Card:
-        """Return the next line."""
         if self._next >= len(self._lines):
             raise InputError(phrase("format.end", name=what), file=self.path, record=self._next)
         self._next += 1
         return Card(Place(self.path, self._next, self._lines[self._next - 1]))
 
     def until_empty(self) -> Iterator[Card]:
-        """Yield lines up to an empty one, or the end."""
+        """Yield lines up to an empty line or the end."""
         while self._next < len(self._lines):
             card = self.take("")
             if not card.words:
@@ -122,7 +121,7 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
 
 @dataclass
 class _Cameras:
-    """The camera of the head, and those of photos that differ from it."""
+    """The camera of the header, and different cameras of photos."""
 
     content: Content
     head: Card
@@ -131,7 +130,7 @@ class _Cameras:
     others: dict[tuple[str, ...], str] = field(default_factory=dict)
 
     def name_of(self, number: int, card: Card) -> str:
-        """Return the name of a photo's camera: that of the head, printed to fewer digits, as a rule."""
+        """Return the name of a photo's camera: usually the one of the header, rounded."""
         given, own = self.head.numbers(0, _CAMERA), card.numbers(1, _CAMERA)
         words = tuple(card.words[1:11])
         last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]

@@ -38,11 +38,11 @@ _GROUPS = {
     "P": ("P1", "P2"),
     **{name: (name,) for name in ("K1", "K2", "K3", "P1", "P2")},
 }
-"""Parameters of a camera by the words of `set_bundle_estimate_params`."""
+"""Camera parameters by the words of `set_bundle_estimate_params`."""
 
 
 def read_script(path: Path, wishes: Wishes) -> Content:
-    """Read a script with the tables that it names."""
+    """Read a script and its tables."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
     content = Content(path, TITLE)
@@ -86,7 +86,7 @@ def _path(element: Element, base: Path) -> Path:
 
 
 def _known(element: Element, word: str) -> str:
-    """Return a path without $HERE, the folder of the script; other places are not known."""
+    """Return a path without $HERE, the folder of the script."""
     own = word.replace("\\", "/")
     if own.startswith("$HERE"):
         own = own.removeprefix("$HERE").removeprefix("/")
@@ -96,7 +96,7 @@ def _known(element: Element, word: str) -> str:
 
 
 def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]]:
-    """Yield the tables that an element names, with the elements that do."""
+    """Yield the tables of an element, with the elements that name them."""
     files = list(parent.all("file"))
     if not files:
         raise parent.error(phrase("format.member", name="file"))
@@ -108,7 +108,7 @@ def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]
 
 
 def _filter(points: Element) -> Callable[[int], bool]:
-    """Return which points a filter leaves."""
+    """Return a function that selects the points of a filter."""
     found = points.child("filter")
     if found is None:
         return lambda _: True
@@ -130,13 +130,13 @@ def _deviation(element: Element) -> float:
 
 
 def _operations(operations: Element, name: str) -> Iterator[Element]:
-    """Yield the operations of a name, which older scripts have without an element around them."""
+    """Yield the operations of a name, without enclosing element in older scripts."""
     for each in (operations, *operations.all("operation")):
         yield from each.all(name)
 
 
 def _estimates(operations: Element, content: Content) -> None:
-    """Take which parameters of cameras are unknown: `all`, then what differs from it."""
+    """Read the free parameters of cameras: `all`, then exceptions."""
     for each in _operations(operations, "set_bundle_estimate_params"):
         interior = each.child("io")
         if interior is None:
@@ -162,7 +162,7 @@ def _estimates(operations: Element, content: Content) -> None:
 
 
 def _datum(operations: Element, content: Content) -> None:
-    """Take the datum `depend`: a photo is held, and the scale by one more coordinate."""
+    """Apply the datum `depend`: one fixed photo, and a coordinate for scale."""
     for each in _operations(operations, "set_datum"):
         if each.text.strip() != "depend":
             continue
@@ -175,7 +175,7 @@ def _datum(operations: Element, content: Content) -> None:
 
 
 def _cameras(parent: Element, messages: list[Message]) -> dict[str, Sensor]:
-    """Return the cameras below an element, by their numbers; the first is 1."""
+    """Return the cameras of an element by number; the first is 1."""
     found: dict[str, Sensor] = {}
     for row, each in enumerate(parent.all("camera"), 1):
         number = each.word("id", str(row))
@@ -220,7 +220,7 @@ def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
 
 
 def _sides(element: Element, size: Size) -> tuple[float, float]:
-    """Return width and height of a pixel: the width from `aspect` where it is said."""
+    """Return width and height of a pixel; `aspect` defines the width if present."""
     sensor = element.need("sensor")
     first, comma, second = (word.strip() for word in sensor.text.partition(","))
     if not comma:
@@ -274,7 +274,7 @@ def _principal_point(
         return middle
     px, py = _numbers(element, "pp", 2)
     if py < 0:
-        # DBAT wrote y up, and the terms with the other sign, before its version 0.9.
+        # Before version 0.9, DBAT wrote y up, and the terms with the other sign.
         if any(terms.values()):
             raise element.need("pp").error(phrase("dbat.old"))
         py = -py
@@ -286,16 +286,16 @@ def _principal_point(
 IMAGES, PHOTOS, POSES, CONTROL = "markpts.txt", "images.txt", "stations.txt", "control.txt"
 MEASURED, COMPUTED = "-2dpts.txt", "-3dpts.txt"
 _HEADER = "object point id,photo #,"
-_FREE = 10  # Lines in which a header is looked for
+_FREE = 10  # Number of lines that are searched for a header
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder has DBAT's tables."""
+    """Return whether a folder contains DBAT tables."""
     return (path / IMAGES).is_file() and (path / PHOTOS).is_file()
 
 
 def is_measurements(path: Path) -> bool:
-    """Whether a file is a table of measurements of PhotoModeler."""
+    """Return whether a file is a table of observations of PhotoModeler."""
     try:
         begin = read_beginning(path).lower()
     except InputError:
@@ -304,7 +304,7 @@ def is_measurements(path: Path) -> bool:
 
 
 def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, Sensor]:
-    """Return cameras: of a table that a user gives, else of a file of cameras in the folder."""
+    """Return cameras from the user's table, otherwise from a file in the folder."""
     if wishes.cameras is not None:
         table = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}, image="mm"), messages))
         return sensors_of_table(table.cameras, table.sizes, table.pixel_mm, wishes.cameras)
@@ -316,7 +316,7 @@ def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, S
 
 
 def read_folder(path: Path, wishes: Wishes) -> Content:
-    """Read `images.txt`, `markpts.txt`, and `stations.txt` and `control.txt` where they are there."""
+    """Read `images.txt`, `markpts.txt`, optionally `stations.txt`, `control.txt`."""
     content = Content(path, "tables of DBAT")
     content.sensors = _sensors(path, wishes, content.messages)
     take_photos(titled(path / PHOTOS), content)
@@ -329,7 +329,7 @@ def read_folder(path: Path, wishes: Wishes) -> Content:
 
 
 def read_measurements(path: Path, wishes: Wishes) -> Content:
-    """Read `NAME-2dpts.txt`, with the positions of `NAME-3dpts.txt` to begin with where it lies beside."""
+    """Read `NAME-2dpts.txt`, with initial positions of `NAME-3dpts.txt`."""
     content = Content(path, "PhotoModeler measurements")
     content.sensors = _sensors(path, wishes, content.messages)
     if len(content.sensors) > 1:
@@ -354,7 +354,7 @@ def read_measurements(path: Path, wishes: Wishes) -> Content:
 
 
 def _cells(path: Path, header: str, least: int) -> list[tuple[Place, list[str]]]:
-    """Return the rows below a header, which stands after some free lines."""
+    """Return the rows below a header, which follows free lines."""
     lines = read_lines(path)
     first = next((k for k, line in enumerate(lines[:_FREE]) if line.lower().startswith(header)), None)
     if first is None:

@@ -1,4 +1,4 @@
-"""Tables of DBAT: commas, `#` comments, columns by a comment or by the script that names them."""
+"""Tables of DBAT: commas, `#` comments, columns by comment or script."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def _spelled(columns: Sequence[str]) -> list[str]:
 
 
 def titled(path: Path) -> ColumnTable:
-    """Read a table whose header stands in a comment, `# id, image, x, y`, perhaps without the first."""
+    """Read a table with a header in a comment, `# id, image, x, y`."""
     table = read_columns(path, known=(*_COLUMNS, *_DEVIATIONS), numbers=_NUMBERS, spelling=_spelled)
     return table.renamed({NAMELESS: "id"}) if NAMELESS in table and "id" not in table else table
 
 
 def untitled(path: Path, columns: Sequence[str]) -> ColumnTable:
-    """Read a table whose columns a script names."""
+    """Read a table whose columns are defined by a script."""
     return read_rows(path, _spelled([column.strip().lower() for column in columns]), numbers=_NUMBERS)
 
 
@@ -75,7 +75,7 @@ def _check_photos(table: ColumnTable, numbers: Sequence[int], content: Content) 
 
 
 def take_photos(table: ColumnTable, content: Content) -> None:
-    """Take photos: numbers, paths and cameras, the only one where there is no column."""
+    """Add photos: numbers, paths and cameras; without camera column the only camera."""
     table.require("id", "path")
     numbers = _whole(table, "id")
     _once(table, numbers, "photo")
@@ -90,7 +90,7 @@ def take_photos(table: ColumnTable, content: Content) -> None:
 
 
 def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> None:
-    """Take centres and angles omega, phi, kappa."""
+    """Add centres and angles omega, phi, kappa."""
     if unit not in _RADIANS:
         names = list(_RADIANS)
         raise table.head.error(phrase("format.unknown", what="unit of angles", value=unit, names=names))
@@ -111,7 +111,7 @@ def take_points(
     check: bool = False,
     wanted: Callable[[int], bool] = lambda _: True,
 ) -> None:
-    """Take control or check points; standard deviations are those of a user, else of the table."""
+    """Add control or check points; `sd` replaces their standard deviations."""
     table.require("id", "x", "y", "z")
     numbers = _whole(table, "id")
     _once(table, numbers, "point")
@@ -145,7 +145,7 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
 
 
 def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> None:
-    """Take measurements; `sd` is their standard deviation in pixels, where the table has none."""
+    """Add observations; `sd` is their default standard deviation, pixels."""
     table.require("id", "im", "x", "y")
     photos = _whole(table, "im")
     _check_photos(table, photos, content)

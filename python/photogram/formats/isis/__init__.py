@@ -1,4 +1,4 @@
-"""Control networks of ISIS, the planetary mapping system of the U.S. Geological Survey."""
+"""Control networks of ISIS, the planetary mapping system of the USGS."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from photogram.formats.format import Format, later
 from photogram.formats.isis.reading import TITLE, is_network
 from photogram.io.files import reading
 
-HEAD = 1 << 16  # Bytes that tell a network
+HEAD = 1 << 16  # Bytes that identify a network
 
 
 def _recognises(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Control networks with the support data of their images as projects."""
+"""Projects from control networks and the support data of their images."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from photogram.words import Phrase, option_sd, phrase
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a control network, and the support data of the images that a list names."""
+    """Read a control network, and the support data of the listed images."""
     if wishes.cubes is None:
         raise InputError(phrase("isis.cubes"), file=path)
     settings = read_settings(wishes.jigsaw or "")
@@ -54,7 +54,7 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
         if serial not in files:
             raise InputError(phrase("isis.image", name=serial), file=cubes)
     held, there, found = _held(settings, files), set(seen), {}
-    # The first image of an observation is that of the list.
+    # The first image of an observation is the first one in the list.
     observations = observations_of([each for each in files if each in there], shared=settings.observations)
     for number, serials in observations.items():
         known = {serial in held for serial in serials}
@@ -69,7 +69,7 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
 
 
 def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
-    """Return serial numbers of the images of HELDLIST, which are named by these or by their files."""
+    """Return serial numbers of images in HELDLIST, a list of numbers or files."""
     if settings.held is None:
         return set()
     names = {str(file.resolve()): serial for serial, file in files.items()}
@@ -84,7 +84,7 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
 
 
 class _Seen(NamedTuple):
-    """Measures that count: rows in the network, those of their n points; and as m images of a block."""
+    """Measures in use and their n points (rows), as m observations of a block."""
 
     measures: Indices
     points: Indices
@@ -116,7 +116,7 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
 
 
 def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Place) -> Floats:
-    """Return (n, 3) X, Y, Z of points: as given, or in the middle of where their rays meet the spheroid."""
+    """Return (n, 3) initial X, Y, Z: given, or mean ray intersections."""
     starts = given_starts(network, seen.points, place)
     unknown = np.asarray(np.isnan(starts).any(axis=1))
     sums, counts = np.zeros_like(starts), np.zeros(len(starts))
@@ -134,7 +134,7 @@ def _starts(network: ControlNetwork, images: list[Image], seen: _Seen, place: Pl
 
 
 def _spheroid(contents: PlanetaryContents) -> Spheroid | None:
-    """Return the sphere above which points are; None where X, Y, Z are adjusted."""
+    """Return the sphere below points; None if X, Y, Z are adjusted."""
     if contents.settings.axes == "rectangular":
         return None
     a, b = contents.different[0].supported.isd.radii
@@ -180,7 +180,7 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
 
 
 def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
-    """Return where photos are about, and how they are turned, in the space of the block."""
+    """Return approximate positions and attitudes of photos."""
     axes, found = Cartesian(spheroid), []
     for own in contents.different:
         found += [about(own.supported.flown, _begin(each)) for each in own.supported.timed]
@@ -189,12 +189,12 @@ def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floa
 
 
 def _begin(own: Timed) -> float:
-    """Return the time of a frame, or that of the first line."""
+    """Return the time of a frame, or of the first line."""
     return float(own.time or 0.0) if own.lines is None else float(own.lines.times([0.0])[0])
 
 
 def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
-    """Return an image of each camera, and which camera each photo has."""
+    """Return an image of each camera, and the camera of each photo."""
     known: dict[object, int] = {}
     first: list[Image] = []
     rows: list[int] = []
@@ -208,7 +208,7 @@ def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
 
 
 def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
-    """Return what does not count: what is ignored, images without measures; and what counts again."""
+    """Return remarks on ignored, unused and reinstated measures."""
     measures, points = network.measures, network.points
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
     counts = {

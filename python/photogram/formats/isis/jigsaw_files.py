@@ -1,4 +1,4 @@
-"""What jigsaw writes of an adjustment: `bundleout.txt`, `images.csv`, `points.csv` and `residuals.csv`."""
+"""Result files of jigsaw: `bundleout.txt` and CSV tables."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def jigsaw_files(outcome: Outcome) -> Mapping[str, bytes]:
 
 
 def _rms(residuals: Floats) -> Floats:
-    """Return (3,) root mean squares of (n, 2) residuals: of samples, of lines, of both; NaN without any."""
+    """Return (3,) root mean squares of (n, 2) residuals: samples, lines, both."""
     if not len(residuals):
         return np.full(3, np.nan)
     squares = (residuals**2).mean(axis=0)
@@ -74,12 +74,12 @@ def _rms(residuals: Floats) -> Floats:
 
 
 def _apriori(own: Parameter) -> str:
-    """Return a standard deviation a priori as jigsaw has it: FREE, N/A where it is known, or a number."""
+    """Return an a-priori standard deviation: FREE, N/A (fixed) or a number."""
     return "N/A" if own.apriori == 0 else repr(own.apriori) if np.isfinite(own.apriori) else "FREE"
 
 
 def _table(heads: Sequence[Sequence[str]], columns: Sequence[Any]) -> bytes:
-    """Return a table with a header of several lines; `heads` are those of each column."""
+    """Return a table with a header of several lines from headers by column."""
     lines = [",".join(line) for line in zip(*heads, strict=True)]
     _, rows = csv_text({str(k): column for k, column in enumerate(columns)}).split(b"\n", 1)
     return ("\n".join(lines) + "\n").encode() + rows
@@ -96,7 +96,7 @@ def _table_of_images(outcome: Outcome) -> bytes:
         for image in outcome.contents.different
         if image.solving.trajectory.name in trajectories
     }
-    # Held images have fewer coefficients.
+    # Images with fixed poses have fewer coefficients.
     names = max((list(own) for own in found.values()), key=len)
     rows = []
     for image, own in found.items():
@@ -109,7 +109,7 @@ def _table_of_images(outcome: Outcome) -> bytes:
 
 
 def _cells(own: Parameter | None) -> list[Any]:
-    """Return the cells of a coefficient; empty ones where an image has none."""
+    """Return the cells of a coefficient; empty cells if an image does not have it."""
     if own is None:
         return [None] * len(_CELLS)
     adjusted = "N/A" if own.apriori == 0 else repr(own.adjusted)
@@ -140,7 +140,7 @@ def _table_of_points(outcome: Outcome) -> bytes:
 
 
 def _table_of_residuals(outcome: Outcome) -> bytes:
-    """Return measures that took part, then those that were rejected, which have no residuals."""
+    """Return the table of used measures, then rejected ones without residuals."""
     network, images = outcome.contents.network, {each.serial: each for each in outcome.contents.different}
     measures, used = network.measures, outcome.result.used_images
     rejected = np.flatnonzero(outcome.rejected)
@@ -191,7 +191,7 @@ def _settings(outcome: Outcome) -> Iterator[str]:
 
 
 def _setting(settings: Settings, name: str) -> str:
-    """Return the value of a setting as jigsaw is told it."""
+    """Return the value of a setting in the words of jigsaw."""
     parameter = PARAMETERS[name]
     value = getattr(settings, parameter.field)
     if parameter.place is not None:
@@ -276,7 +276,7 @@ def _points_summary(outcome: Outcome) -> Iterator[str]:
 
 
 def _rows_of_points(outcome: Outcome) -> Iterator[tuple[str, str, int]]:
-    """Yield name, status and row of the points that took part."""
+    """Yield name, status and row of the used points."""
     types = outcome.contents.network.points.types
     for row in np.flatnonzero(outcome.result.used_points).tolist():
         status = POINT_TYPES[types[outcome.point_rows[row]]].upper()
@@ -300,10 +300,10 @@ def _points(outcome: Outcome) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A coefficient of an image: X, Y, Z in km or RA, DEC, TWIST in degrees, by powers of scaled time.
+    """A coefficient of an image, X, Y, Z in km or angles in degrees.
 
-    `apriori` is its standard deviation in metres or degrees: 0 where it is known, infinite where it is free;
-    `adjusted` that a posteriori, in the unit.
+    `apriori` is the a-priori standard deviation in metres or degrees: 0 if fixed, infinite if free;
+    `adjusted` is the a-posteriori one in the unit.
     """
 
     name: str
@@ -321,7 +321,7 @@ class Parameter:
 
 
 def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
-    """Return the coefficients of an image that are solved for, and of the rest that of degree 0."""
+    """Return the coefficients of an image that are free or of degree 0."""
     solving, own = image.solving, adjusted.given
     places, angles = _middle(image.supported.isd, own)
     degrees = float(np.rad2deg(1.0))
@@ -346,7 +346,7 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
 
 
 def _middle(isd: Isd, own: Trajectory) -> tuple[Floats, Floats]:
-    """Return the place and the angles in the middle of tables, inertial."""
+    """Return the inertial position and angles at the centre of tables."""
     still = Trajectory(own.name, own.table)
     tables = (isd.position.times, isd.pointing.times)
     (places, _), (_, turned) = (about(still, float(times[0] + times[-1]) / 2) for times in tables)

@@ -1,4 +1,4 @@
-"""Control networks: points with their measures in images, as columns, and as the core takes these."""
+"""Control networks: points and measures as columns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.words import phrase
 
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
-"""What types of points mean; `Tie` and `Ground` are what old networks have for `Free` and `Fixed`."""
+"""Meaning of point types; old networks have `Tie` and `Ground` for `Free` and `Fixed`."""
 SOURCES = (
     "None",
     "User",
@@ -26,9 +26,9 @@ SOURCES = (
     "Basemap",
     "BundleSolution",
 )
-"""What sources of a-priori coordinates and radii mean."""
+"""Meaning of sources of a-priori coordinates and radii."""
 MEASURE_TYPES = ("Candidate", "Manual", "RegisteredPixel", "RegisteredSubPixel")
-"""What types of measures mean."""
+"""Meaning of measure types."""
 
 HEADER = {
     "NetworkId": "network_id",
@@ -38,9 +38,9 @@ HEADER = {
     "LastModified": "modified",
     "Description": "description",
 }
-"""Keys of the header in the order of ISIS, and what they are here."""
+"""Keys of the header in the order of ISIS, and the fields of a network."""
 MESSAGE = ("network_id", "target", "created", "modified", "description", "user")
-"""Texts of the header, in the order of their numbers in binary networks."""
+"""Header texts in the order of their numbers in binary networks."""
 
 _Codes = NDArray[np.int8]
 _Indices = NDArray[np.int32]
@@ -51,13 +51,13 @@ _TRIPLES = {
     "adjusted": ("adjusted_x", "adjusted_y", "adjusted_z"),
     "constrained": ("latitude_constrained", "longitude_constrained", "radius_constrained"),
 }
-"""Columns of a table each that are three columns of the core."""
+"""Columns of a table that are three columns of the engine."""
 _WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_covariance": 6}
-"""Numbers in each row of a column, where there are several."""
+"""Numbers per row of columns with several."""
 _TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
 _CODES = {"types", "apriori_source", "apriori_radius_source"}
 _NO_COLUMNS = ("serials", "rest")
-_NAMES = ("ids", "serial", *_NO_COLUMNS)  # What is handed to the core apart from the columns of numbers
+_NAMES = ("ids", "serial", *_NO_COLUMNS)  # Passed to the engine separately from the columns of numbers
 
 
 def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
@@ -66,7 +66,7 @@ def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
 
 
 class _Columns:
-    """Points or measures: all columns have as many rows."""
+    """Columns of points or measures, all with the same number of rows."""
 
     rest: _Rest
 
@@ -87,8 +87,8 @@ class _Columns:
 class ControlPoints(_Columns):
     """The points of a network.
 
-    Coordinates are rectangular and body-fixed, in metres; a covariance is the upper triangle of a matrix, row
-    by row, in square metres. Whatever a point does not have is NaN, -1 where it is an index or a code.
+    Coordinates are rectangular and body-fixed, in metres. A covariance is the upper triangle of a matrix, row
+    by row, in square metres. Missing values are NaN, or -1 for indices and codes.
     """
 
     ids: Sequence[str]
@@ -96,8 +96,8 @@ class ControlPoints(_Columns):
     edit_lock: Bools  # (n,) the point must not be edited
     ignore: Bools
     rejected: Bools
-    reference: _Indices  # (n,) the measure to which the others of the point refer, counted from its first one
-    # (n,) index into `SOURCES`: where the a-priori coordinates, and the radius, are from
+    reference: _Indices  # (n,) the reference measure of the point, counted from its first measure
+    # (n,) index into `SOURCES`: origin of the a-priori coordinates, and of the radius
     apriori_source: _Codes
     apriori_radius_source: _Codes
     apriori: Floats  # (n, 3) coordinates before an adjustment
@@ -105,7 +105,7 @@ class ControlPoints(_Columns):
     constrained: Bools  # (n, 3) whether latitude, longitude and radius are weighted
     adjusted: Floats  # (n, 3) coordinates of an adjustment
     adjusted_covariance: Floats
-    # All other fields of messages, byte for byte, and the first of each point (n + 1); they are written back
+    # All other message fields as bytes, and the start of each point (n + 1); written unchanged
     rest: _Rest
 
     def __len__(self) -> int:
@@ -113,24 +113,23 @@ class ControlPoints(_Columns):
 
     @property
     def is_fixed(self) -> Bools:
-        """(n,) whether a point is held where it is: `Fixed`, in old networks `Ground`."""
+        """(n,) whether a point is fixed: `Fixed`, or `Ground` in old networks."""
         return np.isin(self.types, [POINT_TYPES.index("Fixed"), POINT_TYPES.index("Ground")])
 
     @property
     def is_constrained(self) -> Bools:
-        """(n,) whether the a-priori coordinates of a point are observed: `Constrained`."""
+        """(n,) whether the a-priori coordinates of a point are weighted: `Constrained`."""
         return np.asarray(self.types == POINT_TYPES.index("Constrained"))
 
 
 @dataclass(frozen=True, eq=False)
 class ControlMeasures(_Columns):
-    """The measures of a network, those of a point one after the other.
+    """The measures of a network, grouped by point.
 
-    Samples and lines are pixels, counted so that the centre of an image's first pixel is (1, 1). Whatever a
-    measure does not have is NaN.
+    Samples and lines are pixels; the centre of an image's first pixel is (1, 1). Missing values are NaN.
     """
 
-    serials: Sequence[str]  # Of images, each once
+    serials: Sequence[str]  # Serial numbers of images, each once
     serial: _Indices  # (m,) index of the image in `serials`
     types: _Codes  # (m,) index into `MEASURE_TYPES`
     sample: Floats
@@ -141,7 +140,7 @@ class ControlMeasures(_Columns):
     line_sigma: Floats
     sample_residual: Floats
     line_residual: Floats
-    diameter: Floats  # (m,) of a crater that was measured
+    diameter: Floats  # (m,) diameter of a measured crater
     edit_lock: Bools  # (m,) the measure must not be edited
     ignore: Bools
     rejected: Bools
@@ -155,25 +154,25 @@ class ControlMeasures(_Columns):
 class ControlNetwork:
     """A control network.
 
-    What an adjustment has found is put into it by :func:`dataclasses.replace`: into the points, the measures,
-    and these into the network. What is not replaced is written as it was read.
+    Use :func:`dataclasses.replace` to insert adjustment results: into points and measures, and these into the
+    network. All other values are written as they were read.
 
     Parameters
     ----------
     points, measures
-        Its points and their measures.
+        Points and their measures.
     firsts
         (n + 1,) the first measure of each point, and the number of all.
     network_id, target, user, created, modified, description
-        What its header says; None where it does not. ISIS reads no network without the first two.
+        Values of the header; None if missing. ISIS requires the first two.
     version
-        Of the file that it was read from.
+        Version of the file that was read.
     radii
-        (3,) radii of the target in metres; (0,) where they are not said.
+        (3,) radii of the target in metres; (0,) if unknown.
     others
-        Keys and groups of the header that nobody knows.
+        Unknown keys and groups of the header.
     header_rest
-        Fields of the binary header that nobody knows, byte for byte.
+        Unknown fields of the binary header, as bytes.
     """
 
     points: ControlPoints
@@ -200,12 +199,12 @@ class ControlNetwork:
 
     @property
     def is_ignored(self) -> Bools:
-        """(m,) whether a measure does not count: it is ignored, or its point."""
+        """(m,) whether a measure is ignored, or its point."""
         return self.measures.ignore | self.points.ignore[self.point_of_measure]
 
 
 def _absent(name: str) -> np.generic:
-    """Return what stands in a column of the core where there is nothing."""
+    """Return the missing value of a column of the engine."""
     if name in _TRUTHS:
         return np.bool_(False)
     if name in _CODES:
@@ -214,7 +213,7 @@ def _absent(name: str) -> np.generic:
 
 
 def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> dict[str, Any]:
-    """Return the columns of points or measures; an empty one is one value that stands in all its rows."""
+    """Return columns of points or measures; an empty one has missing values."""
 
     def column(name: str) -> NDArray[Any]:
         shape = (rows, _WIDTHS[name]) if name in _WIDTHS else (rows,)
@@ -234,7 +233,7 @@ def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> d
 
 
 def _to_core(own: _Columns) -> dict[str, Any]:
-    """Return points or measures as columns of the core; those in which nothing stands are left out."""
+    """Return points or measures as columns of the engine, without empty columns."""
     found: dict[str, Any] = {"rest": own.rest}
     for each in fields(own):  # type: ignore[arg-type]
         if each.name in _NAMES:
@@ -250,24 +249,24 @@ def _to_core(own: _Columns) -> dict[str, Any]:
 
 
 def points_of(columns: Mapping[str, Any]) -> ControlPoints:
-    """Return points from the columns of the core: `ids`, `types`, and whatever else there is."""
+    """Return points from columns of the engine: `ids`, `types`, and optional ones."""
     ids = columns["ids"]
     return ControlPoints(ids=ids, **_from_core(ControlPoints, columns, len(ids)))
 
 
 def measures_of(columns: Mapping[str, Any]) -> ControlMeasures:
-    """Return measures from the columns of the core: `serial`, `types`, and whatever else there is."""
+    """Return measures from engine columns `serial`, `types` and optional ones."""
     serial, serials = columns["serial"]
     own = _from_core(ControlMeasures, columns, len(serial))
     return ControlMeasures(serials=serials, serial=serial, **own)
 
 
 def columns_of_points(points: ControlPoints) -> dict[str, Any]:
-    """Return points as columns of the core."""
+    """Return points as columns of the engine."""
     return {"ids": list(points.ids), **_to_core(points)}
 
 
 def columns_of_measures(measures: ControlMeasures) -> dict[str, Any]:
-    """Return measures as columns of the core."""
+    """Return measures as columns of the engine."""
     serial = np.ascontiguousarray(measures.serial, dtype=np.int32)
     return {"serial": (serial, list(measures.serials)), **_to_core(measures)}

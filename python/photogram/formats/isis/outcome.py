@@ -1,4 +1,4 @@
-"""Adjusted control networks: contents, outcome in pixels and axes of the body, rejection of measures."""
+"""Adjusted control networks: results in pixels and body axes, rejection."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A network after the adjustment of its block, from which images and points may have been taken out."""
+    """A network after adjustment of its block."""
 
     contents: PlanetaryContents
     result: Result
 
     @cached_property
     def point_rows(self) -> Indices:
-        """(n,) the point of the network that each point of the block is."""
+        """(n,) the network point of each point of the block."""
         places = {name: row for row, name in enumerate(self.contents.network.points.ids)}
         return np.array([places[name] for name in self.result.block.point_ids], dtype=np.int64)
 
     @cached_property
     def images(self) -> list[Image]:
-        """The image that each photo of the block is of."""
+        """The image of each photo of the block."""
         return [self.contents.images[name] for name in self.result.block.photo_ids]
 
     @cached_property
     def rows(self) -> dict[Image, Indices]:
-        """The images of the block that are measures in each image of the network."""
+        """The block observations that are measures in each image of the network."""
         different = self.contents.different
         places = {image: place for place, image in enumerate(different)}
         of_photo = np.array([places[image] for image in self.images], dtype=np.int64)
@@ -58,7 +58,7 @@ class Outcome:
 
     @cached_property
     def measure_rows(self) -> Indices:
-        """(m,) the measure of the network that each image of the block is: the first of its point there."""
+        """(m,) network measure of each observation: first of its point in the image."""
         network, block = self.contents.network, self.result.block
         measures, count = network.measures, len(network.points)
         serial_of = {serial: row for row, serial in enumerate(measures.serials)}
@@ -71,7 +71,7 @@ class Outcome:
 
     @cached_property
     def rejected(self) -> Bools:
-        """(M,) measures of the network that count and took no part in the end."""
+        """(M,) measures of the network that are not ignored and were rejected."""
         network = self.contents.network
         measures, count = network.measures, len(network.points)
         keys = measures.serial.astype(np.int64) * count + network.point_of_measure
@@ -80,7 +80,7 @@ class Outcome:
 
     @cached_property
     def residuals(self) -> Floats:
-        """(m, 2) measured minus computed sample and line, at the instant of the measured line, in pixels."""
+        """(m, 2) measured minus computed sample and line, in pixels."""
         found = np.full((len(self.result.residuals), 2), np.nan)
         for image, mine in self.rows.items():
             isd = image.supported.isd
@@ -91,7 +91,7 @@ class Outcome:
 
     @cached_property
     def focal(self) -> Floats:
-        """(m, 2) measured x and y behind a perfect lens, in the axes of cameras, millimetres."""
+        """(m, 2) measured x and y without distortion, in camera axes, millimetres."""
         found = focal_images(self.result.block).copy()
         for image, mine in self.rows.items():
             found[mine] *= image.supported.isd.axes[:2]
@@ -99,25 +99,25 @@ class Outcome:
 
     @cached_property
     def xyz(self) -> Floats:
-        """(n, 3) adjusted points, fixed to the body, metres; NaN where left out."""
+        """(n, 3) adjusted points, fixed to the body, metres; NaN if omitted."""
         return Cartesian(self.result.block.spheroid).positions(np.array(self.result.point_positions))
 
     @cached_property
     def latitudes(self) -> Floats:
-        """(n, 3) latitude and longitude (radians, longitude from 0), and radius in metres, of the same."""
+        """(n, 3) latitude, longitude from 0 (radians), and radius (metres)."""
         return spherical(self.xyz)
 
     @cached_property
     def before(self) -> Floats:
-        """(n, 3) where the points began: as :attr:`latitudes`."""
+        """(n, 3) initial values of points, as in :attr:`latitudes`."""
         return spherical(self.contents.starts[self.point_rows])
 
     @cached_property
     def corrections(self) -> Floats:
-        """(n, 3) what latitude, longitude and radius have changed by, metres."""
+        """(n, 3) corrections of latitude, longitude and radius, metres."""
         after = self.latitudes
         change = after - self.before
-        # Across the meridian from which longitudes are counted.
+        # Differences across the prime meridian.
         change[:, 1] = (change[:, 1] + np.pi) % (2 * np.pi) - np.pi
         radius = after[:, 2]
         metres = np.column_stack([radius, radius * np.cos(after[:, 0]), np.ones(len(after))])
@@ -125,7 +125,7 @@ class Outcome:
 
     @cached_property
     def point_rms(self) -> Floats:
-        """(n,) root mean squares of the residuals of points, both coordinates of all measures, in pixels."""
+        """(n,) root mean square residuals of points, pixels."""
         used, block = self.result.used_images, self.result.block
         points, count = block.image_points[used], len(block.point_ids)
         squares = np.bincount(points, (self.residuals[used] ** 2).mean(axis=1), minlength=count)
@@ -133,7 +133,7 @@ class Outcome:
 
     @cached_property
     def covariances(self) -> Floats:
-        """(n, 3, 3) of X, Y, Z, a posteriori, square metres."""
+        """(n, 3, 3) a-posteriori covariances of X, Y, Z, square metres."""
         own, spheroid = self.result.point_covariances, self.result.block.spheroid
         if spheroid is None:
             return np.asarray(own)
@@ -155,7 +155,7 @@ class Outcome:
 
 
 def spherical(xyz: Floats) -> Floats:
-    """Return (n, 3) latitudes, longitudes from 0 on, and radii, of (n, 3) X, Y, Z."""
+    """Return (n, 3) latitudes, longitudes from 0, and radii of (n, 3) X, Y, Z."""
     radius = np.linalg.norm(xyz, axis=1)
     latitude = np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))
     return np.column_stack([latitude, np.arctan2(xyz[:, 1], xyz[:, 0]) % (2 * np.pi), radius])
@@ -167,7 +167,7 @@ PITCHES = 1.4  # Standard deviation of image coordinates, in pixels of the detec
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image of a network: its serial number, file, support data with photos, and what is adjusted."""
+    """An image of a network: serial number, file, support data, parameters."""
 
     serial: str
     path: Path
@@ -176,16 +176,16 @@ class Image:
 
     @property
     def pitch(self) -> float:
-        """The side of a pixel of the detector in millimetres."""
+        """The side of a detector pixel in millimetres."""
         (x, y), _ = self.supported.isd.detector.planes["isis"].matrix.T
         return float((x * x + y * y) ** 0.5)
 
 
 @dataclass(frozen=True, eq=False)
 class PlanetaryContents:
-    """A network as it was read, its images that have measures by the names of photos, and how it is adjusted.
+    """A network as read, its images by photo name, and its settings.
 
-    `starts` are (N, 3) X, Y, Z in metres where all its points begin; NaN for those that do not count.
+    `starts` are (N, 3) initial X, Y, Z of all its points in metres; NaN for ignored ones.
     """
 
     network: ControlNetwork
@@ -196,37 +196,38 @@ class PlanetaryContents:
 
     @property
     def different(self) -> list[Image]:
-        """The images, each once: a push frame camera has several photos in one."""
+        """The images, each once: a push frame camera has several photos in one image."""
         return list(dict.fromkeys(self.images.values()))
 
 
 def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
-    """Return where each of the whole numbers below `count` stands among values."""
+    """Return the positions of each integer below `count` in an array of values."""
     order = np.argsort(values, kind="stable")
     return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
-    """Return the contents of a project; an error where it was not read from a control network."""
+    """Return the contents of a project from a control network."""
     found = details.get(DETAILS)
     if not isinstance(found, PlanetaryContents):
         raise InputError(phrase("isis.project"))
     return found
 
 
-NORMAL = 1.4826  # Standard deviations of normal errors in their median absolute deviation
-FEWEST = 2  # Measures of a point that stay
+NORMAL = 1.4826  # Standard deviation of normal errors, in median absolute deviations
+FEWEST = 2  # Smallest number of remaining measures of a point
 FAINT = 1e6
-"""What the standard deviations of rejected measures are multiplied by, so that they have residuals all the
-same, and may come back."""
+"""Factor of the standard deviations of rejected measures, so that residuals can be computed for a possible
+reinstatement.
+"""
 MOST_ROUNDS = 30
 
 
 def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:
-    """Return a call that adjusts the block of a control network, as its settings have measures rejected.
+    """Return a call that adjusts a control network with rejection.
 
-    A block is adjusted, measures are rejected or taken in again (:func:`flagged`), and it is adjusted anew,
-    until none is rejected and none comes back; then without those that are out.
+    Adjustment and rejection or reinstatement of measures (:func:`flagged`) alternate until nothing changes.
+    The last adjustment is without the rejected measures.
     """
     contents = contents_of(project.details)
     if not contents.settings.rejects:
@@ -241,7 +242,7 @@ def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
 
 def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block], Result]) -> Result:
-    """Return the adjusted block without rejected measures, with a remark on what they were."""
+    """Adjust the block without rejected measures, and report them in a remark."""
     multiplier = contents.settings.multiplier
     out = np.zeros(len(block.image_xy), dtype=bool)
     for rounds in count(1):
@@ -273,24 +274,24 @@ def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
-    """Return median + multiplier x 1.4826 x median absolute deviation of (n,) lengths; NaN do not count."""
+    """Return median + multiplier x 1.4826 x median absolute deviation."""
     median = float(np.nanmedian(lengths))
     return median + multiplier * NORMAL * float(np.nanmedian(np.abs(lengths - median)))
 
 
 def flagged(lengths: Floats, out: Bools, points: Indices, limit: float) -> Bools:
-    """Return which measures are rejected after an adjustment, as jigsaw has it.
+    """Return which measures to reject after an adjustment, as in jigsaw.
 
-    What is rejected stays so while it is longer than the limit; of all others of a point the longest goes, if
-    it is longer and two stay. `lengths` are (m,) of residuals, NaN of measures that took no part, `out` (m,)
-    which were rejected before, `points` (m,) the point of each.
+    A rejected measure remains rejected while its residual exceeds the limit. Otherwise the longest residual
+    of a point is rejected if it exceeds the limit and two measures remain. `lengths` are (m,) of residuals,
+    NaN if unused; `out` (m,) which were rejected before; `points` (m,) the point of each.
     """
     long = lengths > limit
     stay = out & long
     count = int(points.max(initial=-1)) + 1
     left = np.bincount(points[np.isfinite(lengths)], minlength=count)
     left -= np.bincount(points[stay], minlength=count)
-    # The last of each point, by length, is its longest.
+    # Sorted by length: the last of each point is its longest.
     fresh = np.flatnonzero(long & ~out)
     order = fresh[np.lexsort((lengths[fresh], points[fresh]))]
     last = np.append(points[order][1:] != points[order][:-1], True)[: len(order)]

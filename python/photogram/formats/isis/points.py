@@ -1,4 +1,4 @@
-"""Points of control networks as those of blocks: what is known of them, and how well."""
+"""Points of control networks as points of blocks, with prior values."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _LOCAL = [1, 0, 2]  # Longitude, latitude and radius in the order of jigsaw: lat
 
 @dataclass(frozen=True, eq=False)
 class KnownPoints:
-    """What is known of n points before their adjustment, in the coordinates of a block.
+    """Prior values of n points in the coordinates of a block.
 
-    `positions` and `sd` are (n, 3) as of blocks: what is observed or fixed, NaN else, and its standard
-    deviations; `starts` (n, 3) where points begin; `controls` those with a full covariance; `messages` what
-    was taken otherwise than it stands in the network.
+    `positions` and `sd` are (n, 3) as in blocks: weighted or fixed values, otherwise NaN, and their standard
+    deviations. `starts` are (n, 3) initial values; `controls` points with a full covariance matrix;
+    `messages` remarks on values that differ from the network.
     """
 
     positions: Floats
@@ -43,13 +43,12 @@ def known_points(
     spheroid: Spheroid | None,
     place: Place,
 ) -> KnownPoints:
-    """Return what a network and the settings say of points.
+    """Return the prior values of points from a network and the settings.
 
-    Free points have the standard deviations of the settings, and a fixed radius unless that is asked for;
-    constrained ones their own covariance, or where single coordinates are constrained the standard deviations
-    of these; fixed ones none. `rows` are the points of the network that count, `starts` (n, 3) X, Y, Z where
-    they begin, in metres; `spheroid` is a sphere where latitude, longitude and radius are adjusted, None
-    where X, Y, Z are.
+    Free points have the standard deviations of the settings, and a fixed radius unless it is to be estimated.
+    Constrained points have their own covariance matrix or single standard deviations; fixed points have 0.
+    `rows` are the points of the network in use, `starts` (n, 3) their initial X, Y, Z in metres. `spheroid`
+    is a sphere if latitude, longitude and radius are adjusted, None if X, Y, Z are.
     """
     points = network.points
     coordinates = Cartesian(spheroid).from_cartesian(starts)
@@ -66,7 +65,7 @@ def known_points(
 
 
 def per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
-    """Return (n, 3) what a metre is of each coordinate: 1 / (R cos B) of longitude, 1 / R of latitude B."""
+    """Return (n, 3) coordinate units per metre at (n, 3) coordinates."""
     if spheroid is None:
         return np.ones_like(coordinates)
     radius = spheroid.a + coordinates[:, 2]
@@ -86,7 +85,7 @@ def _constrain(
     spheroid: Spheroid | None,
     place: Place,
 ) -> None:
-    """Weigh constrained points by their own covariances."""
+    """Apply the covariance matrices of constrained points."""
     points, own = network.points, np.flatnonzero(network.points.is_constrained[rows])
     covariances = full_matrices(points.apriori_covariance[rows[own]])
     given = np.isfinite(covariances).all(axis=(1, 2))
@@ -117,9 +116,9 @@ def _report(known: KnownPoints, code: str, ids: Sequence[str], rows: Indices) ->
 
 
 def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
-    """Return (n, 3) X, Y, Z that a network gives for points, a-priori ones before adjusted; NaN without.
+    """Return (n, 3) X, Y, Z of points, preferably a-priori ones; NaN without.
 
-    A fixed or constrained point has to have them.
+    They are required for fixed and constrained points.
     """
     points = network.points
     apriori, adjusted = points.apriori[rows], points.adjusted[rows]

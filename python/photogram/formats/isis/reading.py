@@ -1,4 +1,4 @@
-"""Reading control networks: binary ones of versions 2 and 5, text of versions 3 to 5."""
+"""Reader of control networks: binary versions 2 and 5, text 3 to 5."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
 TITLE = "control network (ISIS)"
-LABEL_BYTES = 65536  # Bytes of the label of a binary network; zeros follow what it says
+LABEL_BYTES = 65536  # Bytes of the label of a binary network, padded with zeros
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
 _BINARY, _TEXT = "protobuffer", "controlnetwork"
 _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
-_OLDEST = "1"  # The version of a network that does not say it
+_OLDEST = "1"  # Version of a network without a version
 _HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 
 def _kind(data: bytes) -> str:
-    """Return what the first object of a label is called, in small letters; nothing where there is none."""
+    """Return the name of the first object of a label in small letters; empty without."""
     found = _FIRST_OBJECT.match(data[:LABEL_BYTES].removeprefix(b"\xef\xbb\xbf"))
     return found[1].decode().lower() if found else ""
 
 
 def is_network(head: bytes) -> bool:
-    """Return whether a file that begins so is a control network."""
+    """Return whether this is the start of a control network."""
     return _kind(head) in (_BINARY, _TEXT)
 
 
 def is_binary(path: Path) -> bool:
-    """Return whether a control network is a binary one."""
+    """Return whether a control network is binary."""
     with reading(path), path.open("rb") as file:
         return _kind(file.read(LABEL_BYTES)) == _BINARY
 
@@ -48,13 +48,13 @@ def is_binary(path: Path) -> bool:
 def read_network(path: Path) -> ControlNetwork:
     """Read a control network.
 
-    Comments of text are not read: ISIS writes there what it has computed from the rest.
+    Comments of text are ignored: ISIS writes derived values there.
 
     Raises
     ------
     InputError
-        It cannot be read, is no control network, or of a version that is not known; parts of it are damaged:
-        the error has the number of the point (binary networks) or the line (text).
+        If the file cannot be read, is not a control network, has an unknown version, or is damaged. The error
+        contains the number of the point (binary networks) or the line (text).
     """
     data = read_bytes(path)
     kind = _kind(data)
@@ -84,7 +84,7 @@ def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) 
 
 @dataclass
 class _Label:
-    """What the label of a binary network says."""
+    """The contents of the label of a binary network."""
 
     core: Group
     info: Group
@@ -92,7 +92,7 @@ class _Label:
     path: Path
 
     def whole(self, group: Group, key: str) -> int | None:
-        """Return a whole number that is not negative; None where the key is not there."""
+        """Return an integer that is not negative; None if the key is missing."""
         value = group.get(key)
         if value is None:
             return None
@@ -101,7 +101,7 @@ class _Label:
         return int(value)
 
     def place(self, key: str) -> int:
-        """Return a place or a number of bytes of the core."""
+        """Return an offset or a number of bytes of the core."""
         if (place := self.whole(self.core, key)) is None:
             raise InputError(phrase("format.member", name=key), file=self.path, record=self.core.line)
         return place
@@ -179,7 +179,6 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
 
 
 def _radii(value: Value, network: Group, path: Path) -> Floats:
-    """Return radii in metres."""
     try:
         if isinstance(value, Quantity):
             if value.unit.lower() != "meters":

@@ -1,4 +1,4 @@
-"""Settings of ISIS's program jigsaw, by its names."""
+"""Settings of the ISIS program jigsaw, by their names."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from photogram.messages import unknown_name
 from photogram.words import Phrase, phrase
 
 Solved = Literal["none", "first", "second", "third", "all"]
-"""Which coefficients are unknown: none, that of degree 0, those to degree 1, to degree 2, all."""
+"""Free coefficients: none, of degree 0, to degree 1, to degree 2, all."""
 Sigmas = tuple[float | None, float | None, float | None]
-"""Standard deviations of three things, None where they are not weighted."""
+"""Standard deviations of three parameters, None if they are free."""
 Axes = Literal["latitudinal", "rectangular"]
 
 MOST = 8  # The highest degree of a polynomial
@@ -26,47 +26,47 @@ MOST = 8  # The highest degree of a polynomial
 
 @dataclass(frozen=True)
 class Settings:
-    """What is adjusted, and how it is weighted; defaults are those of jigsaw."""
+    """Adjusted parameters and their weights; defaults are the defaults of jigsaw."""
 
-    # Degrees of the polynomials that are fitted to the angles of an image, and that are adjusted
+    # Degrees of the polynomials fitted to the angles of an image, and of the adjusted ones
     ck_degree: int = 2
     ck_solve_degree: int = 2
-    # Which of their coefficients are unknown, and whether those of the third angle are
+    # Free coefficients, and whether coefficients of the third angle are free
     angles: Solved = "first"
     twist: bool = True
     over_existing: bool = False  # Whether polynomials are added to the angles of the table instead
-    spk_degree: int = 2  # The same of positions
+    spk_degree: int = 2  # The same for positions
     spk_solve_degree: int = 2
     positions: Solved = "none"
     over_hermite: bool = False
-    # Degrees: of the coefficients of degree 0, 1 and 2, by scaled time
+    # Degrees: coefficients of degree 0, 1 and 2, by scaled time
     angle_sigmas: Sigmas = (None, None, None)
-    position_sigmas: Sigmas = (None, None, None)  # Metres: likewise
-    radius: bool = False  # Whether radii of free points are unknown
-    axes: Axes = "latitudinal"  # What point coordinates are adjusted
-    # Metres: of latitude, longitude, radius of all points, and of X, Y, Z
+    position_sigmas: Sigmas = (None, None, None)  # Metres: as for angles
+    radius: bool = False  # Whether radii of free points are free
+    axes: Axes = "latitudinal"  # Coordinates in which points are adjusted
+    # Metres: latitude, longitude, radius of all points, and X, Y, Z
     latitude_sigmas: Sigmas = (None, None, None)
     rectangular_sigmas: Sigmas = (None, None, None)
     observations: bool = False  # Whether images of one observation share their coefficients
-    held: Path | None = None  # The list of images whose poses are known; None: no image is
-    # Whether measures with long residuals are rejected, and how many of their deviations these are long
+    held: Path | None = None  # List of images with fixed poses; None: no image
+    # Whether measures with large residuals are rejected, and the limit in standard deviations
     rejects: bool = False
     multiplier: float = 3.0
-    remarks: tuple[Phrase, ...] = ()  # Settings that are replaced by something else
+    remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
 
     @property
     def angle_coefficients(self) -> int:
-        """How many coefficients of each angle are unknown."""
+        """Number of free coefficients of each angle."""
         return _count(self.angles, self.ck_solve_degree)
 
     @property
     def position_coefficients(self) -> int:
-        """How many coefficients of each coordinate are unknown."""
+        """Number of free coefficients of each coordinate."""
         return _count(self.positions, self.spk_solve_degree)
 
     @property
     def point_sigmas(self) -> Sigmas:
-        """Metres: of the coordinates of all points that are adjusted."""
+        """Standard deviations of the adjusted coordinates of all points, metres."""
         return self.latitude_sigmas if self.axes == "latitudinal" else self.rectangular_sigmas
 
 
@@ -118,7 +118,7 @@ _AXES = _word(latitudinal="latitudinal", rectangular="rectangular")
 
 
 class _Parameter(NamedTuple):
-    """A field of the settings, how its text is read, and its place in a field of three."""
+    """A field of settings, its reader, and its index in a field of three."""
 
     field: str
     read: Callable[[str], Any]
@@ -152,7 +152,7 @@ PARAMETERS: Mapping[str, _Parameter] = {
     "OUTLIER_REJECTION": _Parameter("rejects", _yes),
     "REJECTION_MULTIPLIER": _Parameter("multiplier", _positive),
 }
-"""What each name of jigsaw is here."""
+"""Field of each jigsaw name."""
 
 OTHERWISE: Mapping[str, str] = {
     "MAXITS": "iterations",
@@ -163,15 +163,16 @@ OTHERWISE: Mapping[str, str] = {
     **dict.fromkeys(("BUNDLEOUT_TXT", "IMAGESCSV", "OUTPUT_CSV", "RESIDUALS_CSV"), "written"),
     **dict.fromkeys(("FROMLIST", "CNET", "ONET", "FILE_PREFIX"), "paths"),
 }
-"""Remarks on settings that are replaced by something else."""
+"""Remarks on settings replaced by others."""
 REFUSED = ("SOLVETARGETBODY",)
 
 
 def read_settings(text: str) -> Settings:
-    """Read settings as they stand on jigsaw's command line, or in a file.
+    """Read settings from a jigsaw command line or a file.
 
-    They are `NAME=value` with blanks between, names in any case, values with blanks in quotes; or the path of
-    a file with such lines, in which # begins a comment. A later value counts in place of an earlier one.
+    Settings are `NAME=value`, separated by blanks, with names in any case and values with blanks in quotes.
+    Alternatively, `text` is the path of a file with such lines, in which # begins a comment. The last value
+    of a name is used.
     """
     given: dict[str, Any] = {}
     remarks: dict[str, Phrase] = {}
@@ -189,13 +190,13 @@ def read_settings(text: str) -> Settings:
 
 
 def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Yield names and values, and where they stand in a file."""
+    """Yield names and values, and their locations in a file."""
     path = Path(text) if text.strip() and "=" not in text else None
     lines = [text] if path is None else read_lines(path)
     for record, line in enumerate(lines, 1):
         where: dict[str, Any] = {} if path is None else {"file": path, "record": record, "text": line.strip()}
         try:
-            # `NAME = value` is one setting, as jigsaw has it.
+            # `NAME = value` is one setting in jigsaw.
             words = shlex.split(re.sub(r"\s*=\s*", "=", line), comments=path is not None)
         except ValueError:
             raise InputError(phrase("isis.syntax", value=line), **where) from None
@@ -218,7 +219,7 @@ def _put(given: dict[str, Any], own: _Parameter, value: str) -> None:
 
 
 def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
-    """Return a remark on a setting that is replaced; none for a setting that asks for nothing."""
+    """Return a remark on a replaced setting; none for a setting without effect."""
     if name in OTHERWISE:
         return {name: phrase("error.at", what=name, message=phrase(f"isis.{OTHERWISE[name]}"))}
     if name not in REFUSED:

@@ -1,4 +1,4 @@
-"""Trajectories with the corrections of jigsaw, which images of one observation share."""
+"""Trajectories with jigsaw corrections, shared by the images of an observation."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Solving:
-    """The trajectory of an image, in metres and radians, and the polynomials that it begins with.
+    """The trajectory of an image, in metres and radians, and its initial polynomials.
 
-    `position` and `angles` are (3, n) coefficients of the polynomials that stand for the tables, of time from
-    the middle of a table, scaled by half of it, to which corrections are added; 0 where the tables stay.
-    `over` says whether the tables of positions, and of angles, do.
+    `position` and `angles` are (3, n) coefficients of the polynomials that replace the tables and receive
+    corrections. Time is reduced to the centre of a table and scaled by half of its span. They are 0 if the
+    tables are used. `over` is True for tables of positions, and of angles, that are used.
     """
 
     trajectory: Trajectory
@@ -35,10 +35,10 @@ class Solving:
 
 
 def solving(isd: Isd, name: str, settings: Settings, *, held: bool, first: Isd) -> Solving:
-    """Return what is adjusted of an image, or of all images of an observation: nothing if it is held.
+    """Return the free parameters of an image or an observation; none if it is fixed.
 
-    `isd` has the tables of all images of an observation, `first` those of its first, which say from when time
-    counts, and which polynomials all begin with, as in jigsaw.
+    `isd` contains the tables of all images of an observation. `first` is its first image, which defines time
+    origin and initial polynomials, as in jigsaw.
     """
     counts = (0, 0) if held else (settings.position_coefficients, settings.angle_coefficients)
     position, isd, places = _positions(isd, first.position, settings, counts[0])
@@ -49,16 +49,16 @@ def solving(isd: Isd, name: str, settings: Settings, *, held: bool, first: Isd) 
 
 
 def _scaled(times: Floats) -> tuple[float, float]:
-    """Return the middle of records and half of what they span; 1 s where there is one."""
+    """Return the centre and half of the span of records; 1 s for a single record."""
     return float(times[0] + times[-1]) / 2, float(times[-1] - times[0]) / 2 or 1.0
 
 
 def _positions(
     isd: Isd, own: Positions, settings: Settings, count: int
 ) -> tuple[Polynomial | None, Isd, Floats]:
-    """Return corrections of positions, support data with what they are added to, and its coefficients.
+    """Return position corrections, support data they refer to, coefficients.
 
-    They begin with records of their own, which those of the support data may go beyond.
+    The initial polynomials are fitted to the image's own records; the support data may extend beyond them.
     """
     if not count:
         return None, isd, np.zeros((3, 0))
@@ -76,10 +76,9 @@ def _positions(
 
 
 def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polynomial | None, Isd, Floats]:
-    """Return corrections of angles, support data with what they are added to, and its coefficients.
+    """Return angle corrections, support data they refer to, coefficients.
 
-    Angles that are polynomials are added to a table of one record, their value in the middle: they have no
-    other attitude.
+    Polynomial angles are added to a table of one record, the attitude at the centre.
     """
     if not count:
         return None, isd, np.zeros((3, 0))
@@ -101,7 +100,7 @@ def _angles(isd: Isd, own: Turns, settings: Settings, count: int) -> tuple[Polyn
 
 
 def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
-    """Return polynomials of another degree: with zeros, or without their last ones, as jigsaw has it."""
+    """Return polynomials of another degree, padded or truncated."""
     own = np.zeros((3, degree + 1))
     most = min(degree + 1, fit.coefficients.shape[1])
     own[:, :most] = fit.coefficients[:, :most]
@@ -109,7 +108,7 @@ def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
 
 
 def deviations(sigmas: Sequence[float | None], count: int, degree: int) -> Floats:
-    """Return (degree + 1, 3) standard deviations of coefficients, of which the first `count` are unknown."""
+    """Return (degree + 1, 3) standard deviations; the first `count` are free."""
     given = [np.inf if sigma is None else sigma for sigma in sigmas]
     of_degrees = [*given, *[np.inf] * count][:count] + [0.0] * (degree + 1 - count)
     return np.repeat(of_degrees, 3).reshape(-1, 3)
@@ -125,14 +124,15 @@ _KEYWORDS: Mapping[str, int | None] = {
     r"MRO/CTX/": None,
     r"MGS/MOC": None,
 }
-"""How serial numbers begin, and how many of their keywords, between slashes, name the observation, as in ISIS
-(`ObservationKeys` of `appdata/serialnumbers`); None: all, so that every image is an observation itself."""
-APART = 5.0  # Pixels by which poses of one flight may differ from image to image, where their tables overlap
-COMPARED = 16  # Times at which they are compared
+"""Start of serial numbers, and number of their keywords (between slashes) that name the observation, as in
+ISIS (`ObservationKeys` of `appdata/serialnumbers`). None: all keywords, so that each image is an observation.
+"""
+APART = 5.0  # Largest difference (pixels) of poses of one flight between images with overlapping tables
+COMPARED = 16  # Number of times for the comparison
 
 
 def observation_number(serial: str) -> str:
-    """Return the observation of an image by its serial number; an error where no rule is known."""
+    """Return the observation of an image from its serial number."""
     count = next((count for begin, count in _KEYWORDS.items() if re.match(begin, serial)), 0)
     if count == 0:
         raise InputError(phrase("isis.observation-rule", image=serial))
@@ -140,7 +140,7 @@ def observation_number(serial: str) -> str:
 
 
 def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[str]]:
-    """Return the images of each observation by its number: where none is shared, every image by itself."""
+    """Return the images of each observation by number."""
     found: dict[str, list[str]] = {}
     for serial in serials:
         found.setdefault(observation_number(serial) if shared else serial, []).append(serial)
@@ -148,7 +148,7 @@ def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[s
 
 
 def one_flight(isds: Sequence[Isd]) -> Isd:
-    """Return the support data of the first of several images with the tables of all, which have to agree."""
+    """Return the first support data with the tables of all, which must agree."""
     first, *others = isds
     for each in others:
         _check(first, each)
@@ -169,24 +169,24 @@ def one_flight(isds: Sequence[Isd]) -> Isd:
 
 
 def _once(times: Sequence[Floats]) -> tuple[Floats, Indices]:
-    """Return the different times of tables, ascending, and which record of all has each first."""
+    """Return different times in order, and the first record of each."""
     own, rows = np.unique(np.concatenate(times), return_index=True)
     return own, rows
 
 
 def _joined(tables: Sequence[Turns]) -> Turns:
-    """Return one table of all records, one of each time."""
+    """Return one table of all records, with one record per time."""
     times, rows = _once([each.times for each in tables])
     return Turns(times, np.concatenate([each.matrices for each in tables])[rows], tables[0].interpolation)
 
 
 def _check(first: Isd, other: Isd) -> None:
-    """Refuse an image whose tables say another place or attitude at the times of the first."""
+    """Reject an image whose tables contradict the poses of the first one."""
     one, two = (trajectory_of(each, "flight", interpolation="isis") for each in (first, other))
     begin, end = max(one.reach[0], two.reach[0]), min(one.reach[1], two.reach[1])
     if not begin < end:
         return
-    # Of single records all times are alike.
+    # Single records have equal times.
     times = np.linspace(begin, end, COMPARED) if np.isfinite(end - begin) else np.array([first.time])
     (places, axes), (others, turned) = (given_poses(each, times) for each in (one, two))
     (x, y), _ = first.detector.planes["isis"].matrix.T

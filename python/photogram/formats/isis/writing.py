@@ -1,4 +1,4 @@
-"""Files of adjusted control networks: binary (version 5) and text, support data, and results."""
+"""Writer of adjusted control networks, support data and results."""
 
 from __future__ import annotations
 
@@ -41,21 +41,20 @@ _UPPER = np.triu_indices(3)
 
 
 def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
-    """Return what a network says of itself, in the order of ISIS."""
+    """Return the header of a network in the order of ISIS."""
     return [(key, text) for key, name in HEADER.items() if (text := getattr(network, name)) is not None]
 
 
 def binary_network(network: ControlNetwork) -> bytes:
     """Return a network as a binary file of version 5.
 
-    Every field of every point and measure stands there as it was read, but for those whose columns have other
-    values now.
+    Fields of points and measures are written as they were read, except changed columns.
 
     Raises
     ------
     InputError
-        Columns that do not agree; something that was read from text and has no place in a binary network: the
-        message names it, and the point.
+        If columns are inconsistent, or a value that was read from text cannot be written to a binary network.
+        The message names the value and the point.
     """
     columns = columns_of_points(network.points), columns_of_measures(network.measures)
     points = _photocore.control_point_messages(*columns, network.firsts)
@@ -88,8 +87,8 @@ def network_text(network: ControlNetwork) -> bytes:
     Raises
     ------
     InputError
-        Columns that do not agree; something that was read from a binary network and has no key in text: the
-        message names it, and the point.
+        If columns are inconsistent, or a value that was read from a binary network cannot be written as text.
+        The message names the value and the point.
     """
     if network.header_rest:
         raise InputError(phrase("isis.fields"))
@@ -105,7 +104,7 @@ def network_text(network: ControlNetwork) -> bytes:
 
 
 def results(project: Project, result: Result) -> Mapping[str, bytes]:
-    """Return the files of an adjusted network by their names."""
+    """Return the files of an adjusted network by name."""
     outcome = Outcome(contents_of(project.details), result)
     path = outcome.contents.path
     files = dict(jigsaw_files(outcome))
@@ -122,9 +121,9 @@ def results(project: Project, result: Result) -> Mapping[str, bytes]:
 
 
 def _updated_network(outcome: Outcome) -> ControlNetwork:
-    """Return a network with adjusted coordinates, their covariances a posteriori, residuals and rejections.
+    """Return a network with adjusted coordinates, covariances and residuals.
 
-    What did not count stays as it was read; a point all of whose measures are rejected is rejected.
+    Ignored points and measures are unchanged. A point is rejected if all of its measures are rejected.
     """
     network = outcome.contents.network
     points, measures, ignored = network.points, network.measures, network.is_ignored
@@ -157,17 +156,17 @@ def _updated_network(outcome: Outcome) -> ControlNetwork:
     )
 
 
-CLOSE = 0.01  # Pixels: how far what is seen with the new tables may be from what the trajectory sees
-GRID = 32  # Samples, and lines, at which both are compared: about a thousand points
-HALVINGS = 8  # Of the intervals of a table, at most
+CLOSE = 0.01  # Largest difference (pixels) between projections with the new tables and with the trajectory
+GRID = 32  # Number of samples, and of lines, for the comparison: about a thousand points
+HALVINGS = 8  # Largest number of halvings of the intervals of a table
 
 
 def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
-    """Return the support data of an image with adjusted tables; None of a cube, whose tables are binary.
+    """Return support data with adjusted tables; None for a (binary) cube.
 
-    Positions, velocities, quaternions and angular velocities at the times of their records, and half-way
-    between these as often as it takes for straight joins to see a thousand points within :data:`CLOSE`; an
-    error if that never is. Whatever was not adjusted, and all else, stays as it is.
+    Positions, velocities, quaternions and angular velocities are at the times of the records. The intervals
+    are halved until linear interpolation projects a thousand points within :data:`CLOSE`; otherwise an error
+    is raised. All other contents are unchanged.
     """
     if is_cube(image.path):
         return None
@@ -188,7 +187,7 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
 
 
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:
-    """Return an image on its trajectory as adjusted; what of its tables stays is that of the image alone."""
+    """Return an image on its adjusted trajectory, with its other tables."""
     own, over = adjusted.given, image.solving.over
     table = trajectory_of(image.supported.isd, own.name, interpolation="isis").table
     taken: tuple[str, ...] = ()
@@ -215,7 +214,7 @@ class _Corrected:
         self.table = replace(trajectory_of(self.original, own.name, interpolation="isis"), body=None)
 
     def isd(self, halvings: int) -> Isd:
-        """Return support data with corrected tables, whose intervals are halved so many times."""
+        """Return support data with corrected tables of halved intervals."""
         found = self.original
         if self.places is not None:
             times = _halved(found.position.times, halvings)
@@ -228,7 +227,7 @@ class _Corrected:
         return found
 
     def put(self, document: dict[str, Any], halvings: int) -> None:
-        """Put the corrected tables into a document; of one record there is no other velocity to tell."""
+        """Write the corrected tables into a document; for one record without velocity."""
         isd = self.isd(halvings)
         if self.places is not None:
             own, times = document["instrument_position"], isd.position.times
@@ -252,7 +251,7 @@ class _Corrected:
             own["ephemeris_times"] = times.tolist()
 
     def _before(self, times: Floats) -> Floats:
-        """Return the angles that those of polynomials are added to."""
+        """Return the angles to which the polynomials are added."""
         return to_angles(self._flown(times)[1]) if self.over[1] else np.zeros((len(times), 3))
 
     def _turning(self, total: Polynomials, own: Mapping[str, Any], times: Floats) -> Floats:
@@ -267,13 +266,13 @@ class _Corrected:
         return np.asarray(np.einsum("nij,nj->ni", angle_axes(before + total.at(times)), rates))
 
     def _flown(self, times: Floats) -> tuple[Floats, Floats]:
-        """Return places, and matrices inertial to camera, of the tables as they were."""
+        """Return the positions, and matrices inertial to camera, of the original tables."""
         places, turned, *_ = self.table.flown(times, *np.zeros((2, 0, 3)))
         return places, to_camera(self.original, turned.reshape(-1, 3, 3))
 
 
 def _given(own: Mapping[str, Any], name: str, times: Floats) -> Floats | None:
-    """Return (n, 3) numbers of records at times, joined straight; None where there are none."""
+    """Return (n, 3) record values, interpolated linearly at times; None if missing."""
     if not own.get(name):
         return None
     known, values = np.array(own["ephemeris_times"]), np.array(own[name])
@@ -281,7 +280,7 @@ def _given(own: Mapping[str, Any], name: str, times: Floats) -> Floats | None:
 
 
 def _halved(times: Floats, halvings: int) -> Floats:
-    """Return times, and those that divide their intervals into 2^halvings equal parts."""
+    """Return times of intervals divided into 2^halvings equal parts."""
     parts = 2**halvings
     places = np.arange((len(times) - 1) * parts + 1) / parts
     return np.asarray(np.interp(places, np.arange(len(times)), times))
@@ -290,7 +289,7 @@ def _halved(times: Floats, halvings: int) -> Floats:
 def _total(
     basis: Basis | None, given: Sequence[Coefficient], begun: Floats, adjusted: Floats
 ) -> Polynomials | None:
-    """Return adjusted polynomials; None where there are none."""
+    """Return adjusted polynomials; None without polynomials."""
     if not isinstance(basis, Polynomial) or basis.reference is None or basis.scale is None:
         return None
     total = begun.copy()

@@ -1,4 +1,4 @@
-"""Maps of results for geographic information systems, and point clouds (docs/maps.md)."""
+"""Maps of results for GIS, and point clouds (docs/maps.md)."""
 
 from photogram.formats.maps.files import map_files, point_cloud
 from photogram.formats.maps.layers import Layer, map_layers

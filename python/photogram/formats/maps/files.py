@@ -25,8 +25,8 @@ from photogram.words import phrase
 __all__ = ["check_map", "map_files", "point_cloud"]
 
 GEOPACKAGE, GEOJSON = ".gpkg", (".geojson", ".json")
-WGS84 = "EPSG:4979"  # Of GeoJSON (RFC 7946): longitude, latitude, height above the ellipsoid
-DECIMALS = 9  # Of degrees: 0.1 mm
+WGS84 = "EPSG:4979"  # System of GeoJSON (RFC 7946): longitude, latitude, height above the ellipsoid
+DECIMALS = 9  # Decimals of degrees: 0.1 mm
 _STYLES = """
 CREATE TABLE layer_styles (
     id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,
@@ -55,24 +55,24 @@ def map_files(
     scale: float | None = None,
     sizes: Sequence[tuple[float, float] | None] = (),
 ) -> tuple[dict[Path, bytes], list[str]]:
-    """Return the files of a map, and what is to be said about it.
+    """Return the files of a map, and remarks.
 
     Parameters
     ----------
     result
         The result of a block.
     path
-        `NAME.gpkg`: one file with all layers and their styles. `NAME.geojson`: a file for each layer that
-        has something, `NAME-photos.geojson` ..., each with its style as `.qml` beside; always in WGS 84.
+        `NAME.gpkg`: one file with all layers and their styles. `NAME.geojson`: one file per layer with
+        features, `NAME-photos.geojson` ..., each with its style in a `.qml` file; always in WGS 84.
     crs, scale, sizes
-        As of :func:`map_layers`.
+        As in :func:`map_layers`.
 
     Raises
     ------
     InputError
-        Another suffix, or a system that does not go.
+        If the suffix is unknown, or coordinates cannot be transformed into the system.
     ModuleNotFoundError
-        geopandas or pyogrio are not installed.
+        If geopandas or pyogrio are not installed.
     """
     suffix = check_map(path)
     remarks = []
@@ -95,7 +95,7 @@ def map_files(
 
 
 def check_map(path: Path) -> str:
-    """Return the ending of a file that can be a map."""
+    """Return the suffix of a map file; reject other suffixes."""
     suffix = path.suffix.lower()
     if suffix != GEOPACKAGE and suffix not in GEOJSON:
         raise InputError(phrase("maps.suffix"), file=path)
@@ -113,7 +113,7 @@ def _geopackage(path: Path, layers: Sequence[Layer]) -> dict[Path, bytes]:
 
 
 def _add_styles(path: Path, layers: Sequence[Layer]) -> None:
-    """Put styles where QGIS looks for them, so that the layers open with these."""
+    """Add styles to the table that QGIS reads, so that layers open with them."""
     with closing(sqlite3.connect(path)) as base, base:
         base.execute(_STYLES)
         base.executemany(
@@ -151,7 +151,7 @@ def _write(drawn: Layer, path: Path, driver: str, options: dict[str, str], **mor
     import pyogrio
 
     with warnings.catch_warnings():
-        # That a map has no system is said once for all layers.
+        # One remark reports a missing system for all layers.
         warnings.filterwarnings("ignore", message="'crs' was not provided")
         pyogrio.write_dataframe(
             drawn.table,
@@ -164,7 +164,7 @@ def _write(drawn: Layer, path: Path, driver: str, options: dict[str, str], **mor
 
 
 _Symbol = tuple[str, str, Mapping[str, str]]
-"""Type of the symbol, class of its one layer, and properties of this."""
+"""Symbol type, class of its only layer, and its properties."""
 
 BLUE, RED, GREEN = "31,120,180,255", "214,39,40,255", "51,160,44,255"
 GREY, CLEAR = "90,90,90,255", "0,0,0,0"
@@ -204,7 +204,7 @@ LAYERS: Mapping[str, tuple[str, Sequence[tuple[str, _Symbol]]]] = {
     "check_residuals": ("", [("", _line(GREEN))]),
     "suspicious": ("", [("", _marker("star", "255,127,0,255", 3.6))]),
 }
-"""The attribute by whose values a layer is drawn, if any, and the symbol of each of these."""
+"""The attribute that selects the symbol of a layer, if any, and the symbol of each value."""
 
 
 def style(name: str) -> str:
@@ -225,7 +225,7 @@ def style(name: str) -> str:
     for row, (_, (form, layer, properties)) in enumerate(symbols):
         symbol = SubElement(drawn, "symbol", type=form, name=str(row), alpha="1", clip_to_extent="1")
         inside = SubElement(symbol, "layer", {"class": layer, "enabled": "1", "locked": "0", "pass": "0"})
-        # Versions from 3.26 on read the options, those before 3.18 the properties.
+        # QGIS from version 3.26 reads the options, before 3.18 the properties.
         options = SubElement(inside, "Option", type="Map")
         for key, value in properties.items():
             SubElement(options, "Option", name=key, type="QString", value=value)
@@ -253,7 +253,7 @@ def point_cloud(
 ) -> bytes:
     """Return the adjusted points as PLY (binary, little endian).
 
-    A vertex has `x`, `y`, `z` in double precision, the standard deviations of these as `sd_x`, `sd_y`,
+    A vertex has `x`, `y`, `z` in double precision, their standard deviations `sd_x`, `sd_y`,
     `sd_z`, `sd_max` (the major axis of the standard ellipsoid), and `rays`. Viewers show the further
     properties as scalar fields.
 
@@ -262,16 +262,15 @@ def point_cloud(
     result
         The result of a block or a collection.
     found
-        The same in a coordinate reference system in metres. None: the axes of the block, of a geographic one
-        east, north and up amid its stations.
+        The result in a coordinate reference system in metres. None: the axes of the block, or of a
+        geographic one east, north and up at the mean of its stations.
     origin
-        Taken away from the coordinates, and told in a comment: viewers that calculate in single precision
-        need small numbers.
+        Origin subtracted from the coordinates, for viewers with single precision; a comment contains it.
 
     Raises
     ------
     InputError
-        A system in degrees.
+        If the system is in degrees.
     """
     if found is None:
         rows, places, covariances, what = _own(result)
@@ -290,7 +289,7 @@ def point_cloud(
 
 
 def _own(result: AdjustedNetwork) -> tuple[Indices, Floats, Floats, str]:
-    """Return the points that took part, in metric axes, with covariances and the name of the axes."""
+    """Return used points in metric axes, with covariances and the name of the axes."""
     rows = np.flatnonzero(result.used_points)
     places, covariances = result.point_positions[rows], result.point_covariances[rows]
     if not isinstance(result, Result):

@@ -1,4 +1,4 @@
-"""The layers of a map of a result: geometries with their attributes, as data frames of geopandas."""
+"""Layers of a map of a result, as data frames of geopandas."""
 
 from __future__ import annotations
 
@@ -27,28 +27,29 @@ if TYPE_CHECKING:
 __all__ = ["Layer", "chosen_crs", "map_layers"]
 
 MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
-SUSPICIOUS = 3.0  # Test values beyond are on the map
+SUSPICIOUS = 3.0  # Smallest test value on the map
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("e", "n", "u")
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """A layer.
+    """A layer of a map.
 
     Attributes
     ----------
     name
-        What it is: `photos`, `footprints`, `points`, `point_ellipses`, `control`, `control_residuals`,
-        `check_residuals` or `suspicious`.
+        `photos`, `footprints`, `points`, `point_ellipses`, `control`, `control_residuals`, `check_residuals`
+        or `suspicious`.
     title
-        The same with the scale at which it is drawn, if it has one: `point_ellipses_x200`.
+        The name with the scale of its drawing, if any: `point_ellipses_x200`.
     description
-        In a sentence.
+        One sentence.
     table
-        Geometries and attributes; its `crs` is that of the map, None where the place is not known.
+        Geometries and attributes; its `crs` is the system of the map, None if the position on the earth is
+        unknown.
     left_out
-        How many it might have beside these.
+        Number of omitted features.
     """
 
     name: str
@@ -59,9 +60,9 @@ class Layer:
 
 
 def chosen_crs(result: Result) -> str:
-    """Return the system of a map for which none was asked: that of the frame, or UTM (WGS 84) around it.
+    """Return the default system of a map: the system of the frame, or UTM (WGS 84).
 
-    Empty where nothing says where on the earth the frame is, or lengths are not metres.
+    Empty if the position of the frame on the earth is unknown, or lengths are not metres.
     """
     block, frame = result.block, frame_of(result.block)
     if not has_place(frame) or block.linear_unit != "m":
@@ -74,7 +75,7 @@ def chosen_crs(result: Result) -> str:
 
 
 def placed_middle(result: Result) -> tuple[float, float, float]:
-    """Return latitude, longitude and height amid the stations."""
+    """Return the mean latitude, longitude and height of the stations."""
     from photogram.formats.crs import to_system
 
     earth, _ = to_system("EPSG:4978", result.photo_positions, frame_of(result.block))
@@ -97,26 +98,26 @@ def map_layers(
     result
         The result of a block.
     crs
-        The coordinate reference system of the map. None: that of the frame, or the zone of UTM (WGS 84)
-        around it; where nothing says where on the earth the frame is, coordinates stay as they are and the
-        layers have no system.
+        Coordinate reference system of the map. None: the system of the frame, or its zone of UTM (WGS 84). If
+        the position of the frame on the earth is unknown, layers have the coordinates of the frame, without a
+        system.
     scale
-        By how much error ellipses and residuals are magnified. None: a round number at which they are seen.
+        Magnification of error ellipses and residuals. None: a round number at which they are visible.
     confidence
-        Of the error ellipses.
+        Confidence level of the error ellipses.
     sizes
-        Width and height of the pictures of each camera in the unit of image coordinates; without them
-        footprints reach as far as measurements do.
+        Image width and height of each camera in the unit of image coordinates; without them footprints
+        contain the image observations.
     most
-        Error ellipses at most: those of control and check points, and of every second, third ... of the
-        others. The description of the layer says of how many points they are.
+        Largest number of error ellipses: of control and check points, and of every second, third ... other
+        point. The description of the layer contains the number of points.
 
     Raises
     ------
     InputError
-        A system that does not go.
+        If coordinates cannot be transformed into the system.
     ModuleNotFoundError
-        geopandas is not installed.
+        If geopandas is not installed.
     """
     import geopandas
 
@@ -125,7 +126,7 @@ def map_layers(
     drawn, known = _with_ellipses(found, most)
     few = f" {len(drawn):,} of {known:,}" if len(drawn) < known else ""
     if scale is None:
-        # Sizes in metres beside places in degrees: the spacing is that of the block's own stations.
+        # Sizes are in metres, positions in degrees: the scale follows from the spacing of stations in metres.
         scale = fitting_scale(own, _metric_places(found))
     parts = [
         ("photos", "adjusted stations with standard deviations, metres", *_photos(found)),
@@ -204,7 +205,7 @@ def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _
     rows = np.flatnonzero(known.sum(axis=1) >= 4)
     places = found.carried(outlines[rows][known[rows]])
     of_rings = np.repeat(np.arange(len(rows)), known[rows].sum(axis=1))
-    rings = shapely.linearrings(places, indices=of_rings) if len(rows) else []  # it closes what is open
+    rings = shapely.linearrings(places, indices=of_rings) if len(rows) else []  # Closes open rings
     unit = block.linear_unit
     return shapely.polygons(rings), {
         "photo": np.array(block.photo_ids, dtype=object)[rows],
@@ -226,7 +227,7 @@ def _points(found: Placed) -> _Part:
 
 
 def _with_ellipses(found: Placed, most: int) -> tuple[Indices, int]:
-    """Return which points get an ellipse, and how many might."""
+    """Return the points with an ellipse, and the number of candidates."""
     known = np.flatnonzero(np.isfinite(found.point_covariances).all(axis=(1, 2)))
     if len(known) <= most:
         return known, len(known)
@@ -255,7 +256,7 @@ def _ellipses(found: Placed, known: Indices, confidence: float, scale: float) ->
 
 
 def _given(found: Placed, differences: tuple[Indices, Floats]) -> tuple[Indices, Floats, Floats]:
-    """Return rows of points, where they were given, and (c, 3) steps from there to the adjusted places."""
+    """Return rows of points, given positions, and (c, 3) differences."""
     rows, steps = differences
     places = {row: k for k, row in enumerate(found.rows.tolist())}
     adjusted = found.points[[places[row] for row in rows.tolist()]]
@@ -288,7 +289,7 @@ def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: 
 
 
 def _suspicious(found: Placed) -> _Part:
-    """Return observations whose test values stand out, the largest first."""
+    """Return observations with large test values, the largest first."""
     import shapely
 
     result = found.result
@@ -306,7 +307,7 @@ def _suspicious(found: Placed) -> _Part:
     return shapely.points(np.array([at for at, _ in rows])) if rows else [], columns
 
 
-_Suspect = tuple[Floats, dict[str, Any]]  # The place of an observation, and what is said of it
+_Suspect = tuple[Floats, dict[str, Any]]  # The position of an observation, and its attributes
 
 
 def _images(result: Result, tests: Floats, places: Floats) -> Iterator[_Suspect]:
@@ -385,7 +386,7 @@ def _beside_images(found: Placed, places: Floats) -> Iterator[_Suspect]:
 
 
 def _flown(found: Placed, moment: Moment) -> Floats:
-    """Return where an adjusted trajectory was at a time, on the map."""
+    """Return the position on the map of an adjusted trajectory at a time."""
     result, spheroid = found.result, found.result.block.spheroid
     own = result.trajectories[moment.trajectory.name]
     places, *_ = own.given.flown(np.array([moment.time]), own.position, own.rotation)
@@ -416,7 +417,7 @@ def _ids(found: Placed) -> np.ndarray[Any, Any]:
 
 
 def _metric_places(found: Placed) -> Floats:
-    """Return (k, 2) places in metres, for the distances between them."""
+    """Return (k, 2) positions in metres, for the distances between them."""
     if found.names[0] != "longitude" or not len(found.points):
         return found.points[:, :2]
     one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]

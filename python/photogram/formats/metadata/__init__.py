@@ -1,1 +1,1 @@
-"""Positions of photos, and how good they are, from what files of photographs already carry."""
+"""Positions of photos and their accuracy from metadata of photograph files."""

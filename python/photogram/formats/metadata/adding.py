@@ -1,4 +1,4 @@
-"""Positions of photographs in their systems, as observations of a project and as plain tables."""
+"""Positions of photographs as observations of a project and as tables."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ from photogram.network.unknowns import LeverArm, Shift
 from photogram.words import Phrase, option_sd, phrase
 
 SIMILAR = 10.0  # Least improvement of the fit by a similarity transformation
-DETERMINED = 3.0  # How much wider than their misfit positions must spread across their line to turn a model
+DETERMINED = 3.0  # Smallest ratio of spread across the line to misfit for positions that rotate a model
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
-    """Return a project with the positions of a file `--gnss`, and of the files of its photographs."""
+    """Return a project with positions of `--gnss` and of photo files."""
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
     files = wishes.photos or (None if own is None else own.photo_files)
@@ -57,10 +57,10 @@ def with_wished_photos(project: Project, wishes: Wishes) -> Project:
 def with_gnss_file(
     project: Project, file: GnssFile, sd: Mapping[str, tuple[float, ...]], directory: Path | None = None
 ) -> Project:
-    """Return a project with the positions of a file as observations, which replace those of the project.
+    """Return a project whose positions are replaced by those in a file.
 
-    `sd` are standard deviations by table, of which `gnss` applies to positions without one; `directory` is
-    the folder of all photographs, in whose order events belong to photos.
+    `sd` are standard deviations by table; `gnss` applies to positions without one. `directory` is the folder
+    of all photographs, whose order assigns events to photos.
     """
     metadata = read_gnss_file(file.path, project.block.photo_ids, directory, mrk_antenna=file.mrk_antenna)
     keys = _keys(project, metadata, weighted_only=True)
@@ -78,13 +78,12 @@ def with_gnss_file(
 
 
 def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple[float, ...]]) -> Project:
-    """Return a project with the positions that files of its photographs carry, as observations.
+    """Return a project with positions in photo files as observations.
 
-    Photos whose position is observed already keep that. Positions with standard deviations of a receiver with
-    corrections in real time have a shift of 0.05 m a priori in common in a flight, and a lever arm of 0.01 m:
-    they leave out the errors of the base and of the shutter's time. A model without a place on the earth is
-    carried onto the positions. `sd` are standard deviations by table; those of `gnss` where no source has
-    any.
+    Photos with an observed position are unchanged. RTK positions with standard deviations share a shift (0.05
+    m a priori) and a lever arm (0.01 m) per flight. These represent errors of the base and of the shutter
+    time. A model without georeference is transformed to the positions. `sd` are standard deviations by table;
+    `gnss` applies to positions without one.
     """
     metadata = read_metadata(files.directory, mrk_antenna=files.mrk_antenna)
     return _with_positions(project, metadata, _keys(project, metadata), files.crs, sd, PHOTOS_CRS)
@@ -99,7 +98,7 @@ def _with_positions(
     option: str,
     antenna: tuple[float, float, float, float] | None = None,
 ) -> Project:
-    """Return a project with positions of the photos that `keys` names, as observations."""
+    """Return a project with positions of the photos in `keys` as observations."""
     records = {name: metadata.photos[key] for name, key in keys.items()}
     there = [name for name, each in records.items() if each.position is not None]
     photos = [name for name in there if records[name].deviations is not None or "gnss" in sd]
@@ -125,9 +124,9 @@ def _with_positions(
 
 
 def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) -> dict[str, str]:
-    """Return the name in the metadata of each photo whose position has no observation yet.
+    """Return the name in the metadata of each photo without observed position.
 
-    With `weighted_only` only weighted positions of photos count, and no other observation.
+    If `weighted_only`, only weighted photo positions count as observed.
     """
     block = project.block
     observed = {each.photo for each in block.observations if isinstance(each, Position) and not weighted_only}
@@ -155,7 +154,7 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
 def _told(
     metadata: Metadata, known: Located, antenna: tuple[float, float, float, float] | None
 ) -> list[Message]:
-    """Return what is said of positions that are observations: their sources, and what they have in common."""
+    """Return messages on position observations: sources, and shared parameters."""
     records = known.records
     positions = told(counts(each.position for each in records))
     sources = counts(each.deviations for each in records)
@@ -170,7 +169,7 @@ def _told(
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
-    """Return a project with a place on the earth, and positions and covariances in its frame."""
+    """Return a georeferenced project, and positions and covariances in its frame."""
     from photogram.formats.crs import amid, from_frame, has_place
 
     frame = project.frame
@@ -201,7 +200,7 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
 
 
 def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) -> Project:
-    """Carry a model onto the positions of its photos; without enough of them its poses are not kept."""
+    """Transform a model to photo positions; without enough, remove poses."""
     block = project.block
     places = {name: row for row, name in enumerate(block.photo_ids)}
     model = block.photo_positions[[places[each] for each in photos]]
@@ -234,7 +233,7 @@ def _observations(
     covariances: Floats,
     antenna: tuple[float, float, float, float] | None,
 ) -> list[Position]:
-    """Return the observations, with the unknowns that positions of a flight have in common."""
+    """Return the position observations, with the shared parameters of a flight."""
     *arm, arm_sd = antenna or (0.0, 0.0, 0.0, LEVER_SD)
     groups = [record.flight if record.rtk or (antenna and arm_sd) else "" for record in known.records]
     taken = {own.title for each in project.block.observations for own in each.unknowns if own is not None}
@@ -258,8 +257,8 @@ def _observations(
     ]
 
 
-SHIFT_SD = 0.05  # Metres: a priori standard deviation of the shift that positions of a flight have in common
-LEVER_SD = 0.01  # Metres: that of a lever arm which is already applied
+SHIFT_SD = 0.05  # Metres: a-priori standard deviation of the common shift of positions of a flight
+LEVER_SD = 0.01  # Metres: a-priori standard deviation of a lever arm that is already applied
 ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
 PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"  # Options that name the system of positions
 _UNKNOWN = "above the geoid or above the ellipsoid"
@@ -286,11 +285,11 @@ class Located:
 
     @property
     def flights(self) -> list[str]:
-        """The flight of each position that has a shift and a lever arm in common with others; else empty."""
+        """The flight of each position with a shared shift and lever arm; otherwise empty."""
         return [each.flight if each.rtk else "" for each in self.records]
 
     def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
-        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it."""
+        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and remarks."""
         from photogram.formats.crs import to_frame
 
         turned = covariances_of(self.sd)
@@ -302,9 +301,9 @@ class Located:
         return xyz, turned, remarks
 
     def geographic(self) -> tuple[Floats, Floats]:
-        """Return (n, 3) longitudes, latitudes (degrees), heights above the ellipsoid (WGS 84), and (n, 3) sd.
+        """Return (n, 3) longitudes, latitudes (deg), ellipsoidal heights, and sd.
 
-        What already is so stays as it stands.
+        Positions that are already in this system are not changed.
         """
         if set(self.systems) <= {ELLIPSOIDAL}:
             return self.xyz, self.sd
@@ -322,11 +321,11 @@ def located(
     sd: Sequence[float] | None = None,
     option: str = PHOTOS_CRS,
 ) -> Located:
-    """Return the positions of photos that have one; heights have to be of one kind.
+    """Return the positions of photos; all heights have one reference.
 
-    `crs` is the system of positions whose source does not say it, or not what heights are above; `sd` are
-    standard deviations where no source has any: one number or three, metres. `option` names the system;
-    positions of `--gnss` without any system are in the frame of the project, and their system is empty.
+    `crs` is the system of positions if their source does not name it or the reference of its heights. `sd`
+    are default standard deviations: one number or three, metres. `option` names the system. Positions of
+    `--gnss` without a system are in the frame of the project, and their system is empty.
     """
     known = [each for each in records if each.position is not None]
     said = [each.position for each in known if each.position is not None]
@@ -346,7 +345,7 @@ def located(
 
 
 def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
-    """Return the system of each position: its own, else the one that a user names; empty without both."""
+    """Return the system of each position: its own, else `crs`, else empty."""
     from photogram.formats.crs import is_on
 
     if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
@@ -375,7 +374,7 @@ def _check_heights(
 
 
 def _kind(said: Said, system: str) -> str:
-    """Return what heights are above."""
+    """Return the reference surface of heights."""
     if said.heights == SEA_LEVEL:
         return ABOVE[True]
     return ABOVE[_is_above_geoid(system)] if system else _UNKNOWN
@@ -390,7 +389,7 @@ def _is_above_geoid(system: str) -> bool:
 def gnss_files(
     metadata: Metadata, path: Path, crs: str | None = None, sd: Sequence[float] | None = None
 ) -> dict[Path, bytes]:
-    """Return a table `gnss` of a plain project, and `gnss_groups` beside it where positions need it."""
+    """Return a table `gnss` of a plain project, and `gnss_groups` if needed."""
     known = located(list(metadata.photos.values()), crs, sd)
     if not known.records:
         raise InputError(phrase("format.missing", what="positions of photos"), file=metadata.directory)
@@ -402,7 +401,7 @@ def gnss_files(
 
 
 def _positions(known: Located) -> dict[str, Any]:
-    """Return the columns: names of photos without their folders, where that is enough."""
+    """Return the columns of positions; photo names have folders only if necessary."""
     xyz, sd = known.geographic()
     names = {each.photo: PurePosixPath(each.photo).name for each in known.records}
     often = Counter(names.values())
@@ -417,7 +416,7 @@ def _positions(known: Located) -> dict[str, Any]:
 
 
 def _groups(flights: Sequence[str]) -> dict[str, Any]:
-    """Return the columns of what positions of a flight have in common."""
+    """Return the columns of the shared parameters of flights."""
     count = len(flights)
     columns: dict[str, Any] = {"group": list(flights), "shift": ["true"] * count}
     for kind, deviation in (("lever", LEVER_SD), ("shift", SHIFT_SD)):

@@ -1,4 +1,4 @@
-"""What a folder of photographs says of each photo, by precedence: position and standard deviations apart."""
+"""Metadata of each photo of a folder, by priority of sources."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ WITHOUT = "without"
 
 @dataclass(frozen=True)
 class PhotoRecord:
-    """What is known of one photo.
+    """Position and accuracy of one photo.
 
     Attributes
     ----------
     photo
-        Its path below the folder.
+        Path relative to the folder.
     flight
-        Its folder; with several .MRK files in a folder also what its own is called.
+        Folder of the photo; if the folder has several .MRK files, also the name of its file.
     position
-        What says where it was taken: position, system, flag, angles; None without a position.
+        Source of the position: position, system, flag, angles; None without a position.
     deviations
-        What says how good that is, with the standard deviations of east, north and height in metres; None
-        without usable ones. It may be another source than that of the position.
+        Source of the standard deviations of east, north and height in metres; None without usable ones. It
+        may differ from the source of the position.
     """
 
     photo: str
@@ -59,23 +59,23 @@ class PhotoRecord:
 
     @property
     def rtk(self) -> bool:
-        """Whether it is of a receiver with corrections in real time, and as good as that says itself."""
+        """Whether a receiver with real-time corrections provided the accuracy."""
         source = self.deviations or self.position
         return source is not None and source.rtk
 
 
 @dataclass(frozen=True, repr=False)
 class Metadata(Brief):
-    """What a folder of photographs says of where its photos were taken.
+    """Positions of photos from the metadata of a folder of photographs.
 
     Attributes
     ----------
     directory
         The folder, or the file with positions.
     photos
-        By their paths below the folder, or their names in the file.
+        Records by path relative to the folder, or by name in the file.
     tables, pictures
-        Files that were read: tables and .MRK files, and pictures, of these the heads.
+        Files that were read: tables and .MRK files, and image files (headers only).
     messages
         Remarks.
     """
@@ -87,12 +87,12 @@ class Metadata(Brief):
     messages: tuple[Message, ...]
 
     def sources(self) -> dict[str, int]:
-        """Return how many positions have standard deviations of each source, and how many have none."""
+        """Count positions by source of their standard deviations, or without any."""
         located = [each for each in self.photos.values() if each.position is not None]
         return counts(each.deviations for each in located)
 
     def sections(self) -> list[TitledLines]:
-        """Return what was read as titled sections: for people."""
+        """Return a summary for users as titled sections."""
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]
         flights: dict[str, list[PhotoRecord]] = {}
@@ -116,12 +116,12 @@ class Metadata(Brief):
 
 
 def counts(sources: Iterable[Said | None]) -> dict[str, int]:
-    """Return how often each source is there; :data:`WITHOUT` for none."""
+    """Return the number of records of each source; :data:`WITHOUT` without source."""
     return dict(Counter(WITHOUT if each is None else each.source for each in sources))
 
 
 def told(sources: Mapping[str, int]) -> str:
-    """Return counts of sources in words: 118 of .MRK, 2 of XMP, 1 without."""
+    """Format counts of sources: 118 of .MRK, 2 of XMP, 1 without."""
     rest = [f"{sources[WITHOUT]} {WITHOUT}"] if WITHOUT in sources else []
     return (
         ", ".join([f"{count} of {name}" for name, count in sources.items() if name != WITHOUT] + rest)
@@ -130,19 +130,19 @@ def told(sources: Mapping[str, int]) -> str:
 
 
 def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = False) -> Metadata:
-    """Read where photos were taken, and how well, from what their files already say.
+    """Read positions and accuracies of photos from files of a folder.
 
-    Heads of pictures (EXIF, XMP of DJI and Pix4D), `*_Timestamp.MRK`, `geo.txt`, references of Metashape and
-    geolocations of Pix4D, in a folder and those in it. geo.txt and references count before .MRK, before XMP,
-    before EXIF, for positions and standard deviations apart.
+    Sources are image headers (EXIF, XMP of DJI and Pix4D), `*_Timestamp.MRK`, `geo.txt`, references of
+    Metashape and geolocations of Pix4D. The priority is geo.txt and references, .MRK, XMP, EXIF, separately
+    for positions and standard deviations.
 
     Parameters
     ----------
     directory
         The folder.
     mrk_antenna
-        Whether positions of .MRK files are those of the antenna: then their offsets carry them to the camera.
-        As DJI writes them, they are those of the camera.
+        Whether positions of .MRK files are antenna positions, which their offsets reduce to the camera.
+        Original DJI files contain camera positions.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     Raises
     ------
     InputError
-        Nothing in the folder says anything, a file is at fault, pillow is not installed
+        If the folder contains no metadata, a file is invalid, or pillow is not installed
         (`pip install 'photogram[photos]'`).
 
     Notes
@@ -171,7 +171,7 @@ def metadata_of(
     pictures: Sequence[Path],
     messages: Sequence[Message],
 ) -> Metadata:
-    """Return the record of each photo by its sources, of which the first that has a value counts."""
+    """Return the record of each photo; the first source with a value has priority."""
     photos, without_height = {}, []
     for key, sources in said.items():
         position = next((each for each in sources if each.is_located), None)
@@ -188,7 +188,7 @@ def metadata_of(
 
 
 def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
-    """Return what is to be said of the solutions and accuracies of some photos."""
+    """Return remarks on RTK solutions and accuracies of photos."""
     fixes: dict[str, list[str]] = {}
     remarks: dict[str, int] = {}
     for each in records:
@@ -213,8 +213,8 @@ def read_gnss_file(
 ) -> Metadata:
     """Read the positions of a file by the names of photos.
 
-    `directory`: folder of all photographs; None: those of the project are all. Events belong to photos in
-    their order; `mrk_antenna`: whether positions of .MRK files are antenna positions.
+    `directory`: folder of all photographs; None: the photos of the project. The order of photos assigns
+    events to them. `mrk_antenna`: whether positions of .MRK files are antenna positions.
     """
     messages: list[Message] = []
     first = next((place.text or "" for place in filled_lines(path)), "").strip()
@@ -235,7 +235,7 @@ def read_gnss_file(
 def _of_exposures(
     path: Path, photos: Sequence[str], messages: list[Message], *, antenna: bool
 ) -> Mapping[str, Said]:
-    """Return exposures of an .MRK file by the photos whose names contain their numbers."""
+    """Return exposures of an .MRK file by photo, by number in its name."""
     exposures = read_exposures(path)
     if not exposures:
         raise InputError(phrase("format.missing", what="exposures"), file=path)
@@ -257,7 +257,7 @@ def _of_exposures(
 
 
 def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Mapping[str, Said]:
-    """Return events by photos: both in order of time, or photos in order of their names."""
+    """Return events by photo, matched in order of time, or in order of photo names."""
     events = read_events(path)
     names, times = _in_order(photos, directory)
     if len(names) != len(events):
@@ -270,7 +270,7 @@ def _of_events(path: Path, photos: Sequence[str], directory: Path | None) -> Map
 
 
 def _in_order(photos: Sequence[str], directory: Path | None) -> tuple[list[str], list[float]]:
-    """Return photos in the order of their exposures, and their times in seconds; none without EXIF."""
+    """Return photos and times (seconds) in the order of exposure; empty without EXIF."""
     if directory is None:
         return sorted(photos, key=natural_order), []
     pictures = {
@@ -290,7 +290,7 @@ def _in_order(photos: Sequence[str], directory: Path | None) -> tuple[list[str],
 def _check_intervals(
     path: Path, events: Sequence[Event], names: Sequence[str], times: Sequence[float]
 ) -> None:
-    """Reject events whose intervals are not the intervals between the pictures."""
+    """Reject events whose intervals do not fit the image files."""
     for (first, second), (before, after), name in zip(
         pairwise(events), pairwise(times), names[1:], strict=True
     ):

@@ -1,8 +1,8 @@
-"""The heads of pictures: EXIF and XMP of JPEG, TIFF and DNG, without decoding (extra `photos`).
+"""Metadata in image headers: EXIF and XMP (extra `photos`).
 
-Of EXIF: a position in degrees, minutes and seconds, a height, a radial accuracy. Of packets of XMP: positions
-and standard deviations of DJI, accuracies of Pix4D. Metadata tools rewrite their attributes as nested
-elements and the other way: both are read, by their namespaces.
+EXIF contains position (degrees, minutes, seconds), height and radial accuracy. XMP packets contain positions
+and standard deviations of DJI, and accuracies of Pix4D. Some tools convert XMP attributes to nested elements
+or back; both are read, by namespace.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ from photogram.io.places import Place
 from photogram.words import phrase
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
-GPS = 0x8825  # The tag of EXIF that leads to those of GPS
+GPS = 0x8825  # The EXIF tag that points to the GPS tags
 _EXIF, _TAKEN, _FRACTION = 0x8769, 0x9003, 0x9291
-"""Tags of EXIF: to its own tags, and of these DateTimeOriginal and SubSecTimeOriginal."""
+"""EXIF tags: pointer to the EXIF group, and in it DateTimeOriginal and SubSecTimeOriginal."""
 
 LATITUDE, LONGITUDE, ALTITUDE_REFERENCE, ALTITUDE, STATUS, DOP, ERROR = 2, 4, 5, 6, 9, 11, 31
-"""Tags by their numbers (EXIF 2.32, table 15); the letter of a coordinate is the tag before it."""
+"""Tags by number (EXIF 2.32, table 15); the letter of a coordinate is the previous tag."""
 RADIAL = (
     "GPSHPositioningError of EXIF is radial, and the standard does not say how sure: standard deviations of"
     " east and north are its value over the root of 2, of heights twice that"
 )
 DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
 DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
-LARGEST = 1 << 20  # Bytes of a packet at most; those of cameras have a few thousand
-_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # What older cameras write
+LARGEST = 1 << 20  # Largest size of a packet in bytes; cameras write a few thousand
+_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # Spelling of older cameras
 
 
 def said_by_picture(path: Path) -> list[Said]:
-    """Return what the head of a picture says: of its XMP, then of its EXIF; nothing where neither speaks."""
+    """Return metadata of an image file: XMP, then EXIF."""
     packet, tags = _head(path, GPS)
     found = [None if packet is None else said_by_packet(packet, path), said_by_tags(tags, Place(path))]
     return [each for each in found if each is not None]
 
 
 def time_of_picture(path: Path) -> float | None:
-    """Return the time at which a picture was taken by its EXIF, seconds; None without one."""
+    """Return the EXIF time of exposure in seconds; None without."""
     tags = _head(path, _EXIF)[1]
     try:
         time = datetime.strptime(str(tags[_TAKEN]).strip("\0 "), "%Y:%m:%d %H:%M:%S")
@@ -65,9 +65,10 @@ def time_of_picture(path: Path) -> float | None:
 
 
 def _head(path: Path, group: int) -> tuple[bytes | None, Mapping[int, Any]]:
-    """Return the packet of XMP and a group of EXIF tags of a picture.
+    """Return the XMP packet and a group of EXIF tags of an image file.
 
-    The class of the format is opened itself: Image.open refuses large pictures, which are not decoded here.
+    The class of the format opens the file because Image.open rejects large images, which are not decoded
+    here.
     """
     try:
         from PIL.JpegImagePlugin import JpegImageFile
@@ -78,23 +79,23 @@ def _head(path: Path, group: int) -> tuple[bytes | None, Mapping[int, Any]]:
     with reading(path):
         file = path.open("rb")
     with file, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of tags that are damaged and not asked for
+        warnings.simplefilter("ignore")  # About damaged tags that are not used
         try:
             with kind(file) as picture:
                 packet = picture.info.get("xmp")
                 tags = dict(picture.getexif().get_ifd(group))
-        except Exception as error:  # whatever a damaged file makes the library raise
+        except Exception as error:  # A damaged file may raise any exception
             raise InputError(phrase("photos.picture", reason=str(error)), file=path) from None
     return (packet if isinstance(packet, bytes) else None), tags
 
 
 def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
-    """Return what the GPS tags of a picture say; None where there is neither a position nor an accuracy.
+    """Return the position and accuracy in GPS tags; None without both.
 
-    Section 6 of the specification. `GPSHPositioningError` is horizontal and radial: east and north have its
-    value over the root of 2, heights twice that. `GPSAltitudeRef` 0 and 1 were sea level up to EXIF 2.32, and
-    are the ellipsoid from EXIF 3.0 on, which has 2 and 3 for sea level: what heights of 0 and 1 are above is
-    not certain, and who reads them says it.
+    Section 6 of the specification. `GPSHPositioningError` is horizontal and radial: the standard deviation of
+    east and north is its value divided by the root of 2, of heights twice that. `GPSAltitudeRef` 0 and 1 mean
+    sea level up to EXIF 2.32 and the ellipsoid from EXIF 3.0, which has 2 and 3 for sea level. The reference
+    of heights with 0 and 1 is therefore unknown, and the user must specify it.
     """
     error = _tag(tags, ERROR, place)
     each = error / math.sqrt(2)
@@ -108,7 +109,7 @@ def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
 
 
 def _tag(tags: Mapping[int, Any], tag: int, place: Place) -> float:
-    """Return a tag as a number; NaN where it is not there, or has no denominator."""
+    """Return a tag as a number; NaN if it is missing or its denominator is 0."""
     value = tags.get(tag)
     return math.nan if value is None else _as_tag(value, place, tag)
 
@@ -124,7 +125,7 @@ def _as_tag(value: Any, place: Place, tag: int) -> float:
 
 
 def _reference(tags: Mapping[int, Any], place: Place) -> int:
-    """Return the altitude reference: 0, 1, 2 or 3; 0 where there is none."""
+    """Return the altitude reference 0, 1, 2 or 3; default 0."""
     value = tags.get(ALTITUDE_REFERENCE, 0)
     if isinstance(value, bytes) and len(value) == 1:
         value = value[0]
@@ -134,7 +135,7 @@ def _reference(tags: Mapping[int, Any], place: Place) -> int:
 
 
 def _position_of_tags(tags: Mapping[int, Any], place: Place) -> Triple | None:
-    if str(tags.get(STATUS, "")).strip("\0 ").upper() == "V":  # the receiver had no fix
+    if str(tags.get(STATUS, "")).strip("\0 ").upper() == "V":  # The receiver had no solution
         return None
     latitude = _angle(tags, LATITUDE, "NS", place)
     longitude = _angle(tags, LONGITUDE, "EW", place)
@@ -146,7 +147,7 @@ def _position_of_tags(tags: Mapping[int, Any], place: Place) -> Triple | None:
 
 
 def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> float:
-    """Return a latitude or longitude in degrees; NaN where it is not there."""
+    """Return a latitude or longitude in degrees; NaN if it is missing."""
     value = tags.get(tag)
     if value is None:
         return math.nan
@@ -161,14 +162,14 @@ def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> flo
 
 
 class _WithoutDoctype(ElementTree.TreeBuilder):
-    """A tree of a document that declares nothing: what entities could do is not begun."""
+    """An XML tree builder that rejects document types, and so entities."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         raise ValueError("has a <!DOCTYPE, which no packet needs: it is not read")
 
 
 def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
-    """Return the simple properties of a packet by namespace (without a slash at its end) and name."""
+    """Return simple properties of a packet by namespace and name."""
     place = Place(path)
     if len(data) > LARGEST:
         raise place.error(phrase("photos.packet", n=len(data), most=LARGEST))
@@ -190,11 +191,11 @@ def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
 
 
 def said_by_packet(data: bytes, path: Path) -> Said | None:
-    """Return what a packet of XMP says of its photo; None where it says nothing.
+    """Return the position and accuracy in an XMP packet; None without both.
 
     Section 6 of the specification: `RtkStdLon`, `RtkStdLat` and `RtkStdHgt` are the standard deviations of
-    east, north and height; without a solution they are not taken. Heights are above the ellipsoid where the
-    camera has had corrections, else nothing says what they are above.
+    east, north and height, unused without a solution. Heights are ellipsoidal if the receiver had
+    corrections; otherwise their reference is unknown.
     """
     properties = _properties(data, path)
     if not properties:
@@ -223,7 +224,7 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
 
 
 def _number(properties: Mapping[str, str], name: str, place: Place) -> float:
-    """Return a property as a number; NaN where it is not there."""
+    """Return a property as a number; NaN if it is missing."""
     if name not in properties:
         return math.nan
     return Place(place.file, text=f"{name} {properties[name]}").number(properties[name], name)

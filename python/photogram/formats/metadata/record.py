@@ -1,4 +1,4 @@
-"""Positions of photos by one source each: `Said`, files `.MRK` of DJI, and events of RTKLIB."""
+"""Positions of photos: class `Said`, `.MRK` files, events of RTKLIB."""
 
 from __future__ import annotations
 
@@ -19,46 +19,45 @@ from photogram.words import phrase
 
 Triple = tuple[float, float, float]
 
-ELLIPSOIDAL = "EPSG:4979"  # Longitude and latitude of WGS 84, heights above its ellipsoid
-UNSAID_SYSTEM = "EPSG:4326"  # Longitude and latitude of WGS 84, where nothing says what heights are above
+ELLIPSOIDAL = "EPSG:4979"  # Longitude and latitude of WGS 84, ellipsoidal heights
+UNSAID_SYSTEM = "EPSG:4326"  # Longitude and latitude of WGS 84, heights of unknown reference
 
 UNSAID, SEA_LEVEL = "unsaid", "above sea level"
-"""Heights of which the source does not say what they are above; and those of which it does, but not where the
-geoid is."""
+"""Heights whose reference is unknown; and heights above sea level with an unknown geoid."""
 
 FIXED = "fixed"
-HIGHEST = 1e5  # Metres that a height, or a standard deviation, may be at most
-LEAST = 1e-6  # Metres that a standard deviation is at least
+HIGHEST = 1e5  # Largest height or standard deviation, metres
+LEAST = 1e-6  # Smallest standard deviation, metres
 
 
 @dataclass(frozen=True)
 class Said:
-    """What one source says of one photo.
+    """Position and accuracy of one photo from one source.
 
     Attributes
     ----------
     source
         `geo.txt`, `reference`, `.MRK`, `XMP` or `EXIF`.
     place
-        Where it stands, for errors and remarks.
+        Location in the file, for errors and remarks.
     crs
-        The system of the position; empty where the source does not say it.
+        System of the position; empty if unknown.
     heights
-        Empty: those of the system; else :data:`UNSAID` or :data:`SEA_LEVEL`.
+        Empty: as in the system; otherwise :data:`UNSAID` or :data:`SEA_LEVEL`.
     position
-        Longitude (degrees) or easting, latitude or northing, height; the height is NaN without one. None: the
-        source has no position.
+        Longitude (degrees) or easting, latitude or northing, height; the height is NaN if unknown. None: no
+        position.
     sd
         Standard deviations of east, north and height, metres; None without usable ones.
     rtk
-        Whether they are internal ones of a receiver with corrections in real time.
+        Whether they are internal accuracies of a receiver with real-time corrections.
     flag, fix
-        What DJI writes of the solution, and what it means: `fixed`, `float`, `single`, `none`, `unknown`;
-        empty where the source has no word for it.
+        DJI code of the solution, and its meaning: `fixed`, `float`, `single`, `none`, `unknown`; empty
+        without a code.
     angles
-        Three angles in degrees as the source has them (yaw, pitch, roll); they are no observations.
+        Three angles in degrees of the source (yaw, pitch, roll); they are not observations.
     remark
-        What is to be said of all photos with such a source, if anything.
+        Remark on all photos with this source; may be empty.
     """
 
     source: str
@@ -74,7 +73,7 @@ class Said:
 
     @property
     def fix(self) -> str:
-        """What the flag means."""
+        """Meaning of the flag."""
         return fix_of(self.flag) if self.rtk or self.flag is not None else ""
 
     @property
@@ -84,7 +83,7 @@ class Said:
 
 
 def fix_of(flag: int | None) -> str:
-    """Return what a flag of DJI means (`RtkFlag` of XMP, `Q` of .MRK; section 6 of the specification)."""
+    """Return the meaning of a DJI flag (`RtkFlag` of XMP, `Q` of .MRK)."""
     if flag is None:
         return "unknown"
     if 50 <= flag <= 59:
@@ -93,16 +92,17 @@ def fix_of(flag: int | None) -> str:
 
 
 def usable_deviations(east: float, north: float, height: float) -> Triple | None:
-    """Return standard deviations; None where one of them is not positive or not there (NaN).
+    """Return standard deviations; None if one is missing or not positive.
 
-    A receiver without a solution writes 0: that is no accuracy, nor is what no receiver has.
+    A receiver without a solution writes 0. Values outside :data:`LEAST` and :data:`HIGHEST` are not usable
+    either.
     """
     found = (east, north, height)
     return found if all(LEAST <= each <= HIGHEST for each in found) else None
 
 
 def geographic_position(place: Place, values: Sequence[float]) -> Triple | None:
-    """Return longitude, latitude (degrees) and height of a source; None for 0, 0, which is no position."""
+    """Return longitude, latitude (degrees), height; None for 0, 0."""
     longitude, latitude, height = values
     if not (abs(longitude) <= 180 and abs(latitude) <= 90):
         raise place.error(phrase("photos.degrees", longitude=longitude, latitude=latitude))
@@ -119,11 +119,11 @@ LARGEST_FLAG = 1000
 
 @dataclass(frozen=True)
 class Exposure:
-    """A line of a file: an exposure by its number, from 1, and when it was, in seconds of a week of GPS.
+    """An exposure of an .MRK file: number, from 1, and GPS seconds of week.
 
-    `offset` leads from the antenna to the camera: north, east, down, metres; `position` is longitude,
-    latitude (degrees) and height above the ellipsoid, of the camera; `sd` are those of east, north and
-    height, metres; `flag` is that of the solution, as `fix_of` knows it.
+    `offset` is the vector from antenna to camera: north, east, down, metres; `position` is longitude,
+    latitude (degrees) and ellipsoidal height of the camera; `sd` are standard deviations of east, north and
+    height, metres; `flag` is the code of the solution, see `fix_of`.
     """
 
     number: int
@@ -136,7 +136,7 @@ class Exposure:
     place: Place
 
     def said(self, antenna: bool) -> Said:
-        """Return what the line says of its photo; `antenna`: its position is that of the antenna."""
+        """Return the metadata; `antenna`: the position is an antenna position."""
         position = self.position
         if antenna and position is not None:
             position = _moved(position, self.offset)
@@ -145,7 +145,7 @@ class Exposure:
 
 
 def _moved(position: Triple, offset: Triple) -> Triple:
-    """Return a position moved north, east and down by metres."""
+    """Return a position shifted north, east and down by metres."""
     longitude, latitude, height = position
     known = np.array([[math.radians(longitude), math.radians(latitude), height]])
     lengths = lengths_of_units(known, Spheroid.wgs84())[0]
@@ -158,22 +158,22 @@ def _moved(position: Triple, offset: Triple) -> Triple:
 
 
 def number_of(stem: str) -> int | None:
-    """Return the number of an exposure from the name of its photo: `DJI_0042`, `..._0042_V`; None without."""
+    """Return the exposure number of `DJI_0042`, `..._0042_V`; None without."""
     found = _NUMBER.findall(stem)
     return int(found[-1]) if found else None
 
 
 def prefix_of(path: Path) -> str:
-    """Return what the photos of a file are called before their numbers, if they are called as it is."""
+    """Return the name of a file before its number: the prefix of its photo names."""
     match = _NAME.match(path.stem)
     return match[1] if match else path.stem
 
 
 def read_exposures(path: Path) -> dict[int, Exposure]:
-    """Read a file; return its exposures by their numbers.
+    """Read the exposures of an .MRK file by number.
 
-    Section 6 of the specification: tabs between number, seconds of the week, `[week]`, `dN,N`, `dE,E`, `dV,V`
-    in millimetres, `lat,Lat`, `lon,Lon`, `h,Ellh`, `sN, sE, sV` in metres, and `flag,Q`.
+    Section 6 of the specification: tab-separated number, seconds of the week, `[week]`, `dN,N`, `dE,E`,
+    `dV,V` in millimetres, `lat,Lat`, `lon,Lon`, `h,Ellh`, `sN, sE, sV` in metres, and `flag,Q`.
     """
     found: dict[int, Exposure] = {}
     for record, line in enumerate(read_lines(path), 1):
@@ -240,7 +240,7 @@ class Event:
 
 
 def is_events(path: Path) -> bool:
-    """Whether a text file has the header of RTKLIB's solutions."""
+    """Return whether a text file has the header of RTKLIB solutions."""
     return any(_is_header(line) for line in islice(read_lines(path), HEADER_LINES))
 
 
@@ -301,9 +301,10 @@ def _event(place: Place, head: Place, heights: str) -> Event:
 
 
 def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:
-    """Return longitude, latitude, height and standard deviations of east, north, up; 0, 0, 0 stays.
+    """Convert X, Y, Z to geographic coordinates with standard deviations.
 
-    `deviations` are those of X, Y, Z, and the roots of the covariances XY, YZ, ZX with their signs.
+    `deviations` are standard deviations of X, Y, Z, and signed roots of the covariances XY, YZ, ZX. X, Y, Z
+    of 0 are not converted.
     """
     if not any(xyz):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -323,7 +324,7 @@ def _degrees(words: Sequence[str], place: Place) -> float:
 
 
 def _seconds(words: Sequence[str], place: Place) -> float:
-    """Return seconds since the first GPS week from a date and a time, or from a week and its seconds."""
+    """Return seconds since the first GPS week from date or week."""
     if "/" not in words[0]:
         return place.whole(words[0], "week", highest=10**5) * SECONDS_OF_WEEK + place.number(
             words[1], "seconds"

@@ -1,4 +1,4 @@
-"""Positions by the names of photos: `geo.txt`, references of Metashape, geolocation of Pix4D."""
+"""Positions by photo name: `geo.txt`, Metashape references, Pix4D tables."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 SOURCE = "reference"
-GEO_TXT = "geo.txt"  # Of OpenDroneMap: positions in the system of the first line
-WORDS = (3, 4, 7, 9)  # How many a line of it may have; what follows the ninth is of no use here
-HEAD = 40  # Lines in which a header, a row or the name of a system is looked for
+GEO_TXT = "geo.txt"  # Table of OpenDroneMap: positions in the system of its first line
+WORDS = (3, 4, 7, 9)  # Numbers of words per line; words after the ninth are ignored
+HEAD = 40  # Number of lines that are searched for a header, a row or a system
 _KNOWN = (*TABLES["gnss"].columns, "enabled")
 _NUMBERS = TABLES["gnss"].numbers
 _REQUIRED = ("photo", *AXES)
 _PIX4D = {3: (), 5: ("sd_xy", "sd_z"), 6: ("",) * 3, 8: (*("",) * 3, "sd_xy", "sd_z")}
-"""Columns of Pix4D's tables after the position by the count of numbers: angles, accuracies; no header."""
+"""Columns after the position in Pix4D tables without header, by count of numbers: angles, accuracies."""
 _SYSTEM = re.compile(r"#\s*CoordinateSystem:\s*(.+)", re.IGNORECASE)
 _SEPARATORS = re.compile(r"[,;\t|]")
 
 
 def is_reference(path: Path, pictures: Callable[[str], object] | None = None) -> bool:
-    """Whether a text file has positions by the names of photos, with a header or as Pix4D writes them.
+    """Return whether a text file has positions by photo name.
 
-    A table with a column of points beside the photos has image observations, as has one without a header
-    that names a photo twice. If the names may be those of points, one must name a picture: by its ending, or
-    by `pictures`, which returns the pictures of a name.
+    A table with columns of photos and points has image observations. So has one without header that repeats a
+    photo. If the names may be point names, one must name an image file: by its suffix, or by `pictures`,
+    which returns the image files of a name.
     """
     head = [line for line in islice(read_lines(path), HEAD) if line.strip()]
     for k, line in enumerate(head):
@@ -76,7 +76,7 @@ def _cells(line: str) -> list[str]:
 
 
 def _header(line: str) -> list[str] | None:
-    """Return the headings of a line that names photos and positions; None for another line."""
+    """Return the headings of photo and position columns; None without."""
     own = [each.lower() for each in _cells(line.lstrip().removeprefix("#"))]
     return own if set(_REQUIRED) <= set(PLAIN.spelled(_KNOWN, own)) else None
 
@@ -96,7 +96,7 @@ def _is_picture(name: str) -> bool:
 
 
 def _is_row(line: str) -> bool:
-    """Whether a line is one of Pix4D's: a photo, and its numbers."""
+    """Return whether a line is a Pix4D row: a photo, and its numbers."""
     name, *numbers = _cells(line)
     if not _is_picture(name) or len(numbers) not in _PIX4D:
         return False
@@ -107,10 +107,10 @@ def _is_row(line: str) -> bool:
 
 
 def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
-    """Read a table; return what it says by the names of photos.
+    """Read a table of positions by photo name.
 
-    Section 6 of the specification: columns by their names, units by their headings; one accuracy is that of
-    each axis. What is switched off in Metashape is left out.
+    Section 6 of the specification: columns by their names, units by their headings. A single accuracy applies
+    to each axis. Rows disabled in Metashape are skipped.
     """
     head = list(islice(read_lines(path), HEAD))
     crs = next((match[1].strip() for line in head if (match := _SYSTEM.match(line.strip()))), "")
@@ -136,7 +136,7 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
 
 
 def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[ColumnTable, bool]:
-    """Return the table with its columns in our units, and whether they are longitudes and latitudes."""
+    """Return the table in internal units, and whether it is geographic."""
     rows = [line for line in head if _is_row(line)]
     plain = bool(rows) and not any(_header(line) for line in head)
     angular = False
@@ -152,7 +152,7 @@ def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[Co
 
 
 def _deviations(table: ColumnTable) -> Floats:
-    """Return (rows, 3) standard deviations of the axes: each its own, else the one of all; NaN without."""
+    """Return (rows, 3) standard deviations by axis; NaN without."""
     own = table.vectors(deviation_columns(AXES), infinite=True)
     common = table.numbers("sd", infinite=True)[:, np.newaxis]
     found: Floats = np.where(np.isnan(own), common, own)
@@ -160,10 +160,10 @@ def _deviations(table: ColumnTable) -> Floats:
 
 
 def read_geo_txt(path: Path) -> dict[str, Said]:
-    """Read `geo.txt`; return what it says by the names of photos.
+    """Read positions by photo name from `geo.txt`.
 
-    Section 6 of the specification: `name x y [z [yaw pitch roll [sd_h sd_v]]]`; east and north have sd_h
-    each. Without the two columns nothing is said of standard deviations: those of another source stay.
+    Section 6 of the specification: `name x y [z [yaw pitch roll [sd_h sd_v]]]`; sd_h applies to east and
+    north each. Without the two columns, standard deviations of another source are used.
     """
     if not (places := list(filled_lines(path))):
         raise Place(path).error(phrase("format.crs"))

@@ -1,4 +1,4 @@
-"""The files of a folder of photographs that say where photos were taken, and which photo each line means."""
+"""Search of a folder of photographs for positions, matched to photos."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ EXPOSURES = ".mrk"
 
 @dataclass
 class Found:
-    """What the files of a folder say of each photo, by its path below the folder, and which were read.
+    """Metadata of each photo by relative path, and the files read.
 
-    `said` is what its sources say, the first that counts first; `flights` its folder, and the .MRK file where
-    the folder has several.
+    `said` contains its sources in order of priority; `flights` its folder, and its .MRK file if the folder
+    has several.
     """
 
     said: dict[str, list[Said]] = field(default_factory=dict)
@@ -36,9 +36,9 @@ class Found:
 
 
 def found_in(directory: Path, *, antenna: bool) -> Found:
-    """Read all files of a folder, and of folders in it, that say where photos were taken.
+    """Read all files with photo positions in a folder and its subfolders.
 
-    With `antenna` positions of .MRK files are those of the antenna.
+    If `antenna`, positions of .MRK files are antenna positions.
     """
     with reading(directory):
         if not directory.is_dir():
@@ -65,7 +65,7 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
 
 
 def files_of(directory: Path) -> Iterator[Path]:
-    """Yield the files of a folder in their order, but for hidden ones."""
+    """Yield the visible files of a folder and its subfolders in order."""
     for folder, folders, names in os.walk(directory):
         folders[:] = sorted(each for each in folders if not each.startswith("."))
         yield from (Path(folder) / name for name in sorted(names) if not name.startswith("."))
@@ -76,7 +76,7 @@ def _key(directory: Path, path: Path) -> str:
 
 
 class Photos:
-    """Photos of a folder, known by their paths below it, by what people call them."""
+    """Lookup of photos of a folder by relative path or name."""
 
     def __init__(self, keys: Iterable[str]) -> None:
         self._known: tuple[dict[str, list[str]], ...] = ({}, {}, {})
@@ -86,14 +86,14 @@ class Photos:
                 names.setdefault(name, []).append(key)
 
     def meant(self, name: str, folder: str = ".") -> list[str]:
-        """Return those in a folder that a name means: its path, else its name, else without its ending."""
+        """Return photos of a folder by path, otherwise file name, otherwise stem."""
         path = PurePosixPath(name.replace("\\", "/"))
         paths, names, stems = self._known
         tried = (
             paths.get((PurePosixPath(folder) / path).as_posix()),
             names.get(path.name),
             stems.get(path.stem.casefold()),
-            stems.get(path.name.casefold()),  # a name without an ending, but with a dot
+            stems.get(path.name.casefold()),  # A name without suffix that contains a dot
         )
         for keys in tried:
             inside = [each for each in keys or () if PurePosixPath(each).is_relative_to(folder)]
@@ -103,7 +103,7 @@ class Photos:
 
 
 def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, Said]:
-    """Return what geo.txt and tables of references say of each photo; geo.txt counts before the others."""
+    """Return metadata of geo.txt (with priority) and reference tables."""
     photos = Photos(_key(directory, path) for path in found.pictures)
     texts = [path for path in files if path.suffix.lower() in _TEXTS and path.stem not in TABLES]
     given: dict[str, Said] = {}
@@ -132,7 +132,7 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
 def _add_exposures(
     directory: Path, exposures: Mapping[Path, Mapping[int, Exposure]], found: Found, *, antenna: bool
 ) -> None:
-    """Add what .MRK files say to the photos of their folders, by the numbers in their names."""
+    """Add exposures of .MRK files to the photos of their folders."""
     of_folder: dict[str, list[Path]] = {}
     for path in exposures:
         of_folder.setdefault(_key(directory, path.parent), []).append(path)
@@ -155,7 +155,7 @@ def _add_exposures(
 
 
 def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
-    """Return the folder of a photo, or the next one above it, that is among some."""
+    """Return the folder of a photo, or its nearest parent, among some folders."""
     above = (each.as_posix() for each in PurePosixPath(key).parents)
     return next((each for each in above if each in folders), None)
 
@@ -163,7 +163,7 @@ def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
 def _of_flight(
     key: str, paths: Sequence[Path], number: int, exposures: Mapping[Path, Mapping[int, Exposure]]
 ) -> Path | None:
-    """Return the .MRK file of a photo: the one of its folder, or the one whose name its own begins with."""
+    """Return the .MRK file of a photo: the only one, or the one with its prefix."""
     if len(paths) == 1:
         return paths[0]
     named = [each for each in paths if PurePosixPath(key).name.startswith(f"{prefix_of(each)}_")]

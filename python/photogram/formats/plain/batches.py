@@ -1,7 +1,7 @@
-"""Parts of a plain project whose images lie in Parquet: read batch by batch, never all in memory.
+"""Parts of a plain project with images in Parquet, read in batches.
 
-Photos, control and ties are few and are held. Images go through the memory twice: from the table into buckets
-by the names of their points, so that all images of a point are in one bucket, and from there into the parts.
+Photos, control and ties are few and remain in memory. Image observations are read twice: first into buckets
+by point name, so that a bucket contains all observations of its points, then into the parts.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ HELD = (
     *("cameras", "photos", "control", "gnss", "gnss_groups", "attitudes", "attitude_groups"),
     *("relative_poses", "instruments", *TIES),
 )
-"""Tables that are held in memory."""
-BATCH = 2**18  # Rows that are read at once
-BUCKET = 2**22  # Rows of a bucket, about: one is in memory at a time
+"""Tables that are loaded into memory."""
+BATCH = 2**18  # Rows per read
+BUCKET = 2**22  # Approximate rows of a bucket, which is loaded completely
 
 
 def streamable(path: Path) -> bool:
-    """Whether a path is a project whose images can be read batch by batch: all else is read whole."""
+    """Return whether the images of a project can be read batch by batch."""
     place = path / SETTINGS if path.is_dir() else path
     if place.suffix != ".toml" or not place.is_file():
         return False
@@ -84,7 +84,7 @@ class Streamed:
             raise InputError(phrase("plain.parts-moving", photo=photo), file=settings.path)
         refuse_passages(self.project.block, "blocks in parts")
         block = started(checked(self.project.block))
-        # A node has some of the observations of a drift only.
+        # A node has only some of the observations of a drift.
         self.block = block.replace(observations=with_epochs(block.observations))
         tables = Tables(replace(settings, frame=self.project.frame), [])
         self._cameras = read_cameras(tables)
@@ -101,7 +101,7 @@ class Streamed:
 
     @property
     def images(self) -> Floats:
-        """(P,) image points of each photo."""
+        """(P,) number of image observations of each photo."""
         return self._spread_out[1]
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class Streamed:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def source(self, options: CoreOptions) -> str:
-        """Return what tells the project and how it is adjusted from others: sizes and times of its files."""
+        """Return a fingerprint of options, settings, sizes and times of files."""
         digest = hashlib.sha256(repr((options, self._settings)).encode())
         for name, table in sorted(self._settings.tables.items()):
             found = table.stat()
@@ -117,11 +117,11 @@ class Streamed:
         return digest.hexdigest()
 
     def counted(self, parts: int) -> tuple[Tree, Counts]:
-        """Return the counted work of a number of parts."""
+        """Return the counted work for a number of parts."""
         return counted_work(places_of(self.block), self.images, self._incidences, parts)
 
     def divided(self, run: Path, parts: int, options: CoreOptions, source: str) -> Manifest:
-        """Write a number of parts into the folder of a run; the buckets are gone then."""
+        """Write a number of parts into the folder of a run, and remove the buckets."""
         found = cut(places_of(self.block), self.images, self._incidences, parts)
         root, observed, seen = found.tree.root, np.zeros(0, dtype=np.int64), set[str]()
         for number, incidence in enumerate(self._incidences()):
@@ -144,7 +144,7 @@ class Streamed:
         return manifest
 
     def _without_images(self) -> Settings:
-        """Return settings of the project with tables of points and images that are almost empty."""
+        """Return settings with nearly empty tables of points and images."""
         import pyarrow
         import pyarrow.parquet
 
@@ -177,17 +177,16 @@ class Streamed:
 
     @cached_property
     def _rows(self) -> dict[str, int]:
-        """Rows of photos."""
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     @property
     def _given(self) -> dict[str, int]:
-        """Rows of points that are control, or tied."""
+        """Rows of control points and tied points."""
         return {name: row for row, name in enumerate(self.block.point_ids)}
 
     @cached_property
     def _spread_out(self) -> tuple[int, Floats]:
-        """How many buckets images are spread over, which this does, and (P,) the images of each photo."""
+        """Distribute observations over buckets; return counts."""
         import pandas as pd
         import pyarrow
         import pyarrow.parquet
@@ -232,12 +231,12 @@ class Streamed:
         return buckets, counts
 
     def _read_bucket(self, number: int) -> None:
-        """Turn the rows of a bucket into arrays."""
+        """Convert the rows of a bucket to arrays."""
         import pyarrow.parquet
 
         path = self._folder / f"{number}.parquet"
         settings = replace(self._settings, tables={**self._settings.tables, "images": path})
-        # The column is ours, and no remark is due.
+        # The column is internal and needs no remark.
         images = read_images(Tables(settings, []), self._photos)
         cameras = np.asarray(self._photos.cameras)
         xy, sd = image_coordinates(
@@ -262,7 +261,7 @@ class Streamed:
         path.unlink()
 
     def _edges(self, number: int, points: int) -> tuple[Indices, Indices]:
-        """Return the edge of each point of a bucket; of the first one, that of each observation, too."""
+        """Return the edge of each point and, in the first bucket, observation."""
         if number:
             return np.arange(points), np.zeros(0, dtype=np.int64)
         tied = [tuple(self._tied[name] for name in each.points) for each in self.block.observations]
@@ -288,7 +287,7 @@ class Streamed:
             )
 
     def _into_pieces(self, number: int, bucket: dict[str, np.ndarray], home: Indices) -> None:
-        """Hand the images of a bucket to the nodes where they are at home."""
+        """Write the image observations of a bucket to their nodes."""
         of_images = home[bucket["points"]]
         for node in np.unique(of_images).tolist():
             own = of_images == node
@@ -300,7 +299,7 @@ class Streamed:
             write_arrays(place / f"{number:06d}.npz", piece)
 
     def _at_home(self, node: int, unseen: list[str], observations: Indices) -> AtHome:
-        """Return what is at home in a node, from the pieces of all buckets."""
+        """Return the observations of a node from the pieces of all buckets."""
         place = self._folder / f"node-{node}"
         pieces = [read_arrays(each) for each in sorted(place.glob("*.npz"))] if place.is_dir() else []
         names = [str(name) for piece in pieces for name in piece["names"]]
@@ -342,6 +341,6 @@ def read_head(path: Path) -> list[str]:
 
 
 def _stripped(column: Any) -> tuple[list[str], Indices]:
-    """Return the names of a column without blanks at both ends, and the name of each row."""
+    """Return column names without outer blanks, and the index of each row."""
     names, rows = coded(column)
     return [str(name).strip() for name in names], rows

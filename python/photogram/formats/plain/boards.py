@@ -1,4 +1,4 @@
-"""The table of boards: what the control of a calibration with targets is."""
+"""The table of boards: geometry of the calibration targets."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from photogram.targets.start import Regularisation
 from photogram.words import phrase
 
 ASSUMED = "sd of corners assumed"
-"""The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
+"""Key of a detail: default standard deviations of corners; levels are ratios."""
 REGULARISED = "regularise"  # Detail and column of the weak camera priors of a calibration
 TIMES = "times of photos on frames"
-"""The detail: seconds by the clocks of cameras, by the names of photos of a board."""
+"""Key of a detail: clock times in seconds, by names of board photos."""
 
 
 def read_boards(tables: Tables) -> dict[str, Board]:
-    """Read boards of columns and rows; points of others are the control of the project."""
+    """Read boards of columns and rows; others use control points."""
     table = tables.rows("boards")
     if table.count > 1:
         raise table.error(1, phrase("plain.several-boards"))
@@ -38,7 +38,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         if word := table.words(name, words, "", optional=True)[row]:
             given[name] = word
     if given.get("kind") == "points":
-        # Their places are those of the control, which is read later.
+        # Their positions are control points, which are read later.
         given["points"] = np.zeros((0, 3))
         return Board(**given)
     lengths = {name: float(table.numbers(name)[row]) for name in PITCHES}
@@ -50,7 +50,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
 
 
 def read_regularised(tables: Tables) -> str | None:
-    """Return whose weak priors a calibration adds to its cameras; None without a board or priors."""
+    """Return the source of weak camera priors; None without."""
     table = tables.rows("boards")
     if not table.count:
         return None
@@ -58,7 +58,7 @@ def read_regularised(tables: Tables) -> str | None:
 
 
 def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
-    """Return how boards bend, where the table says so."""
+    """Return the deflection of boards with free deflection."""
     table = tables.rows("boards")
     if all(each.shape != "bend" for each in boards.values()):
         return []
@@ -72,7 +72,7 @@ def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
 
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:
-    """Return the columns of boards, with their bend and the priors of their cameras; none without boards."""
+    """Return columns of boards, deflections and camera priors."""
     if not boards:
         return {}
     each = boards.values()
@@ -95,7 +95,7 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
 
 
 def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:
-    """Return (m,) levels l of images whose standard deviations are 2^l of an assumed one; else None."""
+    """Return (m,) levels l of standard deviations 2^l; None if given."""
     if not assumed:
         return None
     found = np.log2(image_sd[:, 0])

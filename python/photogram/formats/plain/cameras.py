@@ -1,4 +1,4 @@
-"""The tables of cameras, and of knots of splined ones."""
+"""The tables of cameras, and of the knots of B-spline lens models."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
-OTHER_LENS = 5.0  # Difference to the certificate of another lens (mm)
+OTHER_LENS = 5.0  # Difference of principal distances (mm) that indicates another lens than the certificate
 _SD = ("sd_radial", "sd_tangential")
 _DISTANCES = ("c", "f", "fx", "fy")
-SMALLEST_DISTANCE = 0.1  # Smallest principal distance, as a part of the width of the image
+SMALLEST_DISTANCE = 0.1  # Smallest principal distance, relative to the image width
 
 
 @dataclass(frozen=True)
 class Cameras:
-    """The cameras of a project: the size of their pictures, whether photos have their own, their weights.
+    """The cameras of a project: image sizes, cameras per photo or group, weights.
 
-    Cameras of photos that move have a rolling shutter, or a line of sensors in the place of a frame; those of
-    films may have certificates, by their names.
+    Cameras of moving photos have a rolling shutter or a line sensor. Cameras of films may have certificates,
+    by camera name.
     """
 
     cameras: list[Camera] = field(default_factory=list)
@@ -101,7 +101,7 @@ def read_cameras(tables: Tables) -> Cameras:
 def _from_mm(
     image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
 ) -> tuple[float, bool]:
-    """Return the divisor from lengths of a row to the unit of the camera, and whether the row is in mm."""
+    """Return the divisor to camera units, and whether the row is in mm."""
     pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
     least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
     small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
@@ -121,7 +121,7 @@ def _from_mm(
 def _of_camera(
     tables: Tables, table: ColumnTable, row: int, own: _Row, certificates: Mapping[str, Certificate]
 ) -> Certificate | None:
-    """Return the certificate that a camera is taken from; None where the table says what it is."""
+    """Return the certificate that defines a camera; None if the table defines it."""
     certificate = certificates.get(own.name)
     if certificate is None or certificate.c is None:
         return None
@@ -139,7 +139,7 @@ def _of_camera(
 
 @dataclass(frozen=True)
 class _Row:
-    """One row of the table; numbers by the names of their columns, those that are missing left out."""
+    """One row of the table; existing numbers by column name."""
 
     name: str
     each: str
@@ -153,7 +153,7 @@ class _Row:
     deviations: dict[str, float]
 
     def behind_a_lens(self, table: ColumnTable, row: int) -> _Row:
-        """Return the row without what places a line of sensors: the camera that the line is behind."""
+        """Return the row without the parameters of the line sensor."""
         model = "brown" if self.model == LINE else self.model
         own = {name.lower() for name, _ in _MODELS[model][1]} if model in _MODELS else set()
         if both := own.intersection(OF_LINES):
@@ -165,7 +165,7 @@ class _Row:
 
 
 def _rows(table: ColumnTable) -> Iterator[_Row]:
-    """Yield the rows, from columns that are read once: a project may have a camera for each photo."""
+    """Yield the rows; columns are read once for many cameras."""
     words = [table.texts(name) for name in ("for_each", "model", "weights", "calibration")]
     texts = [table.names_once("camera"), *words]
     facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
@@ -200,7 +200,7 @@ def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
 
 
 def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
-    """Return a camera as its calibration by stars has it, with the covariance."""
+    """Return a camera with parameters and covariances of its stellar calibration."""
     from photogram.stellar.cameras import camera_from
 
     beside = given.model or given.values or given.deviations
@@ -229,7 +229,7 @@ def _camera(
         raise table.error(row, phrase("error.requires", name=f"the model {model}", other="width and height"))
     parameters = _spread(own, known)
     if "c" in parameters:
-        # In files a principal distance is positive for the positive plane; models have it negative there.
+        # In files a principal distance is positive for the positive plane; in models it is negative.
         parameters["c"] = -parameters["c"]
     deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
@@ -267,7 +267,7 @@ def _camera(
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
-    """Return values by parameter: one focal length is that of both axes."""
+    """Return values by parameter; a single focal length applies to both axes."""
     if "f" in values and "f" not in own and "fx" in own:
         values = {"fx": values["f"], "fy": values["f"], **{k: v for k, v in values.items() if k != "f"}}
     return values
@@ -279,7 +279,7 @@ _ALL = frozenset(name.lower() for facts in _MODELS.values() for name, _ in facts
 def spread_over_photos(
     cameras: Cameras, photo_cameras: Sequence[int], photos: Sequence[str], groups: Sequence[str]
 ) -> tuple[Cameras, list[int]]:
-    """Give photos, or groups of them, cameras of their own where the table says so."""
+    """Create separate cameras for photos or groups as in the table."""
     if set(cameras.for_each) == {"all"}:
         return cameras, list(photo_cameras)
     found = Cameras()
@@ -303,7 +303,7 @@ def spread_over_photos(
 
 
 def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
-    """Return the columns of the knots of cameras, row by row; nothing without any."""
+    """Return the columns of the knots of cameras, row by row; empty without knots."""
     own = [(each.name, *both) for each in cameras if (both := _both(each)) is not None]
     if not own:
         return {}
@@ -320,7 +320,7 @@ def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
 
 
 def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
-    """Return cameras with the knots that the table has of them; those that are missing are 0 and held."""
+    """Return cameras with the knots of the table; missing knots are 0 and fixed."""
     table = tables.rows("knots")
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
@@ -347,7 +347,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
 
 
 def _both(camera: Camera) -> tuple[Floats, Floats] | None:
-    """Return (ny, nx, 2) knots and their standard deviations; None of a camera without knots."""
+    """Return (ny, nx, 2) knots and standard deviations; None without."""
     if camera.knots is None or camera.knot_sd is None:
         return None
     return camera.knots, camera.knot_sd

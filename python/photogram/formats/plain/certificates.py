@@ -1,4 +1,4 @@
-"""Fiducial marks of film cameras: their table, and certificates in files of their own."""
+"""Fiducial marks of film cameras: table and certificate files."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from photogram.film import Certificate
 
 _MODELS = ("brown_forward", "brown")
-SD_MARK = 0.002  # mm, of places in a certificate that does not say it: they are printed to 0.001
+SD_MARK = 0.002  # Default (mm) for positions in a certificate, which are printed to 0.001
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
-    """Return the certificates that photos, or the section of films, name, by the names of cameras."""
+    """Return the certificates of cameras by camera name."""
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
@@ -57,7 +57,6 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
 
 
 def _cameras_of_films(tables: Tables, table: ColumnTable) -> dict[int, str]:
-    """Return the camera of each row that is of a film."""
     films, names = table.texts("film"), table.texts("camera")
     cameras = tables.read("cameras")
     only = "" if cameras is None or cameras.count != 1 else cameras.texts("camera")[0]
@@ -67,7 +66,7 @@ def _cameras_of_films(tables: Tables, table: ColumnTable) -> dict[int, str]:
 def _flown(
     tables: Tables, table: ColumnTable, cameras: Mapping[int, str]
 ) -> dict[str, dict[date | None, int]]:
-    """Return the days on which each camera was flown, with the first row of each."""
+    """Return the flight dates of each camera, with the first row of each."""
     texts = table.texts("flown")
     found: dict[str, dict[date | None, int]] = {}
     for row, camera in cameras.items():
@@ -82,7 +81,7 @@ def _flown(
 def _valid(
     table: ColumnTable, camera: str, several: Sequence[Certificate], flown: Mapping[date | None, int]
 ) -> Certificate:
-    """Return the certificate of a camera that is valid on all days on which it was flown."""
+    """Return the certificate of a camera that is valid on all of its flight dates."""
     found: Certificate | None = None
     for day, row in flown.items():
         try:
@@ -109,7 +108,7 @@ def _read(path: Path, camera: str) -> Certificate:
 
 
 def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certificate]]:
-    """Return the certificates of a project by camera: of the only one, or of those that have their names."""
+    """Return the certificates of a project by camera: of the only camera, or by name."""
     found: dict[str, list[Certificate]] = {}
     for path in tables.settings.certificates:
         if path.suffix.lower() != ".toml":
@@ -131,7 +130,7 @@ def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certi
 def _tell(
     tables: Tables, camera: str, own: Certificate, several: Sequence[Certificate], flown: Sequence[date]
 ) -> None:
-    """Say what the certificate of a camera leaves to be known, and how near it is to the flight."""
+    """Report gaps of a camera certificate, and its age at the flight."""
     remarks: list[str | Phrase] = list(own.told())
     if not flown or len(several) > 1 or own.verdict.exit_code():
         dated = phrase("plain.undated") if own.day is None else str(own.day)
@@ -154,7 +153,7 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
 
 
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
-    """Return the covariance of all marks of a camera, with the datum that distances have not."""
+    """Return a covariance matrix of all marks of a camera with a datum."""
     try:
         found, free = with_datum(xy, covariance)
     except InputError as error:
@@ -167,13 +166,13 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
 
 @dataclass(frozen=True)
 class Fiducials:
-    """Marks of cameras by the names of both."""
+    """Marks of cameras by camera name and mark name."""
 
     tables: Tables
-    # (2,) mm; deviations of those that are known one by one
+    # (2,) mm; standard deviations of individually known marks
     places: dict[str, dict[str, Floats]] = field(default_factory=dict)
     sd: dict[str, dict[str, Floats]] = field(default_factory=dict)
-    # (2n, 2n) of all marks of a camera, of certificates
+    # (2n, 2n) of all marks of a camera, from certificates
     covariances: dict[str, Floats] = field(default_factory=dict)
 
     def known(
@@ -182,7 +181,7 @@ class Fiducials:
         read: Collection[tuple[str, str]],
         covariances: Covariances,
     ) -> list[Observation]:
-        """Return what is known of marks: of all of a camera together, or of each that was read by itself."""
+        """Return prior observations of marks, joint or per mark."""
         found: list[Observation] = []
         for camera, own in marks.items():
             words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]
@@ -202,7 +201,7 @@ class Fiducials:
         return found
 
     def take(self, certificates: Mapping[str, Certificate]) -> None:
-        """Take the marks of certificates."""
+        """Add the marks of certificates."""
         for camera, own in certificates.items():
             if camera in self.places:
                 file = self.tables.settings.tables["fiducials"]
@@ -220,7 +219,7 @@ class Fiducials:
 def read_fiducials(
     tables: Tables, cameras: Collection[str], certificates: Mapping[str, Certificate]
 ) -> Fiducials:
-    """Read the marks of cameras, of the table and of certificates."""
+    """Read the marks of cameras from the table and from certificates."""
     found, table = Fiducials(tables), tables.rows("fiducials")
     xy = table.given(("x", "y"))
     sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)

@@ -1,4 +1,4 @@
-"""Common unknowns that rows of tables name: all rows of one name have the same object."""
+"""Shared parameters in rows of tables: one object per name."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _Kind = TypeVar("_Kind", bound=Unknown)
 
 
 def made(table: ColumnTable, row: int, make: Callable[..., _Made], *values: Any, **more: Any) -> _Made:
-    """Make something of a row; its errors name the row."""
+    """Create an object from a row; its errors name the row."""
     with at_place(table.place(row)):
         return make(*values, **more)
 
 
 def called(cell: str, title: str) -> str:
-    """Return the name that a cell asks for: the title for `true`, none for `false`, else its own."""
+    """Return the name in a cell: title for `true`, empty for `false`, else the cell."""
     word = cell.lower()
     return title if word in TRUE else "" if word in FALSE else cell
 
 
 def word_of(unknown: Unknown | None) -> str:
-    """Return what the cell of an unknown says: its name, where that is no word for true or false."""
+    """Return the cell of an unknown: its name, unless it is a word for true or false."""
     if unknown is None:
         return "false"
     return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name
@@ -37,7 +37,7 @@ def word_of(unknown: Unknown | None) -> str:
 
 @dataclass(frozen=True)
 class Shared:
-    """The unknowns of a project that have been named so far, by their types and names."""
+    """The named unknowns of a project, by type and name."""
 
     _known: dict[tuple[type[Unknown], str], Unknown] = field(default_factory=dict)
 
@@ -51,7 +51,7 @@ class Shared:
         *given: Any,
         **more: Any,
     ) -> _Kind:
-        """Return what a row names, the same object for all rows that do."""
+        """Return the object of a name, shared by all rows with this name."""
         new = made(table, row, kind, name, *given, **more)
         own = self._known.setdefault((kind, name), new)
         same = own is new or (

@@ -1,4 +1,4 @@
-"""The table of covariances: what was determined together of a camera, a lever arm, a plane, a sensor ..."""
+"""The table of covariances: joint priors of cameras, lever arms, sensors ..."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from photogram.words import phrase
 
 CAMERA = "camera"
 OF_FILMS = ("scanner", "fiducials", "film")
-"""Kinds of things whose covariances readers of their tables ask for by name."""
+"""Types of objects whose readers request covariances by name."""
 _WITH_PHOTOS = {each.KIND for each in (LeverArm, Boresight, Sensor, GyroBias, RotationCoefficient)}
 """Unknowns along, or about, the axes of photos or of bodies."""
 
 
 @dataclass
 class _Matrix:
-    """The covariances of one thing: its rows, and numbers by pairs of components."""
+    """The covariances of one object: its rows, and numbers by pairs of components."""
 
     rows: list[int] = field(default_factory=list)
     values: dict[tuple[str, str], float] = field(default_factory=dict)
 
     def over(self, components: Sequence[str], units: Mapping[str, float]) -> Floats:
-        """Return the matrix; what is not said is zero."""
+        """Return the matrix; missing covariances are 0."""
         found = np.zeros((len(components),) * 2)
         for (first, second), value in self.values.items():
             i, j = components.index(first), components.index(second)
@@ -48,7 +48,7 @@ class _Matrix:
 
 @dataclass(frozen=True)
 class Covariances:
-    """The table, by kind and name of what it is of."""
+    """The table, by type and name of the object."""
 
     tables: Tables
     table: ColumnTable
@@ -81,7 +81,7 @@ class Covariances:
         # In files a principal distance is positive for the positive plane, in models negative.
         units = {name: scale ** camera.powers[name] * (-1.0 if name == "c" else 1.0) for name in names}
         found = spelled.over(names, units)
-        # What stands in no column of standard deviations is held, but for what is in the matrix.
+        # Parameters without standard deviation are fixed, except those in the matrix.
         sd = {
             name: own
             for name, own in zip(camera.names, camera.deviations.tolist(), strict=True)
@@ -90,16 +90,16 @@ class Covariances:
         return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
 
     def names(self, kind: str, name: str) -> set[str]:
-        """Return the words for components that are there of a thing."""
+        """Return the component names in the matrix of an object."""
         own = self.matrices.get((kind, name), _Matrix())
         return {word for pair in own.values for word in pair}
 
     def over(
         self, kind: str, name: str, components: Sequence[str], *, singular: bool = False
     ) -> Floats | None:
-        """Return the matrix of components of films, scanners or marks; None where it is not there.
+        """Return the matrix of films, scanners or marks; None if missing.
 
-        It may be singular where it is said so.
+        If `singular` is True, the matrix may be singular.
         """
         own = self.matrices.get((kind, name))
         if own is None:
@@ -117,7 +117,7 @@ class Covariances:
         return found
 
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
-        """Return what was determined of unknowns together as observations."""
+        """Return the joint priors of unknowns as observations."""
         known = {(each.KIND, each.name): each for each in unknowns}
         found: list[Observation] = []
         for (kind, name), matrix in self.matrices.items():
@@ -138,13 +138,13 @@ class Covariances:
 
 
 def read_covariances(tables: Tables) -> Covariances:
-    """Read the table; it has nothing where it is not there."""
+    """Read the table of covariances; empty if it does not exist."""
     table, matrices = tables.rows("covariances"), dict[tuple[str, str], _Matrix]()
     values = table.given(("covariance",))[:, 0]
     kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]
     columns = (table.texts("name"), table.texts("first"), table.texts("second"))
     for row, (kind, name, *pair) in enumerate(zip(kinds, *columns, strict=True)):
-        # Parameters of cameras are called as their columns are, components of others by words.
+        # Parameters of cameras have the names of their columns, components of others are words.
         first, second = (word.lower() if kind == CAMERA else word.lower().replace("_", " ") for word in pair)
         matrix = matrices.setdefault((kind, name), _Matrix())
         if (first, second) in matrix.values or (second, first) in matrix.values:
@@ -160,9 +160,9 @@ def covariance_tables(
     rigs: Rigs,
     more: Iterable[tuple[str, str, Sequence[str], Floats]],
 ) -> dict[str, dict[str, Any]]:
-    """Return the table of what was determined together of cameras, of unknowns, and of `more`.
+    """Return the table of joint priors of cameras, of unknowns, and of `more`.
 
-    That is by kind, name, components and covariance matrix.
+    `more` contains type, name, components and covariance matrix.
     """
     rows: list[tuple[str, str, str, str, float]] = []
     for each in cameras:
@@ -174,7 +174,7 @@ def covariance_tables(
     for prior in (each for each in block.observations if isinstance(each, Prior)):
         unknown = prior.unknown
         if isinstance(unknown, Knot):
-            continue  # in the table of knots
+            continue  # In the table of knots
         units = np.array(list(_units(unknown, DEGREE).values()))
         matrix = prior.precision * units * units[:, np.newaxis]
         rows += _pairs(unknown.KIND, _name(unknown, rigs), unknown.components, matrix)
@@ -187,9 +187,9 @@ def covariance_tables(
 
 
 def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) -> dict[str, float]:
-    """Return a factor for each component of an unknown: that of angles for angles, with the sign of its axis.
+    """Return unit and sign factors of the components of an unknown.
 
-    Signs are those of the axes of photos, and of bodies, as tables have them.
+    Signs are the signs of photo and body axes in tables.
     """
     pairs = zip(unknown.components, unknown.units(""), strict=True)
     axes = dict(zip("xyz", signs, strict=True)) if unknown.KIND in _WITH_PHOTOS else {}
@@ -197,7 +197,6 @@ def _units(unknown: Unknown, angle: float, signs: Sequence[float] = (1.0,) * 3) 
 
 
 def _name(unknown: Unknown, rigs: Rigs) -> str:
-    """Return what reading the tables calls an unknown."""
     if isinstance(unknown, Sensor):
         return rigs.title(unknown)
     return word_of(unknown) if isinstance(unknown, Shift | Drift | GyroBias) else unknown.name

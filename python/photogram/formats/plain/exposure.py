@@ -1,4 +1,4 @@
-"""What cameras have where their photos move: rolling shutters, and lines of sensors in place of frames."""
+"""Cameras of moving photos: rolling shutters, and line sensors."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from photogram.network.moving_photos import Direction, LineSensor, Shutter
 from photogram.network.trajectories import Readout
 from photogram.words import phrase
 
-LINE = "line"  # The model of a line of sensors behind the lens `brown`
-OF_LINES = ("x0", "y0", "s0")  # Columns of a line of sensors that some models have as parameters
+LINE = "line"  # The model of a line sensor with the lens `brown`
+OF_LINES = ("x0", "y0", "s0")  # Columns of a line sensor that some models have as parameters
 Exposure = Shutter | LineSensor | None
 
 
 def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
-    """Return the line of sensors of each row of a table of cameras; None of one that takes frames."""
+    """Return the line sensor of each row of a camera table; None for frame cameras."""
     unit = 1e-3 if tables.settings.image == "um" else 1.0
     pitches = scaled(table.vectors(("pitch_x", "pitch_y")), unit)
     places = scaled(table.vectors(("x0", "y0"), 0.0), unit)
@@ -54,7 +54,7 @@ def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
 def shutters(
     tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
 ) -> list[Shutter | None]:
-    """Return the rolling shutter of each row of a table of cameras; None without."""
+    """Return the rolling shutter of each row of a camera table; None without."""
     directions = cast("list[Direction]", table.words("readout_direction", get_args(Direction)))
     edges = _edges(tables, table, cameras, sizes, directions)
     values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
@@ -82,7 +82,7 @@ def _edges(
     sizes: Sequence[Size | None],
     directions: Sequence[Direction],
 ) -> Floats:
-    """Return (rows, 2) where reading begins and ends, in coordinates of the cameras; NaN if not known."""
+    """Return (rows, 2) readout limits in camera coordinates; NaN if unknown."""
     settings = tables.settings
     pixels = settings.image == "px"
     given = table.vectors(("readout_begin", "readout_end"))
@@ -102,15 +102,15 @@ def _edges(
 
 
 def _counted(direction: str) -> int:
-    """Return which image coordinate is read out one after the other."""
+    """Return the index of the image coordinate along the readout direction."""
     return 1 if direction in ("down", "up") else 0
 
 
 def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
-    """Return (2,) where a picture begins and ends in a direction, in image coordinates of a camera.
+    """Return (2,) first and last image coordinate of an image along a direction.
 
     `extent` is (2,) width and height in the unit of the camera; NaN if unknown. Pixels that count down begin
-    at the corner, all others at the center.
+    at the corner, all others at the centre.
     """
     axis = _counted(direction)
     length = float(extent[axis])
@@ -124,7 +124,7 @@ def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
 
 
 def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) -> list[Exposure]:
-    """Return what the photos of each camera of a block have: a shutter, a line of sensors, or neither."""
+    """Return the shutter or line sensor of each camera of a block; None without."""
     of_photos = {each.photo: each for each in block.timed}
     found: dict[int, Exposure] = {}
     for photo, row in zip(block.photo_ids, which, strict=True):
@@ -142,7 +142,7 @@ def exposure_columns(
     pixel_mm: Sequence[float | None],
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of shutters and lines of sensors of a table of cameras."""
+    """Return the columns of shutters and line sensors of a camera table."""
     lines = [each if isinstance(each, LineSensor) else None for each in exposures]
     own = [each if isinstance(each, Shutter) else None for each in exposures]
     for camera, line in zip(cameras, lines, strict=True):
@@ -153,7 +153,6 @@ def exposure_columns(
 
 
 def _line_columns(lines: Sequence[LineSensor | None]) -> dict[str, Any]:
-    """Return the columns of lines of sensors."""
     found: dict[str, Any] = {
         column: [None if each is None else float(getattr(each, column)) for each in lines]
         for column in OF_LINES
@@ -170,7 +169,6 @@ def _shutter_columns(
     pixel_mm: Sequence[float | None],
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of rolling shutters."""
     found: dict[str, Any] = {}
     readouts = [each.readout if each and isinstance(each.readout, Readout) else None for each in own]
     found["readout"] = [None if each is None else each.value for each in readouts]
@@ -191,7 +189,7 @@ def _shutter_columns(
 def _edges_written(
     shutter: Shutter, camera: Camera, size: Size | None, pixel_mm: float | None, image_y: str
 ) -> tuple[float, float] | None:
-    """Return where reading begins and ends as tables have it; None where size and direction say it."""
+    """Return readout limits of a table; None if size and direction suffice."""
     if size is not None:
         unit = 1.0 if camera.unit == "px" else pixel_mm or math.nan
         usual = picture_edges(camera, shutter.direction, np.array(size) * unit)

@@ -1,4 +1,4 @@
-"""Mistakes that marks of films show before anything is adjusted: pitch, side, names, resampled scans."""
+"""Mistakes in marks of films: pitch, side, names, resampled scans."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-SHRUNK = 0.01  # No film has changed its size by more
+SHRUNK = 0.01  # Largest change of film size, relative
 INCH = 25.4  # Millimetres
-SAME = 0.5  # Pixels within which the marks of all photos of a resampled scan lie
-SHORTEST = 4  # Angles of a table of distortion that has a curve
-FEWEST = 4  # Marks of a photo that tell whether they are named a quarter turn round
+SAME = 0.5  # Largest difference (pixels) of the marks of all photos of a resampled scan
+SHORTEST = 4  # Smallest number of angles of a distortion table with a curve
+FEWEST = 4  # Smallest number of marks that detects names rotated by a quarter
 
 
 def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phrase | None:
-    """Return an error of the pitch of a scanner; `places` are (n, 2) of the marks in the camera's frame."""
+    """Return an error of the scanner pitch; `places` are (n, 2) camera marks."""
     if len(places) < 2:
         return None
     *_, m = conformal(places, photo.true, mirrored=mirrored)
@@ -39,9 +39,9 @@ def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phr
 
 
 def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> Phrase | None:
-    """Return a remark on images beyond a table of distortion if the curve is less accurate than they are.
+    """Return a remark on images beyond a distortion table with an inaccurate curve.
 
-    `places` are (m,) complex, in the camera's frame, and `sd` (m,) their standard deviations, mm.
+    `places` are (m,) complex, in the camera frame, and `sd` (m,) their standard deviations, mm.
     """
     if own.radial is None or own.c is None or len(own.radial.angle) < SHORTEST:
         return None
@@ -73,7 +73,7 @@ def mark_remarks(
 
 
 def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
-    """Return a remark on scans that were resampled: their marks are at the same pixels."""
+    """Return a remark on resampled scans: marks of all photos are at the same pixels."""
     readings: dict[tuple[str, str], list[Floats]] = {}
     pixels = [photo for photo in photos if photo.machine.readings.pitch != 1.0]
     for photo in pixels:
@@ -86,7 +86,7 @@ def _resampled(photos: Sequence[ScannedPhoto]) -> list[Phrase]:
 
 
 def _round(photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Floats]]) -> Iterator[Phrase]:
-    """Tell cameras whose marks fit far better where all photos have them named a quarter turn round."""
+    """Yield remarks on marks that fit better with names rotated by a quarter."""
     sums: dict[str, Floats] = {}
     counts: dict[str, int] = {}
     for photo in photos:
@@ -101,7 +101,7 @@ def _round(photos: Sequence[ScannedPhoto], places: Mapping[str, Mapping[str, Flo
         way = next((each for each in found.ways if each is not None and each.marks.tolist() == own), None)
         if way is None:
             continue
-        # The same names go the other way round on a film that is seen from the other side.
+        # On a film scanned from the other side, the same names are in reverse order.
         turns = (way.quarter_turns + (-1 if way.mirrored else 1) * np.arange(4)) % 4
         sums[photo.camera] = sums.get(photo.camera, np.zeros(4)) + found.omega[4 * way.mirrored + turns]
         counts[photo.camera] = counts.get(photo.camera, 0) + 2 * len(own) - 6

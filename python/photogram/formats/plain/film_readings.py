@@ -1,4 +1,4 @@
-"""Readings of fiducial marks: of which marks they are, and from which side a film was seen."""
+"""Assignment of fiducial readings to marks, and the scanned side of films."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 
-BETTER = 4.0  # Times by which images must be farther from their places in every other way to lie
-NEAR = 0.1  # How far they may be in the best, in parts of the format: poses and points are start values
-TIES = 4  # Points that two photos have in common at least
+BETTER = 4.0  # Smallest ratio of distances between any other placement and the best one
+NEAR = 0.1  # Largest distance in the best placement, relative to the format; poses and points are approximate
+TIES = 4  # Smallest number of common points of two photos
 
 
 @dataclass(frozen=True)
 class Lying:
-    """A way to lie: places in the camera's frame of the marks that were read, and the side."""
+    """A placement of a film: positions of marks in the camera frame, and side."""
 
     places: Floats
     mirrored: bool
 
     def back(self, true: Floats, images: Floats) -> Floats:
-        """Return (m,) complex places in the camera's frame of images, by true places (n, 2) of the marks."""
+        """Transform images to (m,) complex camera coordinates."""
         t1, t2, theta, m = conformal(self.places, true, mirrored=self.mirrored)
         q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
         return np.asarray(-np.conj(q) if self.mirrored else q)
@@ -40,28 +40,28 @@ class Lying:
 
 @dataclass(frozen=True)
 class Laid:
-    """A film of which it is known how it lies, and true places of its marks and images on the scanner."""
+    """A placed film, with true scanner positions of marks and images."""
 
     way: Lying
     marks: Floats
     images: Floats
 
     def places(self) -> Floats:
-        """Return (m,) complex places of its images in the camera's frame."""
+        """Return (m,) complex positions of its images in the camera frame."""
         return self.way.back(self.marks, self.images)
 
 
 @dataclass(frozen=True)
 class Expected:
-    """Where images of a photo should be in the camera's frame."""
+    """Expected positions of images of a photo in the camera frame."""
 
-    rows: np.ndarray  # (m,) of the images of the photo
+    rows: np.ndarray  # (m,) rows of the image observations of the photo
     places: Floats  # (m,) complex, mm
-    # For what: nothing, a shift and scale, or a rotation with these
+    # Unknown transformation: none, translation and scale, or these and a rotation
     but: Literal["nothing", "shift", "rotation"] = "nothing"
 
     def apart(self, q: Floats) -> float:
-        """Return the root mean square of what images (m,) are away."""
+        """Return the root mean square distance of images from expectation."""
         left = q - self.places
         if self.but != "nothing":
             own, other = q - q.mean(), self.places - self.places.mean()
@@ -73,7 +73,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Seen:
-    """Images, and points whose coordinates are known at least nearly."""
+    """Image observations, and points with at least approximate coordinates."""
 
     images: Images
     points: Floats  # (n, 3) coordinates; NaN where unknown
@@ -86,13 +86,13 @@ class Seen:
         return found
 
     def deviations(self, photo: str) -> Floats:
-        """Return (m,) the larger standard deviations of these; 1 where nothing is said of them."""
+        """Return (m,) the larger standard deviation of each reading; 1 if unknown."""
         rows, sd = self._rows(photo), self.images.sd
         found: Floats = np.ones(len(rows)) if sd is None else sd[rows].max(axis=1)
         return found
 
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
-        """Yield where images of a photo should be: by its pose, and by tie points on another photo."""
+        """Yield expected image positions: from pose, and from tie points."""
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
@@ -117,7 +117,7 @@ class Seen:
             yield Expected(rows, q, "rotation")
 
     def _neighbours(self, photo: str, points: np.ndarray) -> list[str]:
-        """Return the other photos with enough of some points, that with the most first."""
+        """Return other photos with enough of some points, in descending order of number."""
         images = np.unique(
             np.column_stack([self.images.photos, self.images.points])[np.isin(self.images.points, points)],
             axis=0,
@@ -131,7 +131,7 @@ class Seen:
         return np.flatnonzero(self.images.photos == self.photos.names.index(photo))
 
     def _pose(self, photo: str) -> tuple[Floats, Floats, float]:
-        """Return centre, axes as columns, and principal distance of the positive; NaN where unknown."""
+        """Return centre, axes (columns) and principal distance; NaN if unknown."""
         row = self.photos.names.index(photo)
         c = -abs(self.cameras.cameras[self.photos.cameras[row]].parameters.get("c", np.nan))
         centres, matrices = np.asarray(self.photos.centres), np.asarray(self.photos.matrices)
@@ -139,15 +139,15 @@ class Seen:
 
 
 def _projected(rays: Floats, c: float) -> Floats:
-    """Return (m,) complex places of rays (m, 3) in the camera's frame."""
+    """Return (m,) complex positions of rays (m, 3) in the camera frame."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(c * (rays[:, 0] + 1j * rays[:, 1]) / rays[:, 2])
 
 
 def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
-    """Return which way to lie brings images where they should be; None where none does, or several do.
+    """Return the placement that fits expected positions; None if not unique.
 
-    `true` are (n, 2) true places of the marks on the scanner, `images` (m, 2) of all images of the photo.
+    `true` are (n, 2) true positions of the marks on the scanner, `images` (m, 2) of all images of the photo.
     """
     if len(expected.rows) < 2:
         return None
@@ -161,7 +161,7 @@ def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected:
 
 @dataclass
 class ScannedPhoto:
-    """A photo on film: rows of the table of photos, and readings of its marks."""
+    """A photo on film: its row in the table of photos, and readings of its marks."""
 
     name: str
     row: int
@@ -174,11 +174,11 @@ class ScannedPhoto:
 
     @property
     def true(self) -> Floats:
-        """(n, 2) true places on the scanner of its marks."""
+        """(n, 2) true scanner positions of its marks."""
         return self.true_places(np.array(self.readings))
 
     def true_places(self, readings: Floats) -> Floats:
-        """Return (m, 2) true places on the scanner of readings."""
+        """Return (m, 2) true scanner positions of readings."""
         own = self.machine
         return true_places(readings.reshape(-1, 2), own.readings, own.scanner, own.curves)
 
@@ -188,9 +188,9 @@ class MarkReadings:
     """The readings of the marks of scanned photos."""
 
     tables: Tables
-    seen: Seen  # The images of all photos
-    photos: Sequence[ScannedPhoto]  # Those that are scanned, which get their readings
-    # (2,) of marks in the frames of their cameras, by the names of both
+    seen: Seen  # The image observations of all photos
+    photos: Sequence[ScannedPhoto]  # Scanned photos, which receive their readings
+    # (2,) of marks in camera frames, by camera name and mark name
     places: Mapping[str, Mapping[str, Floats]]
 
     def read(self, photos: Photos) -> None:
@@ -226,7 +226,7 @@ class MarkReadings:
         self._name_marks(table)
 
     def _name_marks(self, table: ColumnTable) -> None:
-        """Find which marks readings without names are of: photos that others decide come after these."""
+        """Identify marks of unnamed readings, dependent photos last."""
         waiting = [photo for photo in self.photos if not all(photo.marks)]
         for photo in waiting:
             if any(photo.marks):
@@ -239,7 +239,7 @@ class MarkReadings:
             waiting = left
 
     def _named(self, table: ColumnTable, photo: ScannedPhoto) -> InputError | None:
-        """Find which marks the readings of a photo are of; return the error where it cannot be told."""
+        """Identify the marks of a photo; return an error if ambiguous."""
         places = self.places.get(photo.camera, {})
         try:
             found = which_mark(np.array(list(places.values())).reshape(-1, 2), photo.true)
@@ -259,7 +259,7 @@ class MarkReadings:
         return None
 
     def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
-        """Return which way a film lies by images: of points that are known, or of tie points."""
+        """Return the placement index of a film from known points or tie points."""
         images, true = photo.true_places(self.seen.readings(photo.name)), photo.true
         found = (
             way_by_images(ways, true, images, each) for each in self.seen.expected(photo.name, self._laid)
@@ -267,7 +267,7 @@ class MarkReadings:
         return next((each for each in found if each is not None), None)
 
     def _laid(self, name: str) -> Laid | None:
-        """Return how the film of a photo lies where its marks, or what is given, say it alone."""
+        """Return the placement of a film if its marks or the given side determine it."""
         photo = next((each for each in self.photos if each.name == name), None)
         if photo is None or len(photo.marks) < 2 or not all(photo.marks):
             return None
@@ -279,18 +279,18 @@ class MarkReadings:
         return Laid(Lying(q, side), true, photo.true_places(self.seen.readings(photo.name)))
 
     def places_of(self, photo: ScannedPhoto) -> Floats:
-        """Return (n, 2) places in the camera's frame of the marks of a photo."""
+        """Return (n, 2) positions of the marks of a photo in the camera frame."""
         return np.array([self.places[photo.camera][name] for name in photo.marks]).reshape(-1, 2)
 
     def given_side(self, photo: ScannedPhoto) -> bool | None:
-        """Return whether a photo is said to be mirrored."""
+        """Return whether the table marks a photo as mirrored; None: unknown."""
         word = self.seen.photos.table.texts("mirrored")[photo.row].lower()
         if word and word not in TRUE | FALSE:
             raise self.seen.photos.table.cell_error(photo.row, "mirrored", "error.flag", value=word)
         return None if not word else word in TRUE
 
     def side(self, photo: ScannedPhoto) -> bool:
-        """Return whether a photo is mirrored: as is given, or as its marks tell, or images with its pose."""
+        """Return whether a photo is mirrored: given, by marks, or by images."""
         given = self.given_side(photo)
         q = self.places_of(photo)
         true = photo.true if len(q) else q

@@ -1,4 +1,4 @@
-"""Photos on film and plates: which are scanned, their marks, and what is known of all that."""
+"""Photos on film and plates: scanned photos, their marks, and prior information."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ from photogram.network.films import (
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.words import phrase
 
-LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}  # Marks that determine a film
+LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}  # Required marks of a film
 _START = ("start_t1", "start_t2", "start_theta")
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """Photos whose images are readings: which they are, what images pass, and what was observed."""
+    """Scanned photos with the transformations of their images and their observations."""
 
-    photos: Bools  # (P,) which they are
-    scans: list[Scan] = field(default_factory=list)  # What images pass, and what was observed
+    photos: Bools  # (P,) whether photos are scanned
+    scans: list[Scan] = field(default_factory=list)  # Transformations of image coordinates
     observations: list[Observation] = field(default_factory=list)
-    # For the details of a project whose films are fitted before: the same with all that was read of
-    # them, of which tables are written
+    # If films are fitted in advance: the complete scans and observations for the details of the project, from
+    # which tables are written
     inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
 
 
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
-    """Read which photos are scanned films or plates, and all that belongs to these."""
+    """Read which photos are scanned films or plates, and their films and marks."""
     photos = seen.photos
     films = [photos.table.texts("film")[row] for row in photos.rows.tolist()]
     scanned = np.array([bool(name) for name in films], dtype=bool)
@@ -83,8 +83,6 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
 
 
 class _Reader:
-    """Reads the films of photos."""
-
     def __init__(
         self,
         tables: Tables,
@@ -127,7 +125,7 @@ class _Reader:
         return self._held.setdefault(id(own), own.held()) if self.before else own
 
     def read(self, found: Scanned) -> None:
-        """Put the scans and observations of all photos in their place."""
+        """Add the scans and observations of all photos to the result."""
         marks = {
             camera: {
                 name: Mark(f"{camera} {name}", place, 0.0 if self.before else np.inf)
@@ -161,7 +159,7 @@ class _Reader:
             found.observations.extend(each.known for each in machines.values() if each.known is not None)
 
     def _tell_beyond(self, sides: Sequence[bool]) -> None:
-        """Say where images lie beyond the table of distortion of the certificate of their camera."""
+        """Report images beyond the distortion table of the certificate of their camera."""
         cameras = {each.name: each for each in self.seen.cameras.cameras}
         for camera, own in self.seen.cameras.certificates.items():
             places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
@@ -176,7 +174,7 @@ class _Reader:
                 self.tables.messages.append(Message(message, own.file))
 
     def _starts(self) -> list[tuple[bool, Floats]]:
-        """Return the side of each photo, and where t1, t2 and theta start."""
+        """Return the side of each photo, and initial values of t1, t2 and theta."""
         given = self.table.vectors(_START)
         found: list[tuple[bool, Floats | None]] = []
         for photo in self.photos:
@@ -189,7 +187,7 @@ class _Reader:
                 q = self.marks.places_of(photo)
                 start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
-        # The frame of a camera of stars is that of the plate as it was measured.
+        # The camera frame of a stellar calibration is the one of the measured plate.
         stars = {each.name for each in self.seen.cameras.cameras if each.image_y == "down"}
         told = [
             None if photo.camera in stars or self.marks.given_side(photo) is not None else side
@@ -204,7 +202,7 @@ class _Reader:
         ]
 
     def _neighbour(self, k: int, found: Sequence[tuple[bool, Floats | None]]) -> Floats:
-        """Return where a photo of the same film and scanner starts, of one that has no marks."""
+        """Return initial values of a photo of the same film and scanner."""
         photo, mirrored = self.photos[k], found[k][0]
         for other in sorted(range(len(found)), key=lambda j: abs(j - k)):
             start = found[other][1]
@@ -254,7 +252,7 @@ class _Reader:
         )
 
     def _fitted(self, photo: ScannedPhoto, mirrored: bool) -> Interior:
-        """Return the film of a photo as its marks alone have it."""
+        """Return the film of a photo fitted to its marks only."""
         kind = self.kinds[photo.film]
         model: FilmModel = kind.model  # type: ignore[assignment]
         return made(
@@ -273,7 +271,7 @@ class _Reader:
         )
 
     def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
-        """Return what is known of a film beforehand; nothing of one that is free."""
+        """Return prior observations of a film; empty if it is free."""
         kind = self.kinds[photo.film]
         roll = None if film.roll is not None else kind.roll
         names = [
@@ -295,10 +293,10 @@ class _Reader:
 
 
 def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[Message]) -> Cameras:
-    """Return cameras of which those of films are of the positive, with weights of what was read.
+    """Return cameras with positive planes for films, and weights of the readings.
 
-    A principal distance that a file has with the sign of the model, negative for the positive plane, is taken
-    as it is, and so are its covariances: the frame of marks is that of the positive.
+    The sign of a principal distance of the model, negative for the positive plane, is accepted, with its
+    covariances. The frame of marks belongs to the positive.
     """
     used = {photos.cameras[row] for row in np.flatnonzero(scanned.photos).tolist()}
     found = list(cameras.cameras)

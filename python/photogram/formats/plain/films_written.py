@@ -1,4 +1,4 @@
-"""The tables of scanned films and plates, written from what a block has of them."""
+"""Tables of scanned films and plates, from the contents of a block."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 INSIDE = "films inside"
-"""In the details of a project that takes films as errorless: all that was read of them."""
+"""Key of a detail of a project with fixed films: the complete contents of their tables."""
 _Seen = TypeVar("_Seen")
 
 
 @dataclass
 class _Marks:
-    """The marks of a camera, and what is known of all of them together."""
+    """The marks of a camera, and their joint prior."""
 
     marks: dict[str, Mark] = field(default_factory=dict)
     sd: dict[str, Floats] = field(default_factory=dict)
@@ -34,7 +34,7 @@ class _Marks:
 
 
 class WrittenFilms:
-    """The films of a project as tables have them."""
+    """The films of a project in the form of tables."""
 
     def __init__(self, project: Project, cameras: Sequence[str]) -> None:
         block = project.block
@@ -71,7 +71,7 @@ class WrittenFilms:
         return any(each.readings.pitch != 1.0 for each in self.films.values())
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Return the four tables; none without films."""
+        """Return the four tables; empty without films."""
         if not self.films:
             return {}
         return {
@@ -82,7 +82,7 @@ class WrittenFilms:
         }
 
     def photo_columns(self) -> dict[str, Any]:
-        """Return the columns of photos; none without films."""
+        """Return the columns of photos; empty without films."""
         if not self.films:
             return {}
         films = [self.films.get(photo) for photo in self.photos]
@@ -98,7 +98,7 @@ class WrittenFilms:
         }
 
     def _start(self, photo: str) -> Floats:
-        """Return where a film starts: what was observed of it, where it was."""
+        """Return the initial values of a film: observed, otherwise approximate."""
         if photo not in self.films:
             return np.full(3, np.nan)
         known = self.known.get(photo)
@@ -107,7 +107,7 @@ class WrittenFilms:
         return self.films[photo].placement.position
 
     def covariances(self) -> list[tuple[str, str, Sequence[str], Floats]]:
-        """Return kind, name, components and matrix of what is known with a covariance."""
+        """Return type, name, components and matrix of joint priors."""
         found: list[tuple[str, str, Sequence[str], Floats]] = []
         for photo, each in self.known.items():
             if photo in self.films and each.covariance is not None:
@@ -123,7 +123,7 @@ class WrittenFilms:
         return found
 
     def _rolls(self) -> dict[str, str]:
-        """Return the name of the film of each photo: that of its roll."""
+        """Return the film name of each photo, which is the name of its roll."""
         found = {}
         for photo, film in self.films.items():
             known = self.known.get(photo)
@@ -132,7 +132,7 @@ class WrittenFilms:
         return found
 
     def _film_table(self) -> dict[str, Any]:
-        """Return the table of films, a row for all photos of a roll."""
+        """Return the table of films, one row for all photos of a roll."""
         rows: dict[str, dict[str, Any]] = {}
         for photo, name in self.rolls.items():
             own = self._film_row(photo)
@@ -161,7 +161,7 @@ class WrittenFilms:
         return row | _pattern_cells(film)
 
     def _size(self, photo: str, held: Floats) -> list[float | None]:
-        """Return standard deviations of m, b1, b2; None where a covariance says it."""
+        """Return standard deviations of m, b1, b2; None with covariances."""
         known = self.known.get(photo)
         if known is not None and known.covariance is not None:
             if tuple(known.known) != FILM:
@@ -177,7 +177,6 @@ class WrittenFilms:
         return list((sd | dict(zip(known.known, own, strict=True))).values())
 
     def _machines(self) -> dict[str, Machine]:
-        """Return the scanners by their names."""
         found: dict[str, Machine] = {}
         known = {id(one): each for each in self.together for one in each.joined}
         for film in self.films.values():
@@ -210,7 +209,7 @@ class WrittenFilms:
         }
 
     def _certificates(self) -> dict[str, _Marks]:
-        """Return marks by the names of their cameras, and by their own."""
+        """Return marks by camera name and mark name."""
         cameras: dict[int, str] = {}
         for each in self.readings:
             camera = self.camera_of[each.photo]
@@ -264,19 +263,19 @@ def _of(observations: Sequence[Observation], kind: type[_Seen]) -> Iterator[_See
 
 
 def _joined(machine: Machine, what: str) -> Floats:
-    """Return (21,) numbers of a scanner and its curves; 0 where it has none."""
+    """Return (21,) numbers of a scanner and its curves; 0 without curves."""
     own = [getattr(each, what)[:3] for each in (machine.scanner, *machine.curves)]
     return np.concatenate([*own, np.zeros(3 + len(CURVES) - 3 * len(own))])
 
 
 def _words(machine: Machine, unknown: Unknown) -> Sequence[str]:
-    """Return what the table of covariances calls the components of a scanner, or of one of its curves."""
+    """Return covariance table names of a scanner's or curve's components."""
     at = [*map(id, machine.curves)].index(id(unknown)) if unknown in machine.curves else -1
     return ("Sx", "Sy", "alpha") if at < 0 else CURVES[3 * at : 3 * at + 3]
 
 
 def _own_deviations(machine: Machine) -> Floats:
-    """Return (21,) deviations; NaN of what has a covariance: cells would say that nothing is known of it."""
+    """Return (21,) standard deviations; NaN for components with a covariance matrix."""
     found = _joined(machine, "deviations")
     joined = set() if machine.known is None else {*map(id, machine.known.joined)}
     for k, each in enumerate((machine.scanner, *machine.curves)):
@@ -286,7 +285,6 @@ def _own_deviations(machine: Machine) -> Floats:
 
 
 def _pattern_cells(film: Film) -> dict[str, Any]:
-    """Return the cells of the pattern of a film."""
     pattern = film.pattern
     if pattern is None:
         return {"pattern": "none"}
@@ -307,7 +305,7 @@ def _pattern_cells(film: Film) -> dict[str, Any]:
 
 
 def _take(own: _Marks, known: KnownTogether, marks: Sequence[Mark]) -> None:
-    """Take marks that are known together, or one by itself."""
+    """Add marks with a joint prior, or a single one."""
     full = len(marks) > 1 or known.precision[0, 1] != 0
     if own.covariance is not None or (full and own.marks):
         raise InputError(phrase("plain.one-certificate", name=known.name))
@@ -319,7 +317,7 @@ def _take(own: _Marks, known: KnownTogether, marks: Sequence[Mark]) -> None:
 
 
 def _put(own: _Marks, camera: str, mark: Mark) -> None:
-    """Take a mark of which nothing is observed but what it says itself."""
+    """Add a mark whose only prior is its own standard deviation."""
     sd = mark.deviations
     if own.covariance is not None or not (np.isfinite(sd).all() and (sd > 0).all()):
         raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=camera))
@@ -327,7 +325,7 @@ def _put(own: _Marks, camera: str, mark: Mark) -> None:
 
 
 def _named(camera: str, own: _Marks) -> _Marks:
-    """Return the marks of a camera by what tables call them: without the name of the camera."""
+    """Return the marks of a camera by table name: without the camera name."""
 
     def plain(name: str) -> str:
         return name.removeprefix(f"{camera} ")

@@ -1,4 +1,4 @@
-"""The tables of groups: unknowns that positions and velocities, or attitudes and rates, have in common."""
+"""The tables of groups: shared parameters of pose observations."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ SHARED: Mapping[type, tuple[str, ...]] = {
     Attitude: ("boresight",),
     Rate: ("boresight", "bias"),
 }
-"""Fields that a group gives to its observations, besides their clock."""
+"""Fields of a group that its observations share, besides the clock."""
 _ANTENNA = {kind: tuple(f"{kind}_{axis}" for axis in AXES) for kind in ("lever", "shift", "drift")}
 
 
 @dataclass(frozen=True)
 class Group:
-    """The unknowns of a group; a fixed lever arm is three numbers, a fixed boresight a matrix."""
+    """Parameters of a group; a fixed lever arm or boresight is an array."""
 
     lever_arm: LeverArm | tuple[float, ...] = (0.0, 0.0, 0.0)
     shift: Shift | None = None
@@ -46,7 +46,7 @@ class Group:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What equal groups have in common."""
+        """The key of equal groups."""
         known = self.boresight is None or isinstance(self.boresight, Boresight)
         boresight = self.boresight if known else np.asarray(self.boresight).tobytes()
         return self.lever_arm, self.shift, self.drift, boresight, self.bias, self.clock
@@ -61,7 +61,7 @@ def group_of(observation: Any) -> Group:
 
 
 def grouped(tables: Tables, table: ColumnTable, groups: Mapping[str, Group], name: str) -> list[Group]:
-    """Return the group of each row. Groups of antennas without a table are names only."""
+    """Return the group of each row, possibly a name only."""
     names = table.texts("group")
     if name in tables.settings.tables or name == "attitude_groups":
         for row, text in enumerate(names):
@@ -72,7 +72,7 @@ def grouped(tables: Tables, table: ColumnTable, groups: Mapping[str, Group], nam
 
 
 def read_groups(tables: Tables, name: str) -> dict[str, Group]:
-    """Read the table `gnss_groups` or `attitude_groups`, by the names of groups."""
+    """Read the table `gnss_groups` or `attitude_groups`, by group name."""
     table = tables.rows(name)
     antenna = name == "gnss_groups"
     names = table.texts("group")
@@ -117,7 +117,7 @@ def _antennas(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iter
 
 def _inertials(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Yield boresight and bias of each row."""
-    # Both the photo and what carries it have axes as the settings say.
+    # Photo and carrier have axes as in the settings.
     matrices = tables.turns(table)
     sd = table.vectors(SD_ROTATIONS, math.inf, infinite=True, read=tables.angle)
     biases = tables.vectors(table, BIAS, 0.0)
@@ -136,7 +136,7 @@ def _inertials(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> Ite
 
 
 def antenna_columns(groups: Mapping[str, Group]) -> dict[str, Any]:
-    """Return the table of groups of positions and velocities, by their names."""
+    """Return the table of groups of positions and velocities by name."""
     own = list(groups.values())
     arms = [each.lever_arm for each in own]
     levers = [each if isinstance(each, LeverArm) else None for each in arms]
@@ -165,7 +165,7 @@ def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats
 
 
 def named_groups(observations: Sequence[Any], *, numbered: bool) -> tuple[list[str], dict[str, Group]]:
-    """Return the name of the group of each observation, empty if it has none, and all groups by name.
+    """Return the group name of each observation, and groups by name.
 
     Groups of antennas are `numbered`; others have the names of their boresights.
     """
@@ -183,7 +183,7 @@ def named_groups(observations: Sequence[Any], *, numbered: bool) -> tuple[list[s
 
 
 def _inertial_name(group: Group, groups: Mapping[str, Group]) -> str:
-    """Return the name of a group: of its boresight, if no other group has it."""
+    """Return the name of a group: of its boresight, if it is unique."""
     if group.key == Group().key:
         return ""
     number = len(groups) + 1
@@ -195,10 +195,10 @@ def _inertial_name(group: Group, groups: Mapping[str, Group]) -> str:
 
 
 def inertial_columns(groups: Mapping[str, Group], block: Block) -> dict[str, Any]:
-    """Return the table of groups of attitudes and rates, by their names."""
+    """Return the table of groups of attitudes and rates by name."""
     own = list(groups.values())
     boresights = [each.boresight for each in own]
-    # The boresight is body to photo; the tables have attitudes of the photo in the axes of what carries it.
+    # The boresight is body to photo; tables contain attitudes of the photo in the axes of its carrier.
     matrices = np.array([_matrix(each) for each in boresights]).transpose(0, 2, 1)
     angles = angles_of(matrices, block)
     angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
@@ -223,7 +223,7 @@ def _matrix(boresight: Any) -> Floats:
 
 
 def _boresight_word(group: str, boresight: Any) -> str:
-    """Return what the cell of a boresight says: `true` where it is called as the group."""
+    """Return the cell of a boresight: `true` if it has the name of the group."""
     if boresight is None:
         return "false"
     return word_of(boresight) if isinstance(boresight, Boresight) and boresight.name != group else "true"

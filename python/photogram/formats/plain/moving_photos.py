@@ -1,4 +1,4 @@
-"""Photos that move: on trajectories, by themselves, line by line."""
+"""Moving photos: on trajectories, with their own motion, or line scanners."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def read_timed(
     trajectories: Mapping[str, Trajectory],
     rigs: Mapping[str, Rig],
 ) -> list[Timed]:
-    """Read which photos are on trajectories, or move by themselves."""
+    """Read the motion of photos: on trajectories, or of their own."""
     table = photos.table
     on, lines = named_of(table, "trajectory", trajectories, "trajectory"), _line_times(tables, photos)
     motions = _motions(tables, table)
@@ -73,7 +73,7 @@ def read_timed(
 
 
 def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
-    """Reject what does not belong together."""
+    """Reject inconsistent combinations of motion columns."""
     flown = "trajectory" in given
     if flown and "velocity" in given:
         raise table.error(row, phrase("plain.motion-columns"))
@@ -88,7 +88,7 @@ def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
 
 
 def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
-    """Return velocity and rate of each row, as arguments of :class:`Timed`; none where nothing is said."""
+    """Return arguments of :class:`Timed` for velocity and rate of each row."""
     values = table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)])
     sd = table.vectors(_SD, infinite=True)
     silent = np.isnan(values).all(axis=1) & np.isnan(sd).all(axis=1)
@@ -103,7 +103,7 @@ def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
 def _on_rig(
     table: ColumnTable, row: int, name: str, own: str, camera: str, rigs: Mapping[str, Rig]
 ) -> tuple[Sensor | None, Clock | None]:
-    """Return pose and clock of a photo's camera on what moves; None: those of the trajectory."""
+    """Return pose and clock of a camera on its carrier; None: trajectory."""
     if not name and not own:
         return None, None
     if not name and len(rigs) != 1:
@@ -116,7 +116,7 @@ def _on_rig(
 
 
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
-    """Return the times of lines by the names of photos."""
+    """Return the line times by photo name."""
     table = tables.rows("line_times")
     places = {name: row for row, name in enumerate([*photos.names, *sorted(photos.unused)])}
     of_photos = indices_of(table, "photo", places, "photo")
@@ -135,7 +135,7 @@ def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
 
 
 def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) -> Photos:
-    """Return photos of which those on trajectories without a pose have the pose of the trajectory."""
+    """Return photos with missing poses completed from their trajectories."""
     centres, matrices = photos.centres.copy(), photos.matrices.copy()
     axes = Cartesian(spheroid)
     places = {name: row for row, name in enumerate(photos.names)}
@@ -151,7 +151,7 @@ def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) ->
 
 
 def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
-    """Return the columns of photos that say how they move; none where no photo does."""
+    """Return the motion columns of photos; empty without moving photos."""
     if not block.timed:
         return {}
     timed = {each.photo: each for each in block.timed}
@@ -173,7 +173,7 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
 
 
 def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
-    """Return velocities and rates of photos that move by themselves."""
+    """Return velocities and rates of photos with their own motion."""
     values, sd = np.full((len(own), 6), np.nan), np.full((len(own), 6), np.nan)
     for row, each in enumerate(own):
         if each is not None and each.trajectory is None:
@@ -186,7 +186,7 @@ def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
 
 
 def line_times_table(block: Block) -> dict[str, Any]:
-    """Return the table of times of lines."""
+    """Return the table of line times."""
     own = [each for each in block.timed if each.lines is not None]
     if not own:
         return {}

@@ -1,4 +1,4 @@
-"""Observations of points, a row each, with what they have in common: each kind is declared once."""
+"""Tables of point observations with shared parameters."""
 
 from __future__ import annotations
 
@@ -42,43 +42,41 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
 from photogram.words import phrase
 
-_THROUGH = "through"  # The field that is a place, in the frame of the project
+_THROUGH = "through"  # The field that contains a position, in the frame of the project
 
 
 @dataclass(frozen=True)
 class _Common:
-    """Unknowns that observations have in common; one that no row of its table has is not known at all."""
+    """Shared parameters of observations; without a row in their table they are free."""
 
-    made: type[Unknown]  # Their class; its fields have the values that it has where cells are empty
-    column: str  # What names them in their table, which is called after it, and in those of observations
-    values: Mapping[str, tuple[str, ...]]  # Columns of each field: all of a row, or none
-    sd: tuple[str, ...]  # Columns of standard deviations: free where they are empty
+    made: type[Unknown]  # Class of the parameters; its fields define the defaults of empty cells
+    column: str  # Column of their name in their table (named after it), and in tables of observations
+    values: Mapping[str, tuple[str, ...]]  # Columns of each field: all or none in a row
+    sd: tuple[str, ...]  # Columns of standard deviations; empty means free
 
     @property
     def table(self) -> str:
-        """The name of the table."""
         return f"{self.column}s"
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of observation."""
+    """A type of observation."""
 
     made: type[Observation]  # Its class, and the table
     table: str
-    points: Mapping[str, str]  # Columns of names of points by the fields that have them
-    # Columns of each field that was observed: 0 where they are empty and need not be there
+    points: Mapping[str, str]  # Columns of point names by field
+    # Columns of each observed field; default 0 if optional
     values: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    # Components with standard deviations `sd_..` and covariances; none: there is one, `sd`
+    # Components with standard deviations `sd_..` and covariances; empty: a single `sd`
     sd: tuple[str, ...] = ()
-    unknown: str = ""  # The field of what observations have in common, and what that is
+    unknown: str = ""  # The field of shared parameters, and their type
     common: _Common | None = None
-    # Whether it is of a photo, or of a trajectory at a time, and has a lever arm there
+    # Whether it belongs to a photo, or to a trajectory at a time, and has a lever arm
     of_photos: bool = False
 
     @property
     def sd_columns(self) -> tuple[str, ...]:
-        """The columns of standard deviations."""
         return deviation_columns(self.sd) or ("sd",)
 
 
@@ -115,8 +113,8 @@ _KINDS = (
 def read_kinds(
     tables: Tables, transform: Transform, points: Mapping[str, int], subjects: Subjects
 ) -> list[Observation]:
-    """Read the tables of all kinds."""
-    # What several kinds may have is read once, and is the same for all of them.
+    """Read the tables of all types."""
+    # Tables of shared parameters are read once, for all types.
     commons = {kind.common.table: kind.common for kind in _KINDS if kind.common is not None}
     known = {name: _commons(tables, transform, each) for name, each in commons.items()}
     found: list[Observation] = []
@@ -139,7 +137,7 @@ def read_kinds(
 def _of_photos(
     tables: Tables, table: ColumnTable, kind: _Kind, subjects: Subjects, given: dict[str, list[Any]]
 ) -> list[dict[str, Any] | None]:
-    """Return what each row is of, with its clock, None of those that are left out; adds lever arms."""
+    """Return subject and clock of each row, None if it is skipped; adds lever arms."""
     given["lever_arm"] = list(tables.vectors(table, _LEVER, 0.0))
     own_clocks = scalars(tables, table, Clock, [kind.table] * table.count)
     return [
@@ -151,7 +149,7 @@ def _of_photos(
 def _given(
     tables: Tables, table: ColumnTable, points: Mapping[str, int], kind: _Kind
 ) -> dict[str, list[Any]]:
-    """Return the fields of all rows but for what observations have in common."""
+    """Return the fields of all rows except shared parameters."""
     required, names = TABLES[kind.table].required, list(points)
     if kind.common is not None and kind.common.column in required:
         table.names(kind.common.column)
@@ -178,7 +176,7 @@ def _given(
 
 
 def _named(table: ColumnTable, common: _Common, known: dict[str, Unknown]) -> list[Unknown | None]:
-    """Return which of the unknowns each row has; those that only the rows name come to be known."""
+    """Return the shared parameters of each row; names without a table row are added."""
     found: list[Unknown | None] = []
     for row, name in enumerate(table.texts(common.column)):
         if name and name not in known:
@@ -215,7 +213,7 @@ def _commons(tables: Tables, transform: Transform, common: _Common) -> dict[str,
 
 
 def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of all kinds of which a block has some."""
+    """Return the tables of all types of observations of a block."""
     found: dict[str, dict[str, Any]] = {}
     for kind in _KINDS:
         own = [each for each in block.observations if isinstance(each, kind.made)]
@@ -241,7 +239,7 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
 
 
 def _photo_columns(own: list[Any], block: Block) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the columns that say what observations are of; those of their lever arms and clocks."""
+    """Return the columns of subjects, and of lever arms and clocks."""
     last = scalar_columns(Clock, [None if each.moment is None else each.clock for each in own])
     levers = np.array([each.observed[1:4] for each in own])
     if levers.any():
@@ -255,14 +253,14 @@ def _deviations(own: list[Observation], kind: _Kind) -> dict[str, Any]:
         return {"sd": np.array([each.sd for each in own], dtype=float)}  # type: ignore[attr-defined]
     if kind.made.MISSING:
         seen = ~np.isnan([each.observed for each in own])
-        # What stands in a matrix for components that were not observed counts for nothing.
+        # Matrix elements of unobserved components are ignored.
         covariances = np.where(seen[:, :, np.newaxis] & seen[:, np.newaxis, :], covariances, np.nan)
     sd = np.sqrt(np.einsum("nii->ni", covariances))
     return columns_of(kind.sd_columns, sd) | correlations(covariances, kind.sd)
 
 
 def _common_columns(block: Block, common: _Common) -> dict[str, Any]:
-    """Return the table of what observations of all kinds have in common of one sort."""
+    """Return a table of shared parameters of observations of all types."""
     kinds = {kind.made: kind.unknown for kind in _KINDS if kind.common is common}
     named = (each for kind in kinds for each in block.observations if isinstance(each, kind))
     there = different([getattr(each, kinds[type(each)]) for each in named])
@@ -272,7 +270,7 @@ def _common_columns(block: Block, common: _Common) -> dict[str, Any]:
         if name == _THROUGH:
             values = [nothing if each.is_open else each.position for each in there]
         else:
-            # As it was given: other axes follow from it.
+            # As it was given: other axes follow from it
             given = (getattr(each, name) for each in there)
             values = [nothing if own is None else np.ravel(own) for own in given]
         array = np.array(values, dtype=float)

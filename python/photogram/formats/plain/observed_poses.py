@@ -1,4 +1,4 @@
-"""Tables of positions, velocities, attitudes, rates and relative poses of photos and of trajectories."""
+"""Tables of positions, velocities, attitudes, rates and relative poses."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ _Columns = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of observation of photos and trajectories."""
+    """A type of observation of photos and trajectories."""
 
     made: type[Position | Velocity | Attitude | Rate]
     table: str
-    field: str  # What was observed
+    field: str  # Observed field
     columns: tuple[str, ...]  # Its components
     groups: str  # The table of its groups
 
@@ -84,7 +84,7 @@ def read_observations(
     points: Mapping[str, int],
     rigs: Mapping[str, Rig],
 ) -> list[Observation]:
-    """Read all tables of observations besides images."""
+    """Read all tables of additional observations."""
     groups = {name: read_groups(tables, name) for name in ("gnss_groups", "attitude_groups")}
     return [
         *(each for kind in _KINDS for each in _read(tables, transform, subjects, kind, groups[kind.groups])),
@@ -120,7 +120,7 @@ def _read(
 
 
 def _measured(tables: Tables, transform: Transform, table: ColumnTable, kind: _Kind) -> tuple[Floats, Floats]:
-    """Return (rows, 3) or (rows, 3, 3) what was observed, and (rows, 3, 3) covariances."""
+    """Return (rows, 3) or (rows, 3, 3) observed values, and (rows, 3, 3) covariances."""
     names, flip = deviation_columns(kind.columns), tables.flip
     if kind.made is Attitude:
         sd = table.vectors(names, read=tables.angle)
@@ -135,7 +135,7 @@ def _measured(tables: Tables, transform: Transform, table: ColumnTable, kind: _K
     covariances = covariances_of(sd, table, kind.columns)
     if kind.made is Position:
         return transform.positions(kind.table, values, covariances, table)
-    # Rates are about axes that point as those of photos do.
+    # Rates refer to axes that are parallel to photo axes.
     return (values @ flip, flip @ covariances @ flip) if kind.made is Rate else (values, covariances)
 
 
@@ -156,7 +156,7 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
 
 
 def observed_tables(block: Block, cameras: Sequence[Camera], rigs: Rigs, films: WrittenFilms) -> _Columns:
-    """Return the tables of all observations beside images, of what they have in common, and of rigs."""
+    """Return the tables of additional observations, shared parameters and rigs."""
     return {
         **_group_tables(block),
         **kind_tables(block),
@@ -178,7 +178,7 @@ def _written(
     components: Sequence[str] = (),
     units: Sequence[float] | None = None,
 ) -> dict[str, Any]:
-    """Return the columns of what was observed, with deviations and covariances of its components."""
+    """Return columns of observed values, standard deviations, covariances."""
     components = components or names
     precisions = np.array([each.precision for each in observations])
     sd = np.sqrt(np.einsum("nii->ni", precisions)) * (1.0 if units is None else units)
@@ -190,7 +190,7 @@ def _written(
 
 
 def _group_tables(block: Block) -> _Columns:
-    """Return the tables of positions, velocities, attitudes and rates, and of their groups."""
+    """Return tables of pose observations and their groups."""
     found: _Columns = {}
     for name in ("gnss_groups", "attitude_groups"):
         kinds = [kind for kind in _KINDS if kind.groups == name]

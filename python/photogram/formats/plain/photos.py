@@ -26,9 +26,9 @@ _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 @dataclass(frozen=True)
 class Photos:
-    """The table of photos, in the frame of the project; those that are not used are named apart.
+    """The table of photos in the project frame; unused photos are separate.
 
-    `rows` are those of the table that are used.
+    `rows` are the used rows of the table.
     """
 
     table: ColumnTable
@@ -47,9 +47,9 @@ class Photos:
 
 
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
-    """Read the table of photos; errors as of :func:`read`."""
+    """Read the table of photos; raises the errors of :func:`read`."""
     table = tables.read("photos")
-    assert table is not None  # the images name photos, too
+    assert table is not None  # The table of images names photos, too
     texts = table.names_once("photo")
     use = table.flags("use")
     centres = table.vectors(AXES)
@@ -111,7 +111,7 @@ def _camera_of(table: ColumnTable, cameras: Cameras) -> list[int]:
 def _attitude_weights(
     tables: Tables, table: ColumnTable, matrices: Floats
 ) -> tuple[Floats, list[Observation]]:
-    """Return standard deviations of omega, phi, kappa, and observations of attitudes given otherwise."""
+    """Return attitude standard deviations, and other attitude observations."""
     settings = tables.settings
     own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
     steps = deviation_columns(ROTATIONS)
@@ -145,9 +145,9 @@ def _attitude_weights(
 
 @dataclass(frozen=True)
 class Images:
-    """The table of images, as it is written; `left` are those that it leaves out of photos there are.
+    """The table of images; `left` are the omitted observations of existing photos.
 
-    `sd_given` is whether the table has standard deviations, or there is one for all; levels are ratios.
+    `sd_given` is True if the table or the settings contain standard deviations; levels are ratios.
     """
 
     sd_given: bool
@@ -160,7 +160,7 @@ class Images:
 
 
 def read_images(tables: Tables, photos: Photos) -> Images:
-    """Read the table of images; errors as of :func:`read`."""
+    """Read the table of images; raises the errors of :func:`read`."""
     table = tables.read("images")
     assert table is not None
     if "camera" in table and "photos" in tables.settings.tables:
@@ -184,7 +184,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
 
 
 def _some(images: Images, which: Bools) -> Images:
-    """Return some images, and the names of their points alone."""
+    """Return selected image observations, and the names of their points only."""
     seen, points = np.unique(images.points[which], return_inverse=True)
     return Images(
         images.sd_given,
@@ -232,10 +232,10 @@ def _sd_is_given(tables: Tables, table: ColumnTable) -> bool:
 def image_coordinates(
     settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, scanned: Bools
 ) -> tuple[Floats, Floats | None]:
-    """Return image coordinates and standard deviations in the unit and along the axes of the cameras.
+    """Return image coordinates and standard deviations of the cameras.
 
-    Those of line scanners are samples and lines, whatever the unit of images: their deviations are in this.
-    Those of scanned films are readings, as they are.
+    Line scanners have samples and lines, with standard deviations in the unit of images. Readings of scanned
+    films are unchanged.
     """
     sd = images.sd if images.sd is None or settings.image != "um" else scaled(images.sd, 1e-3)
     pixels = settings.image == "px" and settings.image_y == "down"

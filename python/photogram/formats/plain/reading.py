@@ -1,4 +1,4 @@
-"""Reading a plain project: tables with a file of settings (schema: docs/formats/plain-tables.md)."""
+"""Reader of the plain project (docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 from photogram.words import Phrase, option_sd, phrase
 
-DIFFER = 1e-6  # What the positions of a point in two tables may differ by
+DIFFER = 1e-6  # Largest difference of the positions of a point in two tables
 _USES = ("control", "check", "off")
 
 
@@ -77,7 +77,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
     trajectories = read_trajectories(tables)
     control = tables.read("control")
-    # The frame is settled by control where it has no origin: it is the first that is carried over.
+    # A frame without origin is defined by control, which is therefore transformed first.
     given = None if control is None else read_control(tables, control, transform)
     photos = read_photos(tables, transform, cameras)
     rigs = read_rigs(tables, [each.name for each in cameras.cameras])
@@ -165,7 +165,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
 def _unused(
     settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, photos: Photos
 ) -> Unused:
-    """Return the images of a board that the table leaves out."""
+    """Return the omitted image observations of a board."""
     left = images.left
     if left is None:
         return Unused()
@@ -180,7 +180,7 @@ def _unused(
 
 
 def _check_features(settings: Settings, names: Sequence[str]) -> None:
-    """Reject features through points that are not there."""
+    """Reject features through missing points."""
     for name, (_, wanted) in settings.features.items():
         try:
             named_points(wanted, names)
@@ -192,7 +192,7 @@ def _check_features(settings: Settings, names: Sequence[str]) -> None:
 def _with_stands(
     photos: Photos, stands: Sequence[Stand], photo_cameras: Sequence[int], cameras: Cameras
 ) -> dict[str, Any]:
-    """Return photos, and what stands for frames without one, as :func:`assembled` takes them."""
+    """Return photos and substitutes of frames for :func:`assembled`."""
     free = np.full((len(stands), 3), np.inf)
     owners = {each.name: row for row, each in enumerate(cameras.cameras)}
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
@@ -216,7 +216,7 @@ def _with_cameras(tables: Tables, path: Path) -> Tables:
 def _unknowns(
     observations: Sequence[Observation], mounts: Sequence[Mount], timed: Sequence[Timed]
 ) -> list[Unknown]:
-    """Return the common unknowns of which covariances may be known."""
+    """Return the shared parameters that may have covariances."""
     found = [unknown for each in observations for unknown in each.unknowns if unknown is not None]
     found += of_records(observations)
     found += [each.sensor for each in mounts]
@@ -229,7 +229,7 @@ def _unknowns(
 
 @dataclass(frozen=True)
 class _Given:
-    """Control and check points: what is held, checked, and observed with correlations."""
+    """Control and check points: fixed, weighted, checked or correlated."""
 
     table: ColumnTable
     names: list[str]
@@ -262,7 +262,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)
     values, turned = transform.positions("control", values, covariances, table)
-    # Along the axes of the frame; what is correlated there is not kept.
+    # Standard deviations are along the axes of the frame, without correlations.
     tilted = (turned != turned * np.eye(3)).any(axis=(1, 2))[:, np.newaxis]
     own = np.where(tilted, np.sqrt(np.diagonal(turned, axis1=1, axis2=2)), sd)
     check_sd = np.where(check & np.isfinite(sd), own, np.nan)
@@ -272,7 +272,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         if use != "control":
             held[row] = np.inf
             continue
-        # Turning changes nothing of such a covariance matrix.
+        # Rotation does not change an isotropic covariance matrix.
         isotropic = (covariances[row] == covariances[row][0, 0] * np.eye(3)).all()
         correlated = (turned[row] - np.diag(np.diag(turned[row]))).any()
         if correlated and np.isfinite(sd[row]).all() and not isotropic:
@@ -287,7 +287,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
 
 
 class _PointRows(Mapping[str, int]):
-    """The row of each point by its name. The first lookup makes the dictionary."""
+    """The row of each point by name, in a dictionary made on demand."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names

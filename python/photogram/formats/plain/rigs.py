@@ -23,12 +23,12 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 
-FRAME = "frame itself"  # What the first sensor of a rig is called where sensors have names of their own
-ZERO = 1e-6  # What the pose of the first sensor of a rig may differ from zero by
+FRAME = "frame itself"  # Name of the first sensor of a rig if sensors have explicit names
+ZERO = 1e-6  # Largest difference of the first sensor's pose from zero
 
 
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
-    """Read rigs: the first sensor of each is the frame; sensors are called by their cameras, or otherwise."""
+    """Read rigs; the first sensor of each defines the frame."""
     table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
@@ -56,7 +56,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
         if name == reference or name in sensors:
             raise table.error(row, phrase("plain.sensor-twice", rig=rig, name=name))
         title = own or f"{rig}/{camera}"
-        # A sensor of which nothing is said starts where the poses of its photos have it.
+        # The initial pose of an unspecified sensor is computed from its photos.
         nothing = np.isnan(matrices[row]).any() and np.isnan(values[row]).all() and np.isinf(sd).all()
         values_of_sensor = () if nothing else (value, matrix, sd)
         sensors[name] = made(table, row, Sensor, title, *values_of_sensor)
@@ -69,7 +69,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
 def read_frames(
     tables: Tables, rigs: Mapping[str, Rig], photos: Sequence[str], cameras: Sequence[str]
 ) -> list[FrameOf]:
-    """Read which photos were taken together."""
+    """Read which photos were taken simultaneously."""
     table = tables.rows("frames")
     rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
@@ -90,7 +90,7 @@ def read_frames(
 
 
 def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> str:
-    """Return what a rig calls the sensor of a photo: as the row says, else as the camera."""
+    """Return the sensor of a photo in a rig: explicit, else its camera."""
     sensor = own or camera
     if sensor != rig.reference and sensor not in rig.sensors:
         raise table.error(row, phrase("plain.no-sensor-of-rig", rig=rig.name, sensor=sensor))
@@ -98,13 +98,13 @@ def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> 
 
 
 def times_of_frames(tables: Tables) -> dict[str, float]:
-    """Return when photos on frames were taken, of those that say it."""
+    """Return the given times of photos on frames."""
     table = tables.rows("frames")
     return times_said(table.texts("photo"), table.numbers("time"))
 
 
 def times_said(photos: Sequence[str], times: Floats) -> dict[str, float]:
-    """Return when photos were taken, of those that say it."""
+    """Return the given times of photos."""
     pairs = zip(photos, times.tolist(), strict=True)
     return {photo: time for photo, time in pairs if not math.isnan(time)}
 
@@ -125,7 +125,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
         for column, end in zip(("from", "to"), ends, strict=True):
             if end != rig.reference and end not in rig.sensors:
                 raise table.cell_error(row, column, "plain.no-sensor-of-rig", rig=name, sensor=end)
-        # The reference is the frame: what lies between two cameras has no direction.
+        # The reference is the frame; a distance between two cameras is undirected.
         first, second = sorted(ends, key=lambda end: end != rig.reference)
         if first == second:
             raise table.error(row, phrase("plain.same-ends", name=first))
@@ -135,7 +135,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
 
 
 class Rigs:
-    """The rigs of a block, whose sensors are called by the cameras of their photos where these tell them."""
+    """Rigs of a block; sensors have camera names if these are unique."""
 
     def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
         self._times = times
@@ -158,9 +158,9 @@ class Rigs:
         self.lost = len(bases) - len(self._bases)
 
     def _told_by_cameras(self) -> bool:
-        """Return whether a camera and that of the frame say which sensor took a photo, and a sensor these.
+        """Return whether cameras of frame and photo identify a sensor.
 
-        On trajectories no photo stands for a frame, which would tell the rig.
+        On trajectories no photo represents a frame, so the rig is unknown.
         """
         if self._flown:
             return False
@@ -180,7 +180,7 @@ class Rigs:
         return self._cameras[mount.photo] if self._by_camera else mount.sensor.name
 
     def place(self, sensor: Sensor) -> tuple[str, str] | None:
-        """Return rig and name of a sensor; None of one that took no photo."""
+        """Return rig and name of a sensor; None for a sensor without photos."""
         return next(
             (
                 (rig, name)
@@ -192,11 +192,11 @@ class Rigs:
         )
 
     def clock(self, sensor: Sensor | None) -> Clock | None:
-        """Return the clock of a sensor, where all of its photos, and none on frames, have it."""
+        """Return the clock of a sensor, if all of its photos have it."""
         return self._clocks.get(id(sensor))
 
     def title(self, sensor: Sensor) -> str:
-        """Return what reading the tables calls a sensor."""
+        """Return the name of a sensor in the tables."""
         place = self.place(sensor)
         return "/".join(place) if place is not None and self._by_camera else sensor.name
 
@@ -250,7 +250,7 @@ class Rigs:
 
 
 def _clocks(block: Block) -> dict[int, Clock]:
-    """Return the clocks of sensors by their identity: of those whose photos have one in common."""
+    """Return clocks of sensors, if all of their photos share one."""
     found: dict[int, Clock | None] = {id(each.sensor): None for each in block.mounts}
     for each in block.timed:
         if each.sensor is not None and found.setdefault(id(each.sensor), each.offset) is not each.offset:
@@ -259,7 +259,7 @@ def _clocks(block: Block) -> dict[int, Clock]:
 
 
 def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
-    """Return poses of sensors: zero of the reference, none of those of which nothing is said."""
+    """Return poses of sensors: zero for the reference, empty if unspecified."""
     values = np.array([np.zeros(3) if each is None else each.position for each in sensors])
     matrices = np.array([np.eye(3) if each is None else each.attitude for each in sensors])
     angles = angles_of(matrices, block)

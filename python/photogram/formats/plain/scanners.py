@@ -1,4 +1,4 @@
-"""The tables of scanners and of films: what the films of photos have in common."""
+"""The tables of scanners and of films: shared properties of the films of photos."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
-BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # What is not affine in films, by their model
+BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # Parameters of models that are not affine
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
 UM = 1e-3  # In millimetres
-KNOWN = 1e-6  # Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)
-LOCAL = "local"  # The pattern of films each of whose photos has a grid of its own
+KNOWN = 1e-6  # Standard deviation of fixed components in a singular covariance (mm, a ratio, radians)
+LOCAL = "local"  # The pattern of films with a separate grid for each photo
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A scanner: its unknowns, what its readings count, and what is known of it."""
+    """A scanner: its unknowns, the definition of its readings, and its prior."""
 
     scanner: Scanner
     curves: tuple[ScannerCurve, ...]
@@ -39,7 +39,7 @@ class Machine:
     known: KnownTogether | None
 
     def held(self) -> Machine:
-        """Return it as errorless."""
+        """Return the scanner with fixed parameters."""
         return Machine(
             self.scanner.replace(sd=0.0),
             tuple(each.replace(sd=0.0) for each in self.curves),
@@ -50,7 +50,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class FilmKind:
-    """What the table of films says of one: its roll, and how the films of its photos are known."""
+    """A row of the table of films: its roll, and priors of its films."""
 
     roll: Roll
     model: str
@@ -58,7 +58,7 @@ class FilmKind:
     sd_bend: tuple[float, float]
     pattern: Pattern | None
     reseau: Callable[..., Reseau] | None = None
-    """Makes that of a photo, by its name and shifts that are known."""
+    """Function that returns the pattern of a photo from its name and known shifts."""
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
@@ -69,7 +69,7 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     given = np.column_stack([table.numbers(name, float(name in ("sx", "sy"))) for name in (*DEVICE, *CURVES)])
     sd = table.vectors([f"sd_{name}" for name in (*DEVICE, *CURVES)], 0.0, infinite=True)
     half = np.column_stack([table.numbers(name, 1.0) for name in ("hx", "hy")])
-    # Rows are told from y, which counts up, by where the project has its readings.
+    # Readings count rows downwards by default.
     down = table.flags("rows_down") if "rows_down" in table else np.ones(table.count, dtype=bool)
     files = table.texts("calibration")
     found = {}
@@ -89,18 +89,18 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
 
 @dataclass(frozen=True)
 class _Numbers:
-    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and what is known of them."""
+    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and their prior."""
 
-    values: Floats  # (21,) of which those are open that have a covariance
+    values: Floats  # (21,) values; those with a covariance are estimated
     sd: Floats
     half: Floats  # (2,) half ranges of the polynomials, mm
-    # (2,) where these count from, mm from the origin of readings
+    # (2,) origin of the polynomials, mm from the origin of readings
     zero: Floats = field(default_factory=lambda: np.zeros(2))
     covariance: Floats | None = None  # (21, 21); None without
 
 
 def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:
-    """Reject what a calibration says beside it."""
+    """Reject other parameters in addition to a calibration file."""
     for column in (*DEVICE, *CURVES, "hx", "hy", *(f"sd_{each}" for each in (*DEVICE, *CURVES))):
         if not math.isnan(table.numbers(column, infinite=True)[row]):
             raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
@@ -109,9 +109,9 @@ def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covarianc
 
 
 def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]) -> _Numbers:
-    """Return what the file of a comparator's calibration says, or that of its correction.
+    """Return the contents of a comparator calibration file, or of its correction.
 
-    Where its covariance is singular, what it has as known is given a thousandth of a micrometre.
+    Fixed components of a singular covariance matrix get a standard deviation of 0.001 um.
     """
     from photogram.comparator.correction import Correction
     from photogram.comparator.polynomial import Frame
@@ -137,9 +137,9 @@ def _calibrated(table: ColumnTable, row: int, file: str, messages: list[Message]
 def _machine(
     table: ColumnTable, row: int, name: str, numbers: _Numbers, readings: Readings, covariances: Covariances
 ) -> Machine:
-    """Return a scanner with its curves, if it has such, and what is known of both together."""
+    """Return a scanner with its curves, if any, and their joint prior."""
     words, named = ["sx", "sy", "alpha", *CURVES], covariances.names("scanner", name)
-    # By the first of their three numbers.
+    # By the index of the first of their three numbers
     parts: dict[int, tuple[type[Unknown], str]] = {0: (Scanner, name)}
     if numbers.values[3:].any() or numbers.sd[3:].any() or named - set(words[:3]):
         parts |= {3 * k: (ScannerCurve, f"{name} {k}") for k in range(1, 7)}
@@ -147,7 +147,7 @@ def _machine(
     if numbers.covariance is not None:
         joined = [at for at in parts if np.isinf(sd[at])]
     else:
-        # A covariance is of all three of an unknown, or of none.
+        # A covariance matrix contains all three parameters of an unknown, or none.
         joined = [at for at in parts if named & set(words[at : at + 3])] or [0] * bool(named)
     rows = [at + k for at in joined for k in range(3)]
     sd[rows] = np.inf
@@ -169,7 +169,7 @@ def _machine(
 
 
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
-    """Read the table of films; those that are not in it have the defaults."""
+    """Read the table of films; films without a row have defaults."""
     table = tables.rows("films")
     found = {
         name: FilmKind(Roll(name, 0.0, 5e-4), default, (1e-4,) * 3, _bends(default), None) for name in names
@@ -222,7 +222,7 @@ def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
 
 
 def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
-    """Return what makes the reseau of a photo."""
+    """Return a function that creates the reseau of a photo."""
     values, sd = _needed(table, row, LOCAL, GRID, 2)
     smooth = float(table.numbers("sd_smooth", np.inf, infinite=True)[row])
 
@@ -236,7 +236,7 @@ def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
 def _needed(
     table: ColumnTable, row: int, kind: str, columns: Sequence[str], count: int
 ) -> tuple[Floats, Floats]:
-    """Return numbers of a pattern and deviations of its weights."""
+    """Return the numbers of a pattern and standard deviations of its weights."""
     values = table.vectors(columns)[row]
     missing = [name for name, value in zip(columns, values, strict=True) if math.isnan(value)]
     if missing:

@@ -1,4 +1,4 @@
-"""The tables of the plain project, each declared once (docs/formats/plain-tables.md)."""
+"""Tables of the plain project (docs/formats/plain-tables.md)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
 POSE = (*AXES, *ROTATIONS)  # Components of poses: small rotations are about the axes of the photo
 VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
 BIAS = ("bias_x", "bias_y", "bias_z")
-BASES = ("position", "rotation")  # What a trajectory has coefficients of
+BASES = ("position", "rotation")  # Corrections of a trajectory
 FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")
-"""Of neighbouring coefficients, whose sum was observed."""
+"""Factors of neighbouring coefficients in an observed sum."""
 ANGLES: Mapping[str, tuple[str, ...]] = {
     "omega_phi_kappa": ("omega", "phi", "kappa"),
     "phi_omega_kappa": ("phi", "omega", "kappa"),
@@ -27,12 +27,12 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
     "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
 }
 """Columns of each representation of attitudes."""
-OPK = ANGLES["omega_phi_kappa"]  # That which is written
+OPK = ANGLES["omega_phi_kappa"]  # Representation in written files
 ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
 
 
 def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
-    """Return the columns of covariances between components, and which ones: `cov_xy`, `cov_x_rotation_y`."""
+    """Return covariance columns by index pair: `cov_xy`, `cov_x_rotation_y`."""
     return {
         f"cov_{names[i]}{names[j]}" if len(names[i] + names[j]) == 2 else f"cov_{names[i]}_{names[j]}": (i, j)
         for j in range(len(names))
@@ -49,24 +49,23 @@ def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
 class Schema:
     """A table."""
 
-    required: tuple[str, ...]  # Columns that it must have
-    texts: tuple[str, ...]  # All columns that it may have: names and words, and numbers
+    required: tuple[str, ...]  # Required columns
+    texts: tuple[str, ...]  # Allowed columns: names and words, and numbers
     numbers: tuple[str, ...]
-    # How many standard deviations `[sd]` may have for it; none: it has no place there
+    # Allowed numbers of standard deviations in `[sd]`; empty: not allowed
     deviations: tuple[int, ...] = ()
-    # Whether its coordinates may be in another system than the frame, and its headings be those of
-    # others
+    # Whether coordinates may be in another system than the frame, with other headings
     has_system: bool = False
-    # The column that may be there in the place of a required one
+    # Alternatives to required columns
     stands_in: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """All columns that the table may have."""
+        """All allowed columns."""
         return self.texts + self.numbers
 
     def needed(self, there: Collection[str]) -> tuple[str, ...]:
-        """Return the columns that a table with some columns must have."""
+        """Return the required columns of a table that has some columns."""
         return tuple(each for each in self.required if self.stands_in.get(each) not in there)
 
 
@@ -80,7 +79,7 @@ GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
 FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
 BENDS = ("bend_x", "bend_y")  # Deflections of a board
 PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
-_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # Of angles about axes
+_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # For angles about axes
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
 _CLOCK = ("time_offset", "sd_time_offset")
@@ -367,7 +366,7 @@ TABLES: Mapping[str, Schema] = {
         ("covariance",),
     ),
 }
-"""In the order in which they are read and written."""
+"""Tables in the order of reading and writing."""
 
 _OF_IMAGES = ("images", "fiducial_images")
 _IMAGE_UNITS = frozenset(("f", "fx", "fy", "c", "cx", "cy", "x0", "y0"))
@@ -395,7 +394,7 @@ _ANGLES = frozenset((*ALL_ANGLES[:9], *ROTATIONS))
 
 
 def column_units(name: str, length: str = "m", angle: str = "deg", image: str = "px") -> Units:
-    """Return kind and size of the unit of each column of numbers of a table, by the units of a project."""
+    """Return unit type and size of each numeric column of a table."""
     metres, radians = UNITS[length], KINDS_OF_UNITS["angle"].get(angle, KINDS_OF_UNITS["angle"]["deg"])
     of_image = ("pixel", 1.0) if image == "px" else ("length", UNITS[image])
     found = dict.fromkeys(TABLES[name].numbers, ("", 1.0))

@@ -1,7 +1,7 @@
-"""Scans that were joined of two parts: each part is a film of its own, and both have one pose.
+"""Scans joined from two parts: two films with one pose.
 
-`seam_column` or `seam_row` of a photo is the line between them. What is read beyond it, images and marks, is
-of a second photo, `NAME half 2`, which is mounted on the first where that is; nothing else knows of seams.
+`seam_column` or `seam_row` of a photo is the seam. Readings beyond it, images and marks, belong to a second
+photo, `NAME half 2`, which is mounted on the first. Other modules do not process seams.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ _LINES = ("column", "row")
 class Seam:
     """The line at which a scan was joined."""
 
-    half: str  # What the photo of the second half is called
-    line: str  # `column` or `row`, and that from which readings are of the second half
+    half: str  # Photo name of the second half
+    line: str  # `column` or `row`, and the coordinate at which the second half begins
     at: float
 
 
-Seams = Mapping[str, Seam]  # By the names of photos
+Seams = Mapping[str, Seam]  # By photo name
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:
-    """Return tables whose joined scans are divided, and the seams."""
+    """Return tables with divided scans, and the seams."""
     table = tables.read("photos")
     found: dict[str, Seam] = {}
     if table is None or not any(f"seam_{line}" in table for line in _LINES):
@@ -54,12 +54,12 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
 
 @dataclass(frozen=True)
 class _Divided(Tables):
-    """Tables in which what is beyond a seam is of the second half."""
+    """Tables in which readings beyond a seam belong to the second half."""
 
     seams: Seams = field(default_factory=dict)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there, divided; errors as of the others."""
+        """Return a table if it exists, divided; raises the same errors."""
         table = super().read(name)
         if table is None or name not in ("photos", "images", "fiducial_images"):
             return table
@@ -67,7 +67,7 @@ class _Divided(Tables):
 
 
 def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
-    """Return readings, those beyond a seam of its second half."""
+    """Return readings, with the photo of the second half beyond a seam."""
     texts = table.texts("photo")
     lines = {line: table.numbers(line) for line in _LINES}
     for row, photo in enumerate(texts):
@@ -81,7 +81,7 @@ def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
 
 
 def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
-    """Return the table of photos with a row for each second half, of whose pose nothing is known."""
+    """Return the table of photos with a row without pose for each second half."""
     texts = table.texts("photo")
     more = [row for row, name in enumerate(texts) if name in seams]
     found = table.some([*range(table.count), *more])
@@ -98,7 +98,7 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
 def mounted_halves(
     seams: Seams, mounts: Sequence[Mount], timed: Sequence[Timed], photos: Sequence[str]
 ) -> list[Mount]:
-    """Return mounts with those of second halves; on a trajectory both halves are where it is."""
+    """Return mounts including second halves; on a trajectory both halves are on it."""
     if not seams:
         return [*mounts]
     on_frames = {each.photo: each for each in mounts}

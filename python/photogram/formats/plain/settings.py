@@ -1,4 +1,4 @@
-"""`project.toml`: units, axes, frame, standard deviations and options of a plain project."""
+"""`project.toml`: settings of a plain project."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from photogram.words import Phrase, phrase
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
 WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviations} | {"check": (1, 3)}
-"""Of check points they are those of the table of control."""
+"""Check points have the standard deviations of the table of control."""
 ENDINGS = (".csv", ".tsv", ".txt", ".parquet")
 
 LENGTHS = ("m", "km", "mm", "ft", "us-ft")
@@ -46,7 +46,7 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("adjust", "loss"): ("none", "huber", "cauchy"),
     ("adjust", "unit_variance"): ("constrained", "unity", "redundancy", "free"),
 }
-"""Words that a key may have; the first is the default."""
+"""Allowed words of a key; the first is the default."""
 _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "project": ("format", "name"),
     "frame": ("kind", "crs", "origin", "ellipsoid"),
@@ -66,10 +66,10 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What `project.toml` says, or tables that come without one: all that it leaves out has its default."""
+    """The settings of `project.toml`, or defaults for tables without it."""
 
-    path: Path  # The file, or what errors name where there is none
-    name: str = ""  # Of the project
+    path: Path  # The file, or the path for error messages
+    name: str = ""  # Name of the project
     frame: Frame = field(default_factory=Frame)  # As in a project
     options: Options = field(default_factory=Options)
     length: str = "m"  # Units
@@ -80,27 +80,26 @@ class Settings:
     attitude: str = "omega_phi_kappa"
     rotation: str = "object_to_photo"
     photo: str = "y_up"
-    # What seconds of all tables count from, a number or a date, and of which scale: said, not
-    # calculated with
+    # Time origin of all tables, a number or a date, and time scale: documentation only
     time_origin: float | str = 0.0
     time_scale: str = "none"
     # Standard deviations of tables without columns for them: three numbers, of images two
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    tables: Mapping[str, Path] = field(default_factory=dict)  # The file of each table that is there
-    crs: Mapping[str, str] = field(default_factory=dict)  # Of tables whose coordinates are not in the frame
-    # What is said of the columns of tables of points, as `--columns` and `--roles` say it
+    tables: Mapping[str, Path] = field(default_factory=dict)  # The file of each existing table
+    crs: Mapping[str, str] = field(default_factory=dict)  # Systems of tables not in the frame
+    # Columns of point tables in the form of `--columns` and `--roles`
     columns: Mapping[str, Columns] = field(default_factory=dict)
-    # By their names, as :func:`photogram.features` takes them
+    # By name, as arguments of :func:`photogram.features`
     features: Mapping[str, Definition] = field(default_factory=dict)
-    photo_files: PhotoFiles | None = None  # Where photographs lie whose files carry positions; None without
-    # What `[check]` and `[statement]` say, as :meth:`photogram.Result.statement` takes it
+    photo_files: PhotoFiles | None = None  # Folder of photographs with positions; None without
+    # Contents of `[check]` and `[statement]`, as arguments of :meth:`photogram.Result.statement`
     statement: Mapping[str, Any] = field(default_factory=dict)
-    # The model of films that say none; whether their interior orientation is unknown inside the
-    # adjustment, or fitted before it and errorless
+    # Default model of films; whether interior orientation is estimated in the adjustment, or fitted in
+    # advance and fixed
     film: str = "affine"
     interior: str = "inside"
     certificates: tuple[Path, ...] = ()  # The files of the certificates of the cameras of films
-    flown: date | None = None  # The day of the flight; None where it is not said
+    flown: date | None = None  # Date of flight; None if unknown
 
     def __post_init__(self) -> None:
         if not self.image_y:
@@ -108,7 +107,7 @@ class Settings:
 
     @property
     def times(self) -> str:
-        """What seconds count from, as people are told; nothing where it is not said."""
+        """Time origin for users; empty if unknown."""
         if self.time_origin == 0.0 and self.time_scale == "none":
             return ""
         return f"seconds from {self.time_origin}" + (
@@ -117,14 +116,14 @@ class Settings:
 
 
 def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
-    """Read a file of settings, and find the tables that it names or that lie beside it."""
+    """Read a file of settings, and find its tables, named or in its folder."""
     wishes = wishes or Wishes()
     file = read_document(path, _KEYS, wishes.settings)
     project, frame, adjust = (file.optional(name) for name in ("project", "frame", "adjust"))
     if project.value("format", "") is not VERSION:
         raise project.value_error("format", "plain.version", version=VERSION)
     length = _word(file, "units", "length")
-    # Defaults of the keys are those of the settings.
+    # Defaults of the keys are the defaults of the settings.
     words: dict[str, Any] = {
         key: _word(file, section, key)
         for section in ("units", "axes")
@@ -166,7 +165,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
 
 
 def _word(file: Document, section: str, key: str) -> str:
-    """Return one of the words of a key."""
+    """Return the allowed word of a key."""
     words = _CHOICES[section, key]
     return file.optional(section).choice(key, words, words[0])
 
@@ -194,7 +193,7 @@ def _photo_files(table: Table) -> PhotoFiles | None:
 
 
 def _certificates(table: Table) -> tuple[Path, ...]:
-    """Return the files of the certificates of the cameras of films: one text, or a list."""
+    """Return the certificate files of film cameras: one text, or a list."""
     value = table.values.get("certificate", [])
     names = [value] if isinstance(value, str) else table.texts("certificate") if value else []
     paths = tuple(table.file.parent / name for name in dict.fromkeys(names))
@@ -205,7 +204,6 @@ def _certificates(table: Table) -> tuple[Path, ...]:
 
 
 def _flown(table: Table) -> date | None:
-    """Return the day of the flight."""
     try:
         return day_of(table.values["flown"]) if "flown" in table else None
     except ValueError:
@@ -213,7 +211,7 @@ def _flown(table: Table) -> date | None:
 
 
 def _features(table: Table) -> dict[str, Definition]:
-    """Return the kind of each feature, and its points."""
+    """Return the type and the points of each feature."""
     features: dict[str, Definition] = {}
     for name, value in table.values.items():
         if not isinstance(value, dict) or len(value) != 1:
@@ -226,7 +224,6 @@ def _features(table: Table) -> dict[str, Definition]:
 
 
 def _origin(table: Table) -> tuple[float, float, float] | None:
-    """Return latitude, longitude, height."""
     if "origin" not in table:
         return None
     latitude, longitude, height = table.numbers("origin", 3)
@@ -241,14 +238,13 @@ def _time_origin(table: Table) -> float | str:
     if isinstance(value, int | float):
         return table.number("origin", 0.0)
     try:
-        # TOML has dates of its own.
+        # TOML has a date type.
         return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
     except (TypeError, ValueError):
         raise table.value_error("origin", "plain.time-origin") from None
 
 
 def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
-    """Return the standard deviations of tables."""
     found = {name: tuple(table.numbers(name, WITH_SD[name])) for name in table.values}
     for name, values in found.items():
         if min(values) < 0:
@@ -257,7 +253,7 @@ def _deviations(table: Table) -> dict[str, tuple[float, ...]]:
 
 
 def unread_tables(settings: Settings) -> list[Message]:
-    """Return a remark on tables beside the settings that no table is called, with the nearest names."""
+    """Return a remark on unused tables, with similar names."""
     used = {os.path.realpath(path) for path in settings.tables.values()}
     others = [
         path
@@ -275,13 +271,12 @@ def unread_tables(settings: Settings) -> list[Message]:
 
 
 def _tables(table: Table) -> dict[str, Path]:
-    """Return the file of each table."""
     folder = table.file.parent
     found: dict[str, Path] = {}
     for name in TABLES:
         if name in table:
             found[name] = folder / table.text(name)
-            if not os.path.isfile(found[name]):  # nor if the name is too long for the system
+            if not os.path.isfile(found[name]):  # Also if the name is too long for the system
                 raise table.error(name, phrase("error.absent", kind="file", name=str(found[name])))
             continue
         present = [path for ending in ENDINGS if (path := folder / f"{name}{ending}").is_file()]

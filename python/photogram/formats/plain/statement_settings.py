@@ -1,4 +1,4 @@
-"""Sections `[check]` and `[statement]` of `project.toml`: what a project asks of its accuracy statement."""
+"""Sections `[check]` and `[statement]` of `project.toml`."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ KEYS: Mapping[str, tuple[str, ...]] = {
         *("coverage", "title", "project", "client", "firm", "surveyor", "date", "length_limit", "expansion"),
     ),
 }
-"""Of the sections."""
+"""Keys of the sections."""
 CLASS = "class_"
 _NAMES = {"length_limit": "limit"}
-"""Keys that are called otherwise in :class:`photogram.results.statement.request.Asked`."""
-SENTENCES = "sentences.toml"  # The file that sentences are written to
+"""Keys with other names in :class:`photogram.results.statement.request.Asked`."""
+SENTENCES = "sentences.toml"  # File for sentences
 
 SOME_LENGTH = {"line": "1", "from": "A", "to": "B", "length": 1.0, "sd": 0.0}
 
@@ -47,14 +47,13 @@ def read_asked(file: Document, unit: str) -> dict[str, Any]:
                     name, value = "classes", {key.removeprefix(CLASS): value}
                 if key == "language":
                     Texts(value)
-                # Whether there are lengths is not known before the tables are read.
+                # The existence of lengths is unknown before the tables are read.
                 value = getattr(Asked.checked(lengths=(SOME_LENGTH,), **{name: value}), name)
             found[name] = {**found.get(name, {}), **value} if name == "classes" else value
     return found
 
 
 def _value(table: Table, key: str, unit: str) -> Any:
-    """Return the value of a key."""
     value = table.values[key]
     match key:
         case "survey_common_sd":
@@ -81,7 +80,7 @@ def _value(table: Table, key: str, unit: str) -> Any:
             return value
         case "text":
             path = table.file.parent / table.text(key)
-            if not os.path.isfile(path):  # nor if the name is too long for the system
+            if not os.path.isfile(path):  # Also if the name is too long for the system
                 raise table.error(key, phrase("error.absent", kind="file", name=str(path)))
             return read_sentences(path)
         case "date" if type(value) is datetime.date:
@@ -91,12 +90,12 @@ def _value(table: Table, key: str, unit: str) -> Any:
 
 
 def asked_tables(asked: Mapping[str, Any], unit: str) -> dict[str, Mapping[str, Any]]:
-    """Return the sections by name, which :func:`read_asked` reads again."""
+    """Return the sections by name, in the form for :func:`read_asked`."""
     return {section: {key: _said(asked, key, unit) for key in keys} for section, keys in KEYS.items()}
 
 
 def _said(asked: Mapping[str, Any], key: str, unit: str) -> Any:
-    """Return what a key is to have; None where nothing is asked."""
+    """Return the value of a key; None if it is not set."""
     if key.startswith(CLASS):
         size = asked.get("classes", {}).get(key.removeprefix(CLASS))
         return None if size is None else f"{float(size)!r}{unit}"
@@ -109,7 +108,7 @@ def _said(asked: Mapping[str, Any], key: str, unit: str) -> Any:
 
 
 def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the file of sentences that is asked for, by its name; none without."""
+    """Return the requested file of sentences by name; empty without."""
     if (sentences := asked.get("text")) is None:
         return {}
     lines = [f"{quoted_text(key)} = {quoted_text(sentence)}\n" for key, sentence in sentences.items()]
@@ -117,7 +116,7 @@ def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def read_sentences(path: Path) -> dict[str, str]:
-    """Return the sentences of a TOML file by their keys: `"asprs.tested.h" = "Tested with {n} points."`."""
+    """Return sentences of a TOML file by key."""
     file = TomlFile(path)
     for key, sentence in file.content.items():
         if not isinstance(sentence, str):

@@ -1,4 +1,4 @@
-"""Tables of a plain project that its accuracy statement needs: calibrated lengths, cover of check points."""
+"""Tables for the accuracy statement: calibrated lengths, cover."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from photogram.results.statement.request import Asked
 from photogram.words import phrase
 
 COVERS = ("open", "vegetated")
-"""What check points lie in; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
+"""Cover of check points; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
 
 
 def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) -> frozenset[str]:
-    """Return the check points of a table of control that lie in vegetation."""
+    """Return the check points in vegetation of a table of control."""
     found = []
     for row, word in enumerate(table.words("cover", COVERS)):
         if word == COVERS[0]:
@@ -33,7 +33,7 @@ def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) ->
 
 
 def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str]) -> dict[str, Any]:
-    """Return what a project asks of its statement, as :meth:`photogram.Result.statement` takes it."""
+    """Return the arguments of :meth:`photogram.Result.statement` for a project."""
     found, path = dict(tables.settings.statement), tables.settings.path
     for name in found.get("without", ()):
         if name not in points:
@@ -46,13 +46,12 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
     try:
         Asked.checked(**found)
     except InputError as error:
-        # Each by itself was checked with its line: together they are refused for want of lengths only.
+        # Each value was checked with its line: the combination is only rejected without lengths.
         raise TomlFile(path).error("standards", message_of(error), "statement") from None
     return found
 
 
 def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
-    """Return the rows of the table of calibrated lengths."""
     table = tables.rows("lengths")
     table.names("line")
     for end in ENDS:
@@ -87,14 +86,14 @@ def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
 def with_cover(
     asked: Mapping[str, Any], points: Collection[str], vegetated: frozenset[str]
 ) -> dict[str, Any]:
-    """Return what is asked where a table says of some points which of them lie in vegetation."""
+    """Return the settings of a statement with the vegetation cover of a table."""
     rest = {name: own for name, own in asked.items() if name != "vegetated"}
     every = asked.get("vegetated", frozenset()).difference(points) | vegetated
     return {**rest, "vegetated": every} if every else rest
 
 
 def asked_by_other_names(asked: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
-    """Return what is asked where points have other names."""
+    """Return the settings of a statement with renamed points."""
     found = dict(asked)
     if "vegetated" in found:
         found["vegetated"] = frozenset(names.get(each, each) for each in found["vegetated"])
@@ -111,7 +110,7 @@ def asked_by_other_names(asked: Mapping[str, Any], names: Mapping[str, str]) -> 
 
 
 def _quantity(asked: str, names: Mapping[str, str]) -> str:
-    """Return `point C08 z` or `distance C01 C30` with other names, which may have blanks in them."""
+    """Rename the points of `point C08 z` or `distance C01 C30`."""
     kind, *words = asked.split()
     if kind == "point" and (point := " ".join(words[:-1])) in names:
         return f"point {names[point]} {words[-1]}"
@@ -124,7 +123,7 @@ def _quantity(asked: str, names: Mapping[str, str]) -> str:
 
 
 def parts_of_asked(asked: Mapping[str, Any]) -> list[str]:
-    """Return what it consists of, for people."""
+    """Return the parts of the settings of a statement for users."""
     found = []
     if asked.keys() - {"lengths", "vegetated"}:
         found.append("what is asked of an accuracy statement")

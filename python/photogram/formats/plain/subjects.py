@@ -1,4 +1,4 @@
-"""What rows of observations are of: photos, or trajectories at times; and the clocks that date them."""
+"""Subjects of observations: photos, or trajectories at times; and their clocks."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from photogram.words import phrase
 
 _Scalar = TypeVar("_Scalar", Clock, Readout)
 _COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Readout: ("scan", "line_rate")}
-"""What names clocks, and line rates of scans, and their numbers."""
+"""Columns of the names and numbers of clocks, and of line rates of scans."""
 
 
 @dataclass(frozen=True)
 class Subjects:
-    """What observations may be of."""
+    """The possible subjects of observations."""
 
-    photos: Mapping[str, int]  # Photos by their names, and the times of each in seconds; NaN without
+    photos: Mapping[str, int]  # Photos by name, and the time of each in seconds; NaN without
     times: Sequence[float]
-    trajectories: Mapping[str, Trajectory]  # By their names
+    trajectories: Mapping[str, Trajectory]  # By name
 
     def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
-        """Return what each row is of, as arguments of its observation; None of those that are left out.
+        """Return the subject of each row as arguments; None for skipped rows.
 
-        These are at times that their trajectory does not reach; a remark has their number.
+        Rows at times outside their trajectory are skipped; a remark contains their number.
         """
         if "trajectory" not in table:
             names, rows = list(self.photos), indices_of(table, "photo", self.photos, "photo").tolist()
@@ -60,7 +60,7 @@ class Subjects:
 
 
 def clocked(table: ColumnTable, row: int, of: Mapping[str, Any], clock: Clock | None) -> dict[str, Any]:
-    """Return what an observation is of, with its clock."""
+    """Return the subject of an observation, with its clock."""
     if clock is None:
         return dict(of)
     if "trajectory" not in of:
@@ -71,10 +71,10 @@ def clocked(table: ColumnTable, row: int, of: Mapping[str, Any], clock: Clock | 
 def subject_columns(
     observations: Sequence[Position | Velocity | Attitude | Rate | Range], block: Block
 ) -> dict[str, Any]:
-    """Return the columns that say what observations are of."""
+    """Return the columns of the subjects of observations."""
     moments = [each.moment for each in observations]
     if not any(moments):
-        # Where photos have times of their own, those of drifts are said beside.
+        # If photos have times, the times of drifts are written in addition.
         times = [each.time for each in observations] if block.timed else []
         dated = any(isinstance(each, Position) for each in observations)
         return {
@@ -92,9 +92,9 @@ def subject_columns(
 def scalars(
     tables: Tables, table: ColumnTable, kind: type[_Scalar], titles: Sequence[str], usual: float = 0.0
 ) -> list[_Scalar | None]:
-    """Return the clock of each row, or the factor of its line rate, as a rule 1; None without.
+    """Return clock or line rate factor (default 1) of each row; None without.
 
-    One without a name is called by its title.
+    Without a name, the title is the name.
     """
     word, number = _COLUMNS[kind]
     values, sd = table.numbers(number, usual), table.numbers(f"sd_{number}", 0.0, infinite=True)

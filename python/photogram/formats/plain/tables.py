@@ -1,4 +1,4 @@
-"""The tables of a plain project: how cells become numbers, and these columns."""
+"""Conversion of the tables of a plain project to numbers, and back."""
 
 from __future__ import annotations
 
@@ -37,27 +37,27 @@ from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 _Named = TypeVar("_Named")
-DEGREE = 180 / np.pi  # Of a radian
+DEGREE = 180 / np.pi  # Degrees per radian
 
 
 def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
-    """Return our names of columns; latitudes and longitudes need a table with a system of coordinates."""
+    """Return internal column names; geographic ones need a system."""
     names = PLAIN.spelled(known, own)
     return [heading if is_angular(heading) else name for heading, name in zip(own, names, strict=True)]
 
 
 @dataclass(frozen=True)
 class Tables:
-    """The tables of a project with its settings, read as they are asked for; collects remarks."""
+    """The tables of a project with its settings, read on demand; collects remarks."""
 
-    settings: Settings  # Of the project
+    settings: Settings  # Settings of the project
     messages: list[Message]  # Remarks
-    names: Collection[str] = ()  # Points that have images, where they are known before the tables are read
-    shared: Shared = field(default_factory=Shared)  # Common unknowns that rows of all tables name
+    names: Collection[str] = ()  # Observed points, if they are known before the tables are read
+    shared: Shared = field(default_factory=Shared)  # Shared parameters in rows of all tables
     _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there. It is parsed once, except images, which are too large to store."""
+        """Return a table if it exists, parsed once except images."""
         if name in self._tables:
             return self._tables[name]
         table = self._parsed(name)
@@ -88,7 +88,7 @@ class Tables:
         return settled(table, given, known, units, required, self.names, name, self.messages)
 
     def _photos_of_images(self) -> ColumnTable | None:
-        """Return a table of the photos that the images name, for a project without one."""
+        """Return a table of photos from the images, for a project without one."""
         images = self.read("images")
         assert images is not None
         photos = images.names("photo")
@@ -104,7 +104,7 @@ class Tables:
         return ColumnTable(images.path, images.head, tuple(cells), len(rows), cells, records)
 
     def rows(self, name: str) -> ColumnTable:
-        """Return a table, one without rows where there is none; errors as :meth:`read`."""
+        """Return a table, possibly without rows; errors as :meth:`read`."""
         found = self.read(name)
         if found is not None:
             return found
@@ -112,7 +112,7 @@ class Tables:
         return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
 
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
-        """Add a remark, on a file."""
+        """Add a remark, optionally on a file."""
         self.messages.append(Message.of(code, path, **fields))
 
     def angle(self, text: str) -> float:
@@ -146,7 +146,7 @@ class Tables:
         return found
 
     def known_matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
+        """Return (rows, 3, 3) attitudes A, photo to object, all required."""
         found = self.matrices(table)
         unknown = np.isnan(found).any(axis=(1, 2))
         if unknown.any():
@@ -155,16 +155,16 @@ class Tables:
 
     @property
     def radians(self) -> float:
-        """What a number of the unit of angles is in radians, for covariances."""
+        """Radians per unit of angles, for covariances."""
         return {"gon": math.pi / 200, "rad": 1.0}.get(self.settings.angle, math.pi / 180)
 
     @property
     def flip(self) -> Floats:
-        """(3, 3) what carries vectors from the axes of photos, as the settings have them, to ours."""
+        """(3, 3) transformation from photo axes of the settings to internal axes."""
         return Y_DOWN if self.settings.photo == "y_down" else np.eye(3)
 
     def turns(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) the axes of one photo in those of another, as columns; NaN without."""
+        """Return (rows, 3, 3) axes of one photo in another, as columns."""
         found: Floats = self.flip @ self.matrices(table)
         return found
 
@@ -174,14 +174,14 @@ class Tables:
         return found
 
     def pose_covariances(self, table: ColumnTable, sd: Floats) -> Floats:
-        """Return (rows, 6, 6) covariances of poses, from standard deviations in our units and columns."""
+        """Return (rows, 6, 6) covariances of poses in internal units."""
         found = covariances_of(sd, table, POSE, (1.0,) * 3 + (self.radians,) * 3)
         signs = np.tile(np.diag(self.flip), 2)
         turned: Floats = found * signs * signs[:, np.newaxis]
         return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Reject quaternions without length and matrices that are no rotations, with their rows."""
+        """Reject invalid quaternions and matrices, with their rows."""
         kind = self.settings.attitude
         for row in known.tolist():
             if kind == "quaternion":
@@ -194,7 +194,7 @@ class Tables:
     def deviations(
         self, table: ColumnTable, kind: str, columns: Sequence[str], default: float = math.nan
     ) -> Floats:
-        """Return (rows, k) standard deviations: of the table, else of `[sd]`, else the default."""
+        """Return (rows, k) standard deviations: table, `[sd]`, or default."""
         given = self.settings.sd.get(kind)
         defaults = (
             [default] * len(columns)
@@ -219,13 +219,13 @@ class Tables:
 
 
 def matrices_of(settings: Settings, values: Floats) -> Floats:
-    """Return (n, 3, 3) attitudes A, photo to object, from the numbers of the representation of a project."""
+    """Return (n, 3, 3) attitudes A, photo to object, from their numbers in tables."""
     kind = settings.attitude
     given = values.reshape(-1, 3, 3) if kind == "matrix" else values
     found = Attitudes.of(cast("Representation", kind), given).matrices
     if kind in ("yaw_pitch_roll", "azimuth_tilt_swing"):
         return found
-    # Of these kinds the numbers are read as a matrix Q, and the settings say what Q is.
+    # Numbers of these types define a matrix Q; the settings define its direction.
     turned = found.transpose(0, 2, 1) if kind in ("omega_phi_kappa", "phi_omega_kappa") else found
     to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
     if settings.photo == "y_down":
@@ -240,9 +240,9 @@ def covariances_of(
     names: Sequence[str] = AXES,
     units: Sequence[float] | None = None,
 ) -> Floats:
-    """Return (n, k, k) covariances from standard deviations (n, k) and the columns cov_xy ... of a table.
+    """Return (n, k, k) covariances of (n, k) standard deviations and cov_xy ...
 
-    `units` are what a number of the table is in our unit of each component; None: the same.
+    `units` are the internal units per unit of the table of each component; None: 1.
     """
     count = len(names)
     found = np.zeros((len(sd), count, count))
@@ -255,7 +255,7 @@ def covariances_of(
 
 
 def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind: str) -> Indices:
-    """Return (rows,) which of the named things each row is of."""
+    """Return (rows,) the index of the named object of each row."""
     found = table.names(column)
     rows = np.array([places.get(name, -1) for name in found.names], dtype=np.int64)
     if (rows < 0).any():
@@ -266,7 +266,7 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
 
 
 def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind: str) -> list[_Named | None]:
-    """Return which of the named things each row names; None where the cell is empty."""
+    """Return the named object of each row; None for an empty cell."""
     names = table.texts(column)
     for row, name in enumerate(names):
         if name and name not in known:
@@ -277,7 +277,7 @@ def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind:
 def vectors_of(
     table: ColumnTable, columns: Sequence[str], read: Callable[[str], float] | None = None
 ) -> Floats:
-    """Return (rows, k) numbers that are given altogether or not at all; NaN where they are not."""
+    """Return (rows, k) numbers, complete in each row or NaN; reject incomplete rows."""
     values: Floats = table.vectors(columns, read=read)
     partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
     if partly.any():
@@ -289,7 +289,7 @@ def vectors_of(
 def correlations(
     covariances: Floats, names: Sequence[str], units: Sequence[float] | None = None
 ) -> dict[str, Any]:
-    """Return the columns of covariances, where there are any; `units` are those of a table in ours."""
+    """Return covariance columns, if any; `units`: table per internal unit."""
     scales = (1.0,) * len(names) if units is None else units
     columns = covariance_columns(names)
     if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
@@ -298,23 +298,23 @@ def correlations(
 
 
 def columns_of(names: Sequence[str], values: Floats) -> dict[str, Any]:
-    """Return (rows, k) numbers as columns by their names."""
+    """Return (rows, k) numbers as columns by name."""
     return dict(zip(names, values.T, strict=True))
 
 
 def places_written(block: Block, values: Floats) -> Floats:
-    """Return positions as tables have them."""
+    """Return positions in the units of tables."""
     if not block.geographic:
         return values
     return np.column_stack([degrees_typed(values[:, :2]), values[:, 2]])
 
 
 def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
-    """Return unknowns, each once."""
+    """Return the different unknowns, without repetition."""
     return list({id(each): each for each in unknowns if each is not None}.values())
 
 
 def angles_of(matrices: Floats, block: Block) -> Floats:
-    """Return (n, 3) omega, phi, kappa in degrees of attitudes, axes of a photo as columns."""
+    """Return (n, 3) omega, phi, kappa (degrees) of photo axes as columns."""
     kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
     return degrees_typed(Attitudes(matrices).values(kind), MATRIX_ROUNDING)

@@ -1,4 +1,4 @@
-"""The tables of trajectories: records, what corrections are made of, knots, coefficients, their sums."""
+"""Tables of trajectories: records, corrections, knots, coefficients."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
 )
-Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by what they are of
+Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by subject
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
-    """Read trajectories, by their names."""
+    """Read trajectories by name."""
     table = tables.read("trajectories")
     if table is None:
         if there := [each for each in _OTHERS if each in tables.settings.tables]:
@@ -56,7 +56,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
         position, rotation = (each.of(row, name, own) for each in bases)
         body = bodies.get(name)
         if body is not None:
-            # The matrix of a body leads from inertial axes to its own, that of an attitude the other way.
+            # The matrix of a body transforms from inertial axes, an attitude in the opposite direction.
             body = body[0], np.swapaxes(body[1], 1, 2)
         values = own, position, rotation, body, along[row], angles[row]
         found[name] = made(table, row, Trajectory, name, *values)
@@ -64,7 +64,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
 
 
 def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
-    """Return the rows of each trajectory or, with `bases`, of each of its bases."""
+    """Return the rows of each trajectory or, if `bases`, of each of its corrections."""
     indices_of(table, "trajectory", places, "trajectory")
     words: Sequence[Sequence[str]] = [table.texts("trajectory")]
     if bases:
@@ -76,7 +76,7 @@ def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = Fal
 
 
 def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
-    """Return (rows,) times that increase in each group or, where there may be `multiple`, do not decrease."""
+    """Return (rows,) times, increasing in each group (or equal if `multiple`)."""
     times = table.given((column,))[:, 0]
     for rows in groups.values():
         steps = np.diff(times[rows])
@@ -90,7 +90,7 @@ def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple
 def _turned(
     tables: Tables, name: str, places: Mapping[str, int], flip: Floats | None = None
 ) -> dict[str, tuple[Floats, Floats]]:
-    """Return (k,) times and (k, 3, 3) attitudes of each trajectory that a table has; `flip`: of no photo."""
+    """Return (k,) times and (k, 3, 3) attitudes by trajectory."""
     table = tables.rows(name)
     groups = _rows_of(table, places)
     times, matrices = _times(table, groups), tables.known_matrices(table)
@@ -100,7 +100,7 @@ def _turned(
 
 
 def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> list[Table]:
-    """Return what is known beforehand of the trajectory of each row."""
+    """Return the sampled trajectory of each row."""
     own = tables.rows("trajectory_positions")
     groups = _rows_of(own, places)
     times, values = _times(own, groups), np.column_stack([own.given(AXES), vectors_of(own, VELOCITY)])
@@ -128,13 +128,13 @@ _COLUMNS = {
     "polynomial": ("degree", "reference", "scale"),
     "spline": ("degree", "every", "smooth", "correlation"),
 }
-"""What is said of each basis."""
+"""Columns of each basis."""
 _ALL = tuple(dict.fromkeys(name for names in _COLUMNS.values() for name in names))
 _WITH_SD = ("smooth", "correlation")
 
 
 class _Bases:
-    """What corrections of positions, or of rotations (`kind`), are made of: a basis for each trajectory."""
+    """Bases of position or rotation corrections (`kind`) by trajectory."""
 
     def __init__(self, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> None:
         self.table, self.kind = table, kind
@@ -154,13 +154,13 @@ class _Bases:
         self.coefficients = tables.rows("trajectory_coefficients")
         self.rows = _rows_of(self.coefficients, places, bases=True)
         self.words = [each.lower() for each in table.texts(kind, "none")]
-        self.signs = np.ones((table.count, 3))  # which way the axes of coefficients point
+        self.signs = np.ones((table.count, 3))  # Direction of the axes of coefficients
         if kind == "rotation":
             about_photo = [each != "zxz" for each in table.words("angles", get_args(Angles))]
             self.signs[about_photo] = np.diag(tables.flip)
 
     def of(self, row: int, name: str, known: Table) -> Basis | None:
-        """Return the basis of the trajectory of a row; None for no corrections."""
+        """Return the basis of the trajectory of a row; None without corrections."""
         word = self.words[row]
         rows = self.rows.get((name, self.kind))
         self._check(row, name, word, rows)
@@ -175,7 +175,7 @@ class _Bases:
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Reject what is no basis, and what is said of another."""
+        """Reject unknown bases and columns of other bases."""
         kind = self.kind
         if word not in _COLUMNS:
             raise self.table.cell_error(row, kind, "error.choice", names=list(_COLUMNS), value=word)
@@ -188,7 +188,6 @@ class _Bases:
             raise self.table.error(row, phrase("error.not-applicable", name=others[0], other=other))
 
     def _basis(self, row: int, name: str, word: str) -> Basis:
-        """Return the basis that a row says."""
         degree = self._whole(row, "degree")
         if word == "polynomial":
             return Polynomial(degree or 0, self._number(row, "reference"), self._number(row, "scale"))
@@ -222,7 +221,7 @@ class _Bases:
         return value, sd
 
     def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
-        """Return (K, 3) values and standard deviations of coefficients, those of no row by their default."""
+        """Return (K, 3) coefficients and standard deviations, with defaults."""
         table = self.coefficients
         values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
         numbers = table.numbers("k")[rows]
@@ -253,7 +252,7 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
     found: dict[int, Observation] = {}
     for (name, of), rows in groups.items():
         own = trajectories[name].coefficients[BASES.index(of)]
-        # Rotations are about the axes of photos, in the unit of angles.
+        # Rotations are about photo axes, in the unit of angles.
         turn = tables.flip * tables.radians if of == "rotation" else np.eye(3)
         for row in rows.tolist():
             given = factors[row][~np.isnan(factors[row])]

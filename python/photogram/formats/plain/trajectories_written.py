@@ -1,4 +1,4 @@
-"""The tables of trajectories of a block, and of sums of their coefficients that were observed."""
+"""The tables of trajectories of a block, and of observed sums of coefficients."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 from photogram.words import phrase
 
-Place = tuple[str, str, int]  # Trajectory, position or rotation, and the number of a coefficient
+Place = tuple[str, str, int]  # Trajectory, position or rotation, and number of a coefficient
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectories of a block that are not those of single photos, each once."""
+    """Return trajectories of a block, except trajectories of single photos."""
     own = [each.trajectory for each in block.timed if each.trajectory is not None]
     found = all_trajectories(own, block.observations)
     names = [each.name for each in found]
@@ -76,7 +76,7 @@ def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
 
 
 def _unit(kind: str) -> float:
-    """Return what a number of coefficients is in the unit of tables."""
+    """Return the table units per unit of coefficients."""
     return DEGREE if kind == "rotation" else 1.0
 
 
@@ -87,7 +87,7 @@ def _is_empty(column: Any) -> bool:
 
 
 def _basis_columns(kind: str, bases: Sequence[Basis | None]) -> dict[str, Any]:
-    """Return what bases are; knots stand in a table of their own."""
+    """Return the columns of bases; knots have a separate table."""
     words = {Polynomial: "polynomial", Spline: "spline"}
     polynomials = [each if isinstance(each, Polynomial) else None for each in bases]
     splines = [each if isinstance(each, Spline) else None for each in bases]
@@ -107,7 +107,7 @@ def _basis_columns(kind: str, bases: Sequence[Basis | None]) -> dict[str, Any]:
 
 
 def _common_sd(own: Trajectory, which: int) -> float | None:
-    """Return the standard deviation of all coefficients whose given values are 0; None of others."""
+    """Return the common standard deviation of coefficients of 0, else None."""
     coefficients = own.coefficients[which]
     sd = {value for each in coefficients for value in each.deviations.tolist()}
     alike = len(sd) == 1 and not any(each.position.any() for each in coefficients)
@@ -115,7 +115,7 @@ def _common_sd(own: Trajectory, which: int) -> float | None:
 
 
 def _coefficient_rows(parts: Sequence[tuple[Trajectory, int]]) -> dict[str, Any]:
-    """Return the table of the coefficients of positions (0) or rotations (1) of trajectories."""
+    """Return the coefficient table of positions (0) or rotations (1)."""
     rows = [(own.name, which, each) for own, which in parts for each in own.coefficients[which]]
     units = np.array([_unit(BASES[which]) for _, which, _ in rows])[:, np.newaxis]
     return {
@@ -161,7 +161,7 @@ def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
 
 
 def smoothness_table(block: Block) -> dict[str, Any]:
-    """Return the table of sums of neighbouring coefficients; none where splines say all themselves."""
+    """Return the table of sums of neighbouring coefficients."""
     own = [(each, place) for each, place in _beside(block) if place is not None]
     if not own:
         return {}
@@ -181,12 +181,12 @@ def smoothness_table(block: Block) -> dict[str, Any]:
 
 
 def lost_smoothness(block: Block) -> int:
-    """Return how many sums of coefficients the table has no place for: not of neighbours, or of too many."""
+    """Return the number of sums that the table cannot contain."""
     return sum(place is None for _, place in _beside(block))
 
 
 def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
-    """Return sums that no spline says itself, each with the place of its first coefficient, if it has one."""
+    """Return sums not defined by splines, each with its first key."""
     shared = shared_trajectories(block)
     places = {
         id(each): (trajectory.name, of, k)
@@ -206,7 +206,7 @@ def _content(each: Observation) -> tuple[object, ...]:
 
 
 def _first(coefficients: Sequence[object], places: Mapping[int, Place]) -> Place | None:
-    """Return the place of the first of neighbours; None of others."""
+    """Return the key of the first of neighbouring coefficients; None for others."""
     found = [places.get(id(each)) for each in coefficients]
     first = found[0]
     if first is None or len(found) > len(FACTORS):

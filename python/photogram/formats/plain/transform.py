@@ -1,4 +1,4 @@
-"""Coordinates of tables in other systems than that of the frame of a project."""
+"""Transformation of table coordinates of other systems into the frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from photogram.words import phrase
 
 
 class Transform:
-    """What carries coordinates of tables into the frame, in units of the house."""
+    """Transformation of table coordinates into the frame, in internal units."""
 
     def __init__(self, settings: Settings, messages: list[Message]) -> None:
         self.settings, self._messages = settings, messages
@@ -26,7 +26,7 @@ class Transform:
     def positions(
         self, name: str, values: Floats, covariances: Floats | None, table: ColumnTable
     ) -> tuple[Floats, Floats]:
-        """Return (n, 3) positions of a table in the frame, and their (n, 3, 3) covariances, m2."""
+        """Return (n, 3) positions in the frame, and (n, 3, 3) covariances, m2."""
         own = np.zeros((len(values), 3, 3)) if covariances is None else covariances
         crs = self.settings.crs.get(name, "")
         if not crs:
@@ -61,7 +61,7 @@ class Transform:
         return positions, rotated
 
     def _settle(self, crs: str, values: Floats) -> None:
-        """Choose an origin for a topocentric frame that has none: amid the first positions that are given."""
+        """Choose the origin of a topocentric frame: mean of the first positions."""
         from photogram.formats.crs import amid
 
         if self.frame.kind == "cartesian" or (self.frame.kind == "topocentric" and self.frame.origin is None):

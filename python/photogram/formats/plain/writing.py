@@ -1,4 +1,4 @@
-"""Writing a plain project, so that reading it gives the same block."""
+"""Writer of the plain project; reading its files gives the same block."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from photogram.words import phrase
 
 
 def cannot_hold(project: Project) -> list[str]:
-    """Return what of a project the tables have no place for."""
+    """Return the parts of a project that the tables cannot contain."""
     block = project.block
     found = [] if block.refraction is None else ["refraction"]
     if sums := lost_smoothness(block):
@@ -54,7 +54,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def _second_positions(block: Block) -> int:
-    """Return how often the position of a point is observed beside another observation of it."""
+    """Return the number of additional observations of the position of a point."""
     observed = [each.point for each in block.observations if isinstance(each, Control)]
     held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1)).tolist()
     twice = {block.point_ids[row] for row in held} & set(observed)
@@ -62,7 +62,7 @@ def _second_positions(block: Block) -> int:
 
 
 def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
-    """Return the cameras of a block, also where it has principal distances, and which one photos have."""
+    """Return cameras (also for principal distances), and the one of each photo."""
     if block.cameras:
         assert block.photo_cameras is not None
         cameras = [
@@ -77,7 +77,7 @@ def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
 
 
 def attitude_matrices(block: Block) -> Floats:
-    """Return (P, 3, 3) attitudes A of photos, photo to object; NaN where unknown."""
+    """Return (P, 3, 3) attitudes A of photos, photo to object; NaN if unknown."""
     found = np.full((len(block.photo_ids), 3, 3), np.nan)
     known = ~np.isnan(block.photo_attitudes).any(axis=1)
     if known.any():
@@ -97,7 +97,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     image_y = _image_y(project, cameras, exposures)
     lines_alone = camera_unit(block) != "px" and bool(lines[block.image_photos].all())
     names = ["column", "row"] if image_y == "down" or lines_alone or films.pixels else ["x", "y"]
-    # Samples and lines, and readings of films, are as they are.
+    # Samples and lines, and readings of films, are unchanged.
     plain = lines | np.array([name in films.films for name in block.photo_ids])
     pictures = _pictures(project, cameras)
     tables = {
@@ -123,7 +123,7 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure]) -> str:
-    """Return where image coordinates of frames count to: down from the corner, or up from the middle."""
+    """Return the direction of y: down (corner) or up (centre)."""
     if camera_unit(project.block) != "px":
         return "up"
     sizes, _ = _pictures(project, cameras)
@@ -137,9 +137,9 @@ def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Ex
 
 
 def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | None], list[float | None]]:
-    """Return the size of the pictures of each camera, by the camera itself where it has it, and of pixels."""
+    """Return image size and pixel size of each camera."""
     if not project.block.cameras:
-        # Principal distances are no cameras of the project.
+        # Principal distances are not cameras of the project.
         return [None] * len(cameras), [None] * len(cameras)
     sizes: list[Size | None] = list(project.sizes)
     for row, each in enumerate(cameras):
@@ -149,7 +149,7 @@ def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | 
 
 
 def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table of cameras with what their photos have; models may have parameters of the same names."""
+    """Return a camera table with exposure columns."""
     found = {**table, **more}
     for name in OF_LINES:
         if name in table and name in more:
@@ -203,7 +203,7 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     constants = {"w", "h"}
     if any(each.weights != "corrected" for each in cameras):
         columns["weights"] = [each.weights for each in cameras]
-    # Columns know no case: B1 of one model and b1 of another stand in one.
+    # Columns ignore case: B1 of one model and b1 of another share a column.
     values = [{name.lower(): value for name, value in each.parameters.items()} for each in cameras]
     deviations = [
         {name.lower(): sd for name, sd in zip(each.names, each.deviations.tolist(), strict=True)}
@@ -241,12 +241,12 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
 
 
 def _times_of(project: Project) -> Mapping[str, float]:
-    """Return when photos of a board were taken; others say it where it counts."""
+    """Return the times of photos of a board."""
     return project.details.get(TIMES, {}) if project.boards else {}
 
 
 def _given(block: Block, what: str) -> tuple[Floats, Floats]:
-    """Return values of photos, observed ones where they are weighted, and their standard deviations."""
+    """Return photo values (observed if weighted) and standard deviations."""
     initial, sd = getattr(block, f"photo_{what}s"), getattr(block, f"photo_{what}_sd")
     observed = getattr(block, f"photo_{what}s_observed")
     return (initial if observed is None else np.where(np.isfinite(sd), observed, initial)), sd
@@ -260,7 +260,7 @@ def _images(
     plain: Bools,
     image_y: str,
 ) -> dict[str, Any]:
-    """Return the columns of images, behind them those that are left out; samples of scanners as they are."""
+    """Return image columns; omitted observations are last."""
     block, left = project.block, project.unused
     photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
     places = {name: row for row, name in enumerate(block.photo_ids)}
@@ -320,7 +320,7 @@ def control_table(project: Project) -> dict[str, Any]:
         f"sd_{axis}": np.where(np.isinf(own), np.nan, own) for axis, own in zip(AXES, sd.T, strict=True)
     }
     columns |= correlations(covariances, AXES)
-    # What is known and not held of a control point is held by nothing: it goes out as an infinite deviation.
+    # Known but free coordinates of a control point are written with an infinite standard deviation.
     for k, axis in enumerate(AXES):
         unheld = np.isinf(sd[:, k]) & np.isfinite(positions[:, k])
         columns[f"sd_{axis}"] = np.where(unheld, np.inf, columns[f"sd_{axis}"])

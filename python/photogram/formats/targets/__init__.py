@@ -1,4 +1,4 @@
-"""Corners of a board in pictures, in files of mrcal, OpenCV, Kalibr, or tables."""
+"""Corners of a board in images, in files of mrcal, OpenCV, Kalibr, or tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calibrations with targets as projects whose control is the board, and back; cameras of projects alone."""
+"""Conversion of target calibrations to projects, and back."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 from photogram.words import Phrase, option_sd, phrase
 
-MIDDLE = 0.5  # Of the first pixel, from the upper-left corner: projects count from there
-NEAR = 1e-6  # Of the spacing: what control may be off the points of a board
+MIDDLE = 0.5  # Centre of the first pixel, from the upper-left corner: projects count from there
+NEAR = 1e-6  # Largest distance of control from board points, relative to the spacing
 
 
 def read_project(path: Path, wishes: Wishes) -> Project:
-    """Read corners, with first values: what is adjusted is the block of their calibration."""
+    """Read corners, with initial values, as the block of their calibration."""
     sd = wishes.sd.get("images")
     origin = wishes.pixel_origin or "center"
     found = read(path, sd0=None if sd is None else sd[0], pixel_origin=origin)
@@ -44,7 +44,7 @@ def read_project(path: Path, wishes: Wishes) -> Project:
 
 
 def project_of(calibration: Start, path: Path | None = None) -> Project:
-    """Return a calibration as a project, whose pixels count from the upper-left corner of the first."""
+    """Convert a calibration to a project; pixels count from the corner."""
     middle = calibration.block()
     cameras = [shifted(each) for each in middle.cameras]
     block, lacks = middle.replace(cameras=cameras, image_xy=middle.image_xy + MIDDLE), []
@@ -70,7 +70,7 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
 
 
 def _times(calibration: Start) -> dict[str, float]:
-    """Return when pictures of frames were taken; those on trajectories say it themselves."""
+    """Return the times of photos on frames."""
     corners = calibration.corners
     if corners.times is None or calibration.sync == "offset":
         return {}
@@ -78,7 +78,7 @@ def _times(calibration: Start) -> dict[str, float]:
 
 
 def _unused(calibration: Start) -> Unused:
-    """Return the corners that do not count as images that count from the corner of the first pixel."""
+    """Return omitted corners as observations from the first corner."""
     corners, names = calibration.corners, calibration.board.names
     rows = np.flatnonzero(~corners.use).tolist()
     sd = corners.sd[rows] * (calibration.sd0 or calibration.assumed)
@@ -91,7 +91,7 @@ def _unused(calibration: Start) -> Unused:
 
 
 def calibration_of(project: Project) -> Calibration:
-    """Return the calibration that a project with a board is, of cameras in pixels."""
+    """Convert a project with a board and cameras in pixels to a calibration."""
     block = project.block
     if not project.boards:
         raise InputError(phrase("board-project.none"), file=project.path)
@@ -99,7 +99,7 @@ def calibration_of(project: Project) -> Calibration:
         raise InputError(phrase("format.pixels"), file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
         raise InputError(phrase("board-project.sd"), file=project.path)
-    # Those of knots are their cameras'.
+    # Priors of knots belong to their cameras.
     others = [
         each.name
         for each in block.observations
@@ -140,7 +140,7 @@ def calibration_of(project: Project) -> Calibration:
 
 
 def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
-    """Return what is told of clocks and of the board's motion: (P,) times, and fields of calibrations."""
+    """Return (P,) clock times, and the fields of calibrations on motion of the board."""
     block = project.block
     assert block.photo_cameras is not None
     places = {name: row for row, name in enumerate(block.photo_ids)}
@@ -161,7 +161,7 @@ def _in_motion(project: Project, seen: Indices) -> dict[str, Any]:
 
 
 def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
-    """Return the deflections that the board begins with, and their standard deviations."""
+    """Return the initial deflections of the board, and their standard deviations."""
     found = [each.bend for each in block.passages if isinstance(each, Figure)]
     if not found:
         return (0.0, 0.0), np.full(2, np.inf)
@@ -172,8 +172,8 @@ def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
     """Return the corners of a project, and (V,) the photo of each view.
 
-    `number` is (n,) the number of the board's point of each point, `stands` (P,) the photo whose pose is that
-    of the view of each photo, `sd0` the standard deviation of a corner of level 0.
+    `number` is (n,) the board point of each point. `stands` is (P,) the photo with the pose of the view of
+    each photo. `sd0` is the standard deviation of a corner of level 0.
     """
     block = project.block
     assert block.photo_cameras is not None
@@ -201,7 +201,7 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
 
 
 def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[Indices, Indices, list[int]]:
-    """Return of the images that were left out of some pictures: picture, point, and their rows."""
+    """Return the omitted observations of some photos: photo, point, and row."""
     left = project.unused
     places = {name: row for row, name in enumerate(pictures)}
     points = dict(zip(project.block.point_ids, number.tolist(), strict=True))
@@ -213,7 +213,7 @@ def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[I
 
 
 def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
-    """Return (K,) the references of cameras, (K, 4, 4) sensors, their sd, and (P,) the photo of each view."""
+    """Return (K,) references, (K, 4, 4) sensors, sd, and (P,) view photos."""
     assert block.photo_cameras is not None
     places = {name: row for row, name in enumerate(block.photo_ids)}
     count = len(block.cameras)
@@ -229,7 +229,7 @@ def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:
 
 
 def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
-    """Return photos on sensors, with the photos that stand for their frames; itself where none does."""
+    """Return photos on sensors, with the photo of their frame or itself."""
     flown = {id(each.trajectory): each.photo for each in block.timed if each.sensor is None}
     return [(each.photo, each.frame, each.sensor) for each in block.mounts] + [
         (each.photo, flown.get(id(each.trajectory), each.photo), each.sensor)
@@ -239,7 +239,7 @@ def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
 
 
 def _numbers_of(project: Project, board: Board) -> Indices:
-    """Return (n,) the number of the board's point of each point of the block."""
+    """Return (n,) the board point of each point of the block."""
     names = project.block.point_ids if board.kind == "points" else board.names
     known = {name: k for k, name in enumerate(names)}
     strange = [name for name in project.block.point_ids if name not in known]
@@ -249,7 +249,7 @@ def _numbers_of(project: Project, board: Board) -> Indices:
 
 
 def _with_places(board: Board, block: Block, number: Indices) -> Board:
-    """Return a board with the places and standard deviations that the control of a block has."""
+    """Return a board with positions and standard deviations of control."""
     if board.kind == "points":
         return board.replace(points=block.point_positions, point_names=block.point_ids)
     far = np.abs(board.places[number] - block.point_positions)
@@ -264,20 +264,20 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
 
 
 def adjusted_project(calibrated: Calibrated) -> Project:
-    """Return what was adjusted as a project: free values where the adjustment has ended."""
+    """Convert an adjusted calibration to a project with adjusted values."""
     return project_of(calibrated.restarted())
 
 
 def shifted(camera: Camera, by: float = MIDDLE) -> Camera:
-    """Return a camera whose principal point counts from elsewhere: the corner of the first pixel."""
+    """Return a camera whose principal point counts from the first corner."""
     if "w" in camera.names or not {"cx", "cy"} <= {*camera.names}:
-        return camera  # from the middle of the picture, which is the same place
+        return camera  # From the image centre, which does not change
     centre = {name: camera.parameters[name] + by for name in ("cx", "cy")}
     return camera.replace(parameters={**camera.parameters, **centre})
 
 
 def rig_of_project(project: Project) -> Rig:
-    """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0."""
+    """Return pixel cameras of a project, and their poses relative to camera 0."""
     block = project.block
     if not block.cameras:
         raise InputError(phrase("board-project.cameras"), file=project.path)
@@ -292,7 +292,7 @@ def rig_of_project(project: Project) -> Rig:
 
 
 def _sensors(project: Project) -> Floats:
-    """Return (K, 4, 4) camera 0 -> camera k; NaN where they are not one sensor on one frame."""
+    """Return (K, 4, 4) camera 0 -> camera k; NaN if not on one frame."""
     block = project.block
     found = np.full((len(block.cameras), 4, 4), np.nan)
     found[0] = np.eye(4)

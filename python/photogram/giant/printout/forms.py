@@ -1,4 +1,4 @@
-"""Forms of the printout: pages with carriage control, numbers as its FORMAT statements show them."""
+"""Forms of the printout: pages and numbers as in FORTRAN."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from photogram.show.angles import degrees_minutes_seconds
 
 Page = list[str]  # The lines of a page below its banner
 
-WIDTH = 132  # Columns of a line printer, carriage control not counted
+WIDTH = 132  # Columns of a line printer without carriage control
 LINES = 52
-"""Lines of entries on a page: 13 stations, 52 points of one line or 13 of four, 10 control points of five."""
+"""Lines of entries per page: 13 stations, 52 points of one line or 13 of four, 10 control points of five."""
 
 BANNER = "NOAA/NOS GIANT SYSTEM .... (4/85) : "
 
 
 def headed(title: str, *lines: str) -> Page:
-    """Return the heading of a page: a letter-spaced title in the middle, and further lines below it."""
+    """Return a page heading: a centred spaced title, and further lines."""
     spaced = "   ".join(" ".join(word) for word in title.split())
     return ["", spaced.center(WIDTH).rstrip(), "", *lines, ""]
 
@@ -33,10 +33,10 @@ def paginate(
     again: Sequence[str] | None = None,
     closing: Sequence[str] = (),
 ) -> list[Page]:
-    """Fill pages with entries of one line or more, which are never split.
+    """Fill pages with entries of one or more lines, which are never split.
 
-    `again` (the heading when None) stands at the top of the other pages; a heading that has more lines leaves
-    less room for entries. `closing` stands below the last entry, on its page if there is room for all of it.
+    `again` (the heading if None) begins the other pages; a longer heading leaves less space for entries.
+    `closing` follows the last entry, on its page if it fits completely.
     """
     again = heading if again is None else again
     length = len(again) + LINES
@@ -62,7 +62,7 @@ def printout(title: str, pages: Iterable[Page]) -> str:
 
 
 VALUE = 15
-"""Columns of a value: sign, degrees, minutes and seconds (A1, I3, I3, F8.4), or a length as wide as that."""
+"""Columns of a value: sign, degrees, minutes and seconds (A1, I3, I3, F8.4), or a length of equal width."""
 
 UNITS = {"m": "METERS", "ft": "FEET"}
 
@@ -70,7 +70,7 @@ Values = Iterable[float]
 
 
 def fixed(value: float, width: int, decimals: int) -> str:
-    """Write a number as Fw.d; NaN is blank, zero has no sign, one that is too long gets the room it needs."""
+    """Write a number as Fw.d, wider if necessary; NaN is blank, zero without sign."""
     text = "" if math.isnan(value) else f"{value:.{decimals}f}"
     return (text.removeprefix("-") if text.strip("-0.") == "" else text).rjust(width)
 
@@ -81,16 +81,16 @@ def exponential(value: float) -> str:
         return " " * 10
     mantissa, _, power = f"{value + 0.0:.2e}".partition("e")
     exponent = int(power) + 1 if value else 0
-    # An exponent of three digits takes the place of the letter.
+    # A three-digit exponent replaces the letter.
     shown = f"E{exponent:+03d}" if abs(exponent) < 100 else f"{exponent:+04d}"
     sign = "-" if value < 0 else ""
     return f"{sign}0.{mantissa.lstrip('-').replace('.', '')}{shown}".rjust(10)
 
 
 def dms(angle: float, *, circle: bool = False) -> str:
-    """Write radians as sign, degrees, minutes, seconds (A1, I3, I3, F8.4); NaN is blank, zero has no sign.
+    """Write radians as sign, degrees, minutes, seconds (A1, I3, I3, F8.4).
 
-    `circle` brings 360 degrees, which rounding may make of a little less, to zero.
+    `circle` converts 360 degrees, a possible result of rounding, to zero.
     """
     if math.isnan(angle):
         return " " * VALUE
@@ -111,16 +111,16 @@ def attitude(angles: Values) -> list[str]:
 
 
 def attitude_name(photo_to_ground: bool) -> str:
-    """Name the sense of the angles as the headings do."""
+    """Return the sense of the angles in the words of the headings."""
     return "PHOTO TO GROUND" if photo_to_ground else "GROUND TO PHOTO"
 
 
 @dataclass(frozen=True)
 class Space:
-    """How coordinates of the object space are named and written."""
+    """Names and format of coordinates of the object space."""
 
     geographic: bool  # Longitude, latitude and elevation, or X, Y and Z
-    unit: str = "m"  # The linear unit, as a block names it
+    unit: str = "m"  # The linear unit of a block
 
     @property
     def names(self) -> tuple[str, str, str]:
@@ -139,7 +139,7 @@ class Space:
         return ", ".join((angle, angle, self.linear_unit))
 
     def values(self, position: Values, decimals: int) -> list[str]:
-        """Write three coordinates, or differences or deviations of them; lengths with so many decimals."""
+        """Write three coordinates, differences or standard deviations."""
         first, second, third = position
         planimetry = (
             [dms(first), dms(second)]
@@ -153,14 +153,14 @@ MATRIX = 33  # Columns of a row of a matrix: three numbers (1X, E10.3)
 
 
 def matrix_rows(covariance: Floats | None) -> Sequence[str]:
-    """Write the three rows of a (3, 3) matrix; without one, three times nothing."""
+    """Write the three rows of a (3, 3) matrix, or three empty ones without a matrix."""
     if covariance is None:
         return ["", "", ""]
     return ["".join(f" {exponential(value)}" for value in row) for row in covariance.tolist()]
 
 
 def counts_and_rms(values: Floats, counted: Bools) -> tuple[list[int], list[float]]:
-    """Return how many values of each of three columns count, and the root of their mean square or NaN."""
+    """Return counts of values in three columns, and root mean squares."""
     count = counted.sum(axis=0)
     squares = np.where(counted, values**2, 0.0).sum(axis=0)
     rms = np.sqrt(np.divide(squares, count, out=np.full(3, np.nan), where=count > 0))

@@ -1,4 +1,4 @@
-"""The job as it was given: options (sample, page 0), frames (page 1), control (page 21), warnings."""
+"""Input of a job: options, frames, control, warnings."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def options_page(
     *,
     as_published: bool = False,
 ) -> Page:
-    """Return the page of the options; the unit variance as COMMON says where none is given.
+    """Return the page of the options; the default unit variance is as in COMMON.
 
-    The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours. As
-    published there is no linear unit of a rectangular job. `refraction` may be more than COMMON asks for.
+    The sample shows one choice of most options; `docs/giant-listing.md` lists our lines. As published, the
+    linear unit of a rectangular job is omitted. `refraction` may exceed the request of COMMON.
     """
     air = refraction is not None and refraction.air is not None
     water = refraction is not None and refraction.water is not None
@@ -82,9 +82,9 @@ def _residuals(limit: float) -> str:
 def control_pages(
     space: Space, ground: Iterable[GroundPoint], default_sd: tuple[float, float, float]
 ) -> list[Page]:
-    """Return the pages of the control: ten points each, whether they are photographed or not.
+    """Return the pages of the control, ten points each.
 
-    Components that are not held are listed as they stand; `default_sd` stands for deviations of zero.
+    Unheld components are listed unchanged; `default_sd` replaces standard deviations of zero.
     """
     entries = []
     for point in ground:
@@ -96,12 +96,12 @@ def control_pages(
     return paginate(headed("GROUND CONTROL DATA"), entries)
 
 
-ACROSS = 4  # Plate coordinates, or names of points, on a line
+ACROSS = 4  # Plate coordinates, or names of points, per line
 
 
 @dataclass(frozen=True)
 class Station:
-    """A camera station as it was given, in the units of the block, with the standard deviations in force."""
+    """Input of a camera station in block units, with standard deviations."""
 
     position: Values
     attitude: Values
@@ -119,7 +119,7 @@ def frame_pages(
     parameters: bool = True,
     plates: bool = True,
 ) -> list[Page]:
-    """Return the pages of a frame: station (COMMON column 3), plate coordinates (column 4), if asked for."""
+    """Return the requested pages of a frame: station, plate coordinates."""
     x_sd, y_sd = (sd or IMAGE_SD for sd in images.sd)
     frame = ["", f"FRAME  {images.name}", ""]
     heading = [
@@ -162,10 +162,10 @@ def _plates(images: ImageFrame) -> list[Sequence[str]]:
 
 
 def warning_pages(warnings: Iterable[ErrorWarning]) -> list[Page]:
-    """Return the pages of the warnings; none where there is nothing to warn of."""
+    """Return the pages of the warnings; empty without warnings."""
     entries: list[list[str]] = []
     for warning in warnings:
-        # The heading is on one page with the first names.
+        # The first page of a warning contains its heading and the first names.
         heading = [*(["ERROR WARNINGS", ""] if warning.general else []), warning.heading, ""]
         for row in range(0, len(warning.names), ACROSS):
             names = "".join(f"{name:<20}" for name in warning.names[row : row + ACROSS])

@@ -1,4 +1,4 @@
-"""The adjustment: corrections of stations by iterations (sample, page 25), residuals (pages 26 to 29)."""
+"""The adjustment: corrections of stations, residuals (sample, pages 25-29)."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def iteration_pages(
     *,
     as_published: bool = False,
 ) -> list[Page]:
-    """Return the pages of k iterations with their corrections (k, P, 6) of position and attitude (radians).
+    """Return pages of k iterations with corrections (k, P, 6), radians.
 
-    The notice stands below the last one; as published there is no line of the units.
+    The notice is below the last one; the published form lacks the line with the units.
     """
     if not iterations:
         return [[*headed(TITLE), notice]]
@@ -55,28 +55,28 @@ def _numbers(values: Values) -> str:
     return "".join(fixed(value, 16, 9) for value in values)
 
 
-ACROSS = 10  # Frames on a line
+ACROSS = 10  # Frames per line
 
 
 @dataclass(frozen=True)
 class PointResiduals:
-    """The residuals (k, 2) of a point, observed minus computed in mm, on its k frames."""
+    """Residuals (k, 2) of a point, observed minus computed, mm, on k frames."""
 
     name: str
     frames: Sequence[str]
     residuals: Floats
 
     def listed(self, limit: float) -> bool:
-        """Whether COMMON columns 41-50 (millimetres) ask for this point."""
+        """Whether COMMON columns 41-50 (millimetres) select this point."""
         return limit == 0 or (limit > 0 and bool((abs(self.residuals) > limit).any()))
 
 
 def residual_pages(
     points: Iterable[PointResiduals], limit: float, closing: Sequence[str], *, as_published: bool = False
 ) -> list[Page]:
-    """Return the pages of the residuals in processing order, with `closing` (:func:`statistics`) below.
+    """Return the pages of residuals, with `closing` (:func:`statistics`) below.
 
-    The limit is that of COMMON columns 41-50; as published there is no line that says what the residuals are.
+    The limit is in COMMON columns 41-50; the published form lacks the definition of the residuals.
     """
     meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
     heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))
@@ -101,7 +101,7 @@ def _entries(point: PointResiduals) -> list[list[str]]:
 
 
 def statistics(sums: SumsOfSquares, degrees_of_freedom: float, variance: float | None) -> list[str]:
-    """Return the weighted sums of squares and the estimates for unit weight; `variance` None is undefined."""
+    """Return weighted sums of squares and estimates of unit weight."""
     parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
     lines = [
         f"{f'WEIGHTED SUM OF SQUARES ({name})':<40} ={fixed(size, 16, 3)}" for name, size in parts.items()

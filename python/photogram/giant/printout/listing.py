@@ -1,4 +1,4 @@
-"""The printout of a job: which pages there are, in which order, from which arrays."""
+"""The printout of a job: selection and order of its pages."""
 
 from __future__ import annotations
 
@@ -40,19 +40,20 @@ def listing(
 ) -> str:
     """Return the printout of the 1987 program (unit 6) for an adjusted project.
 
-    Columns 3 to 6, 8 and 11 of COMMON and its residual limit say what is listed; see `docs/giant-listing.md`.
+    Columns 3 to 6, 8 and 11 of COMMON and its residual limit select the contents; see
+    `docs/giant-listing.md`.
 
     Parameters
     ----------
     project, block
-        What was adjusted: `block` is `project.to_block()`, with or without limits or another refraction.
+        The adjusted project: `block` is `project.to_block()`, with or without limits or another refraction.
     result
         The adjustment of the block, whether it converged or not.
     as_published
-        Whether every line is one that the program of 1987 printed, and the corrections of control components
-        that are not held are the changes of the last iteration, and not adjusted minus supplied.
+        If True, print only lines of the 1987 program. Corrections of unheld control components are then the
+        changes of the last iteration instead of adjusted minus supplied.
     limits
-        The limits that the block was made with.
+        The limits of the block.
 
     Returns
     -------
@@ -111,14 +112,14 @@ def _result_pages(
 ) -> Iterator[Page]:
     common = project.common
     freedom = result.degrees_of_freedom
-    if result.unit_variance == "unity":  # as in 1987: those of free cameras
+    if result.unit_variance == "unity":  # As in 1987: sums of squares of free cameras
         sd = result.photo_given_sd
         freedom -= np.count_nonzero((sd > 0) & np.isfinite(sd))
     closing = statistics(result.sums_of_squares, freedom, result.variance_of_unit_weight)
     yield from residual_pages(
         _residuals(block, result), common.residual_limit, closing, as_published=as_published
     )
-    # A diverged adjustment may have no covariances.
+    # Covariances of a diverged adjustment may be missing.
     used = result.used_points
     propagated = common.error_propagation and bool(
         np.isfinite(result.photo_cofactors).all() and np.isfinite(result.point_cofactors[used]).all()
@@ -138,7 +139,7 @@ def _result_pages(
 
 
 def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
-    """Return the points in processing order, that of the block, each with its images by frame."""
+    """Yield the points in order of the block, with images by frame."""
     order = np.argsort(block.image_points, kind="stable")
     bounds = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
     for point in np.flatnonzero(result.used_points).tolist():

@@ -1,4 +1,4 @@
-"""What was adjusted: stations, ground points (sample, pages 30 to 34, 41 to 54), corrections (page 35)."""
+"""Adjusted stations, ground points and corrections (sample, pages 30-54)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def station_pages(
     attitudes: Floats,
     covariances: Floats | None,
 ) -> list[Page]:
-    """Return the pages of P stations, thirteen each; with their (P, 6, 6) covariances if there are any."""
+    """Return pages of P stations, with (P, 6, 6) covariances if available."""
     matrix = "" if covariances is None else f"{'COVARIANCE MATRIX':^{MATRIX}}"
     heading = headed(
         "TRIANGULATED CAMERA STATIONS",
@@ -64,9 +64,9 @@ IDENT = 18  # Columns of the name and the mark of control
 
 
 def point_pages(space: Space, names: Sequence[str], marks: Sequence[str], positions: Floats) -> list[Page]:
-    """Return the pages of n points without error propagation: a line for each, 52 on a page.
+    """Return pages of n points without error propagation, 52 per page.
 
-    Marks are `*code*` for control, else nothing.
+    Marks are `*code*` for control, otherwise empty.
     """
     heading = headed(TITLE, f"{'IDENT':<{IDENT}}{'POSITION':^72}".rstrip())
     return paginate(
@@ -86,9 +86,9 @@ def propagated_point_pages(
     covariances: Floats,
     held: Bools,
 ) -> list[Page]:
-    """Return the pages with covariances (n, 3, 3): three lines for each point, 13 on a page, and a summary.
+    """Return pages of points with covariances (n, 3, 3), and a summary.
 
-    Components that are held (n, 3) do not count in the summary.
+    The summary contains unheld components (n, 3) only.
     """
     heading = headed(
         TITLE,
@@ -130,16 +130,15 @@ def _summary(space: Space, deviations: Floats, counted: Bools) -> list[str]:
     ]
 
 
-ACROSS = 4  # Points on a line
+ACROSS = 4  # Points per line
 
 
 def correction_pages(
     space: Space, names: Sequence[str], corrections: Floats, held: Bools, *, as_published: bool
 ) -> list[Page]:
-    """Return the pages of the corrections (n, 3), NaN where there is none, with which components are held.
+    """Return pages of corrections (n, 3) with held components; NaN if missing.
 
-    As published there is neither a line that says what is listed, nor number and rms of the components that
-    are not held.
+    The published form has neither a definition of the corrections nor number and rms of unheld components.
     """
     meaning = "ADJUSTED MINUS INPUT; IN PARENTHESES: COMPONENT NOT HELD, ADJUSTED MINUS SUPPLIED VALUE"
     heading = headed("CORRECTIONS APPLIED TO GROUND CONTROL", *([] if as_published else [meaning]))
@@ -156,7 +155,7 @@ def correction_pages(
 
 
 def _cells(space: Space, name: str, values: Sequence[float], held: Sequence[bool]) -> list[str]:
-    """Three lines of 33 columns: the name, the label, and 17 for the value with its parentheses."""
+    """Return three lines of 33 columns: name, label, value."""
     rows = zip(("", name, ""), space.names, space.values(values, 3), held, strict=True)
     return [
         f"{ident:<9}{axis}={f' {value} ' if is_held else f'({value})'}   "

@@ -1,6 +1,6 @@
-"""The one writer of all results: sets of files that are put in place together, or not at all.
+"""Writer of all results: sets of files that are written together, or not at all.
 
-How it looks from outside stands in `docs/command-line.md`.
+`docs/command-line.md` describes the behaviour for users.
 """
 
 from photogram.io.writing.outputs import Content, OutputSet, write_whole

@@ -1,4 +1,4 @@
-"""A set of files that are completed first, and then put in place together."""
+"""A set of files that are completed, then moved to their paths together."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class _Raw(io.RawIOBase):
-    """A descriptor whose errors name the file as the user did."""
+    """A file descriptor whose errors contain the path of the user."""
 
     def __init__(self, descriptor: int, given: Path) -> None:
         self._descriptor = descriptor
@@ -71,7 +71,6 @@ class _Staged:
     placed: bool = False
 
     def complete(self) -> None:
-        """Put the content on the disk."""
         if not self.file.closed:
             with naming(self.target.given):
                 self.file.flush()
@@ -79,20 +78,19 @@ class _Staged:
             self.file.close()
 
     def keep(self) -> None:
-        """Give what stands at the place another name, where the file system can, for :meth:`restore`."""
+        """Preserve the existing file for :meth:`restore`, if possible."""
         if self.target.status:
             with suppress(OSError):
                 os.link(self.target.place, f"{self.path}.old", follow_symlinks=False)
                 self.old = f"{self.path}.old"
 
     def place(self) -> None:
-        """Move the file to its place."""
         with naming(self.target.given):
             os.replace(self.path, self.target.place)
         self.placed = True
 
     def restore(self) -> bool:
-        """Put back what stood at the place; False if it cannot be."""
+        """Restore the previous file; return False if this is impossible."""
         if not self.placed:
             return True
         try:
@@ -108,15 +106,15 @@ class _Staged:
 
 
 class OutputSet:
-    """Files that are all there in the end, or none: a context manager.
+    """A set of files that are either all written or not at all; a context manager.
 
-    Every file is completed in a hidden directory beside its place and put on the disk; when all are, they are
-    moved to their places in one pass, during which signals wait. If one cannot be moved, those that were are
-    put back. While more than one file is moved a mark stands in each directory, so that a run that is killed
-    then leaves a word. What the exception of the block, a signal or a failure leaves is the state before.
+    Every file is completed in a hidden directory next to its target. When all are complete, they are moved to
+    their paths in one pass, during which signals are deferred. If one cannot be moved, the others are moved
+    back. While several files are moved, each directory has a mark file, which reports an interrupted run. An
+    exception of the block, a signal or a failure restores the previous state.
 
-    Symbolic links are followed and stay; what is no regular file is written through: at once by :meth:`open`,
-    before the files are put in place by :meth:`write`.
+    Symbolic links are followed and preserved. Pipes and devices are written directly: immediately by
+    :meth:`open`, before the files are moved by :meth:`write`.
     """
 
     def __init__(self, inputs: Iterable[Path] = ()) -> None:
@@ -141,7 +139,7 @@ class OutputSet:
             self.abandon()
 
     def open(self, path: Path) -> io.BufferedWriter:
-        """Open a file to be written piece by piece; the set closes it."""
+        """Open a file for writing in pieces; the set closes it."""
         target = self._target(path)
         if target.regular:
             return self._stage(target)
@@ -169,7 +167,7 @@ class OutputSet:
             if target.directory not in self._stagings:
                 self._make(target.directory)
                 remove_leftovers(target.directory)
-                # Known before it is made, so that it is removed whenever the process is told to end.
+                # Registered before its creation, so that a signal always removes it.
                 self._stagings[target.directory] = Staging(target.directory)
                 self._stagings[target.directory].begin()
             path = os.path.join(self._stagings[target.directory].path, str(len(self._staged)))
@@ -182,11 +180,10 @@ class OutputSet:
         return file
 
     def _make(self, directory: str) -> None:
-        """Make a directory with those above it."""
         if os.path.isdir(directory):
             return
         self._make(os.path.dirname(directory))
-        # Before it is made, so that it is removed whenever the process is told to end.
+        # Registered before its creation, so that a signal always removes it.
         self._made.append(directory)
         try:
             os.mkdir(directory)
@@ -207,7 +204,7 @@ class OutputSet:
             self._place()
 
     def _place(self) -> None:
-        """Move all files to their places, or none."""
+        """Move all files to their paths, or none."""
         places = [staged.target.place for staged in self._staged]
         several = len(places) > 1
         try:
@@ -235,10 +232,10 @@ class OutputSet:
             unmark(staging)
 
     def abandon(self) -> None:
-        """Remove what the set has made apart from files in place."""
+        """Remove everything that the set has created, except files at their paths."""
         with deferred():
             for file in [*(staged.file for staged in self._staged), *self._streams]:
-                # Without flushing: what is not complete goes nowhere.
+                # Without flushing: incomplete content is not written.
                 with suppress(OSError):
                     file.raw.close()
             for staging in self._stagings.values():
@@ -250,17 +247,17 @@ class OutputSet:
                 _live.remove(self)
 
 
-_live: list[OutputSet] = []  # Those at work, for a signal that ends the process
+_live: list[OutputSet] = []  # Active sets, for a signal that ends the process
 
 
 def abandon_all() -> None:
-    """Remove what the sets of this process have made apart from files in place: it is about to end."""
+    """Abandon all sets of this process, which is about to end."""
     while _live:
         _live[-1].abandon()
 
 
 def write_whole(files: Mapping[Path, Content]) -> None:
-    """Write contents by path so that all are there, or none."""
+    """Write contents by path: all, or none."""
     with OutputSet() as outputs:
         for path, content in files.items():
             outputs.write(path, content)
@@ -274,12 +271,12 @@ def _put(file: io.BufferedWriter, content: Content) -> None:
 
 
 def _stream(target: Target) -> io.BufferedWriter:
-    """Open what is no regular file, to write through it."""
+    """Open a pipe or device for direct writing."""
     with naming(target.given):
         if target.descriptor is None:
             descriptor = os.open(target.place, os.O_WRONLY | getattr(os, "O_NOCTTY", 0))
         else:
-            # What was printed to the same place before comes before.
+            # Previous output to the same target must precede.
             for stream in (sys.stdout, sys.stderr):
                 if stream is not None:
                     stream.flush()
@@ -288,7 +285,7 @@ def _stream(target: Target) -> io.BufferedWriter:
 
 
 def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
-    """Give a new file the owner, as far as the system allows, and the permissions of the one it replaces."""
+    """Set owner (if permitted) and permissions of a new file as of the replaced one."""
     if sys.platform == "win32":
         return
     made = os.fstat(descriptor)
@@ -300,9 +297,9 @@ def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Let the signals that ask to end wait until the block is done; then they do what they did before.
+    """Defer termination signals until the end of the block.
 
-    Only the main thread runs handlers of signals: in any other nothing is to be deferred.
+    Only the main thread runs handlers of signals; other threads defer nothing.
     """
     caught: list[int] = []
     former: dict[int, Any] = {}

@@ -1,4 +1,4 @@
-"""Hidden directories in which files are completed, and marks of sets that were not all put in place."""
+"""Hidden directories for incomplete files, and marks of incomplete sets."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ that stand in this directory have been written again, or remove it yourself.
 
 
 class Staging:
-    """A directory with a random name that only its user may enter, locked as long as its process lives.
+    """A private directory with a random name, locked during the life of its process.
 
-    The lock, not the number of a process, tells whether the process lives: numbers are used again, and mean
-    nothing in other containers or on other machines that share a disk. Where the file system knows no locks,
-    every such directory counts as alive.
+    The lock shows whether the process lives. Process ids are reused, and are meaningless in other containers
+    or on other machines that share a disk. On file systems without locks, every such directory counts as
+    active.
     """
 
     def __init__(self, directory: str) -> None:
@@ -45,7 +45,7 @@ class Staging:
         self._lock: int | None = None
 
     def begin(self) -> None:
-        """Make the directory; :meth:`remove` is called whatever happens."""
+        """Create the directory; :meth:`remove` is always called."""
         for _ in range(TRIALS):
             if self._begin():
                 return
@@ -55,11 +55,11 @@ class Staging:
 
     @property
     def path(self) -> str:
-        """Where it is."""
+        """Path of the directory."""
         return os.path.join(self.directory, f".photogram-{self.token}")
 
     def _begin(self) -> bool:
-        """Make and lock the directory; False if another run took it for a leftover meanwhile."""
+        """Create and lock the directory; False if another run removed it."""
         os.mkdir(self.path, 0o700)
         lock = os.path.join(self.path, LOCK)
         try:
@@ -70,7 +70,7 @@ class Staging:
         return locked is None or (locked and os.fstat(self._lock).st_nlink > 0)
 
     def remove(self) -> None:
-        """Remove the directory with what is in it, as far as possible."""
+        """Remove the directory and its contents, as far as possible."""
         with suppress(OSError):
             _empty(self.path)
         if self._lock is not None:
@@ -80,7 +80,7 @@ class Staging:
 
 
 def alive(directory: str, token: str) -> bool:
-    """Tell whether the run with this token still works in a directory."""
+    """Return whether the run with this token still works in a directory."""
     path = os.path.join(directory, f".photogram-{token}", LOCK)
     try:
         lock = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
@@ -93,7 +93,7 @@ def alive(directory: str, token: str) -> bool:
 
 
 def remove_leftovers(directory: str) -> None:
-    """Remove the staging directories that dead runs of the same user have left in a directory."""
+    """Remove staging directories of terminated runs of the same user."""
     with suppress(OSError), os.scandir(directory) as entries:
         for entry in entries:
             if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
@@ -109,7 +109,7 @@ def _remove_dead(path: str) -> None:
             try:
                 lock = os.open(LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), dir_fd=opened)
             except FileNotFoundError:
-                # Just begun, or its removal was cut short: it goes only if it is empty.
+                # New, or incompletely removed: it is removed only if it is empty.
                 os.rmdir(path)
                 return
             try:
@@ -122,7 +122,7 @@ def _remove_dead(path: str) -> None:
 
 
 def _empty(path: str) -> None:
-    """Remove the files of a staging directory, the lock last, and itself; no link is followed."""
+    """Remove a staging directory, the lock last, without following links."""
     opened = os.open(path, DIRECTORY)
     try:
         for name in sorted(os.listdir(opened), key=lambda name: name == LOCK):
@@ -133,7 +133,7 @@ def _empty(path: str) -> None:
 
 
 def try_lock(descriptor: int) -> bool | None:
-    """Lock a file; False where another process holds it, None where the file system knows no locks."""
+    """Lock a file; False if it is locked, None without support of locks."""
     if sys.platform == "win32":
         return None
     try:
@@ -146,7 +146,7 @@ def try_lock(descriptor: int) -> bool | None:
 
 
 def sync_directory(directory: str) -> None:
-    """Put the names in a directory on the disk, where the file system can."""
+    """Flush the names in a directory to the disk, if the file system can."""
     try:
         opened = os.open(directory, os.O_RDONLY | getattr(os, "O_DIRECTORY", 0))
         try:
@@ -159,7 +159,7 @@ def sync_directory(directory: str) -> None:
 
 
 def mark(staging: Staging, places: Iterable[str]) -> None:
-    """Put a mark into the directory of a set: from now on it may be incomplete."""
+    """Create the mark file of a set that may be incomplete."""
     lines = [json.dumps(os.path.relpath(place, staging.directory)) for place in places]
     content = (MARK_TEXT + "\n".join(lines) + "\n").encode()
     made = os.path.join(staging.path, "mark")
@@ -176,14 +176,14 @@ def mark(staging: Staging, places: Iterable[str]) -> None:
 
 
 def unmark(staging: Staging) -> None:
-    """Take the mark of a set away: it is complete."""
+    """Remove the mark file of a complete set."""
     with naming(Path(_path(staging))), suppress(FileNotFoundError):
         os.unlink(_path(staging))
         sync_directory(staging.directory)
 
 
 def clear_marks(places: Iterable[str]) -> None:
-    """Remove the marks of dead runs whose files have all been written again."""
+    """Remove the marks of terminated runs whose files have all been written again."""
     written = set(places)
     for directory in {os.path.dirname(place) for place in written}:
         for path, named in _dead_marks(directory):
@@ -194,7 +194,7 @@ def clear_marks(places: Iterable[str]) -> None:
 
 
 def doubtful(paths: Iterable[Path]) -> dict[Path, str]:
-    """Return those files that belong to a set which may be incomplete, with the mark that says so."""
+    """Return the files of sets that may be incomplete, with the marks."""
     found: dict[Path, str] = {}
     marks: dict[str, list[tuple[str, set[str]]]] = {}
     for path in paths:
@@ -211,7 +211,7 @@ def _path(staging: Staging) -> str:
 
 
 def _dead_marks(directory: str) -> list[tuple[str, set[str]]]:
-    """Return the marks of dead runs in a directory, with the places that they name, other lines left out."""
+    """Return marks of terminated runs in a directory, with their paths."""
     found = []
     with suppress(OSError):
         for name in sorted(os.listdir(directory)):

@@ -1,4 +1,4 @@
-"""What stands where a result is to go: nothing, a file, or something that is written through."""
+"""Targets of results: new files, existing files, pipes and devices."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
-MOST_LINKS = 40  # Symbolic links that are followed, as by Linux
+MOST_LINKS = 40  # Largest number of symbolic links that are followed, as in Linux
 _Identity = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where the bytes of an output go."""
+    """The target of an output."""
 
-    given: Path  # The path as the user wrote it; errors name it
+    given: Path  # The path of the user, for errors
     place: str  # The path after all symbolic links
-    status: os.stat_result | None  # Of what stands there; None where nothing does
-    descriptor: int | None = None  # A descriptor of this process that the path means, as `/dev/stdout` does
+    status: os.stat_result | None  # Status of the existing file; None without
+    descriptor: int | None = None  # File descriptor of this process, for paths such as `/dev/stdout`
 
     @property
     def regular(self) -> bool:
-        """Whether it is a file, or will be one; what is none (a FIFO, a device) is written through."""
+        """Whether the target is a (new) regular file, not a pipe or device."""
         return self.descriptor is None and (self.status is None or stat.S_ISREG(self.status.st_mode))
 
     @property
     def directory(self) -> str:
-        """The directory of the place."""
+        """The directory of the target."""
         return os.path.dirname(self.place)
 
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let an :class:`OSError` name the file as the user did."""
+    """Add the path of the user to an :class:`OSError`."""
     try:
         yield
     except OSError as error:
@@ -48,7 +48,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def follow(path: Path) -> Target:
-    """Find out where an output goes."""
+    """Return the target of an output path."""
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
     with naming(path):
@@ -76,7 +76,7 @@ def follow(path: Path) -> Target:
 
 
 def _own_descriptor(place: str) -> int | None:
-    """Return the descriptor of this process that a path like `/proc/self/fd/1` means."""
+    """Return the file descriptor of this process for a path like `/proc/self/fd/1`."""
     directory, name = os.path.split(place)
     if not (name.isascii() and name.isdigit()):
         return None
@@ -85,9 +85,9 @@ def _own_descriptor(place: str) -> int | None:
 
 
 class Guard:
-    """Refuses outputs that are inputs, directories, or one another, by whatever name.
+    """Rejects outputs that are inputs, directories, or one another, under any name.
 
-    What is no regular file (a FIFO, a device) is written through and may be anything.
+    Pipes and devices are written directly and are not checked.
     """
 
     def __init__(self, inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
@@ -99,14 +99,14 @@ class Guard:
             self._above |= {_spelling(place), *_above(place)}
 
     def add(self, path: Path) -> Target:
-        """Return where an output goes."""
+        """Check an output and return its target."""
         target = follow(path)
         if not target.regular:
             return target
         if target.status and _identity(target.status) in self._read:
             raise InputError(phrase("file.over-input"), file=path)
         above = set(_above(target.place))
-        # What two targets that are one have in common
+        # Keys by which two targets are identical
         keys: list[object] = [_spelling(target.place)]
         keys += [_identity(target.status)] if target.status else []
         if any(key in self._files for key in keys):
@@ -120,14 +120,14 @@ class Guard:
 
 
 def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path], directories: Iterable[Path] = ()) -> None:
-    """Let a :class:`Guard` look at outputs before anything is computed."""
+    """Check outputs with a :class:`Guard` before anything is computed."""
     guard = Guard(inputs, directories)
     for path in outputs:
         guard.add(path)
 
 
 def _spelling(place: str) -> str:
-    """Fold the letter case of the last part: file systems may not know it apart."""
+    """Fold the letter case of the last part, which some file systems ignore."""
     directory, name = os.path.split(place)
     return os.path.join(directory, name.casefold())
 

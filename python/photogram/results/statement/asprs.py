@@ -65,15 +65,9 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
     horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
     the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
     """
-    rest = (found - survey) * (found + survey)
-    return Accuracy(
-        count,
-        found,
-        survey,
-        math.hypot(found, survey),
-        math.hypot(rmse_interval(found, freedom)[1], survey),
-        math.sqrt(rest) if rest >= 0 else None,
-    )
+    rest, upper = (found - survey) * (found + survey), rmse_interval(found, freedom)[1]
+    product = math.sqrt(rest) if rest >= 0 else None
+    return Accuracy(count, found, survey, math.hypot(found, survey), math.hypot(upper, survey), product)
 
 
 def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
@@ -104,7 +98,6 @@ def verdict(figure: Accuracy | None, limit: float) -> str:
 
 
 def wording(count: int) -> str:
-    """Return which of the standard's three sentences holds (7.16): `tested`, `produced`, or `none`."""
     if count >= ENOUGH:
         return "tested"
     return "produced" if count else "none"

@@ -139,44 +139,34 @@ def budgets(
 
     values = covariances.propagate(together, items)
     _, effects = covariances.influences(items, together)
-    freedom = _Freedoms(result, rows, components)
-    return [
-        _budget(result, each, float(values.value[k]), t, rows, freedom, coverage)
-        for k, (each, t) in enumerate(zip(wanted, effects, strict=True))
-    ]
+    freedoms, found = _Freedoms(result, rows, components), []
+    for each, value, t in zip(wanted, values.value.tolist(), effects, strict=True):
+        squares = result.covariance_scale * t**2
+        variance = float(squares.sum())
+        share = 1.0 / variance if variance > 0 else 0.0
+        freedom = freedoms.of(squares, variance)
+        budget = Budget(
+            quantity=each.name,
+            subject=each.subject,
+            unit=each.unit,
+            value=value,
+            sd=math.sqrt(variance),
+            cofactor=variance / result.covariance_scale,
+            sources=tuple(Source(*source, source[-1] * share) for source in rows.sources(squares)),
+            largest=tuple(_largest(rows, squares, t, share)),
+            freedom=freedom,
+            k=coverage_factor(coverage, freedom.used),
+            coverage=coverage,
+        )
+        found.append(budget)
+    return found
 
 
-def _budget(
-    result: Result, wanted: Wanted, value: float, t: Floats, rows: Rows, freedoms: _Freedoms, coverage: float
-) -> Budget:
-    squares = result.covariance_scale * t**2
-    variance = float(squares.sum())
-    share = 1.0 / variance if variance > 0 else 0.0
-    sources = [
-        Source(level, name, number, contribution, contribution * share)
-        for level, name, number, contribution in rows.sources(squares)
-    ]
+def _largest(rows: Rows, squares: Floats, t: Floats, share: float) -> Iterable[Single]:
     most = np.sort(np.argpartition(-squares, min(LARGEST, len(squares)) - 1)[:LARGEST])
-    order = most[np.argsort(-squares[most], kind="stable")].tolist()
-    largest = [
-        Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
-        for row in order
-        if (own := float(squares[row])) > 0
-    ]
-    freedom = freedoms.of(squares, variance)
-    return Budget(
-        quantity=wanted.name,
-        subject=wanted.subject,
-        unit=wanted.unit,
-        value=value,
-        sd=math.sqrt(variance),
-        cofactor=variance / result.covariance_scale,
-        sources=tuple(sources),
-        largest=tuple(largest),
-        freedom=freedom,
-        k=coverage_factor(coverage, freedom.used),
-        coverage=coverage,
-    )
+    for row in most[np.argsort(-squares[most], kind="stable")].tolist():
+        if (own := float(squares[row])) > 0:
+            yield Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
 
 
 def budget_line(texts: Texts, found: Budget) -> str:

@@ -86,7 +86,6 @@ class Compared:
         return np.asarray((3 * points[:, np.newaxis] + components).ravel())
 
     def of(self, part: str) -> tuple[Floats, Floats]:
-        """Return the differences of a part, and their covariance C_c."""
         rows = self.rows(part)
         return self.differences.ravel()[rows], self.covariance[np.ix_(rows, rows)]
 
@@ -292,8 +291,6 @@ def _check_apart(block: Block, rows: Indices) -> None:
 
 @dataclass(frozen=True)
 class System:
-    """A system of coordinates for people."""
-
     crs: str  # Name; empty for the system of the block
     axes: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]  # Names and units of its three coordinates
     carried: Callable[[Floats], Floats]  # Transforms (n, 3) positions of the block; angles in degrees

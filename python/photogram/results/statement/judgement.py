@@ -51,30 +51,11 @@ class Judged:
 class _Evidence:
     found: Grounds
     strict: bool
-    control: Sequence[LeftOut]  # control points that disagree with the rest of the block
-    high: bool  # whether differences at check points are larger, or smaller, than predicted
-    low: bool
-    lengths: bool  # whether calibrated lengths disagree with their standard deviations
-
-    @property
-    def missed(self) -> bool:
-        lengths = self.found.standards.lengths
-        return "missed" in self.classes or (lengths is not None and lengths.test.met is False)
-
-    @property
-    def met(self) -> bool:
-        lengths = self.found.standards.lengths
-        return lengths is not None and bool(lengths.test.met)
-
-    @property
-    def classes(self) -> list[str]:
-        asprs = self.found.standards.asprs
-        return [] if asprs is None else list(asprs.verdicts.values())
-
-    @property
-    def doubtful(self) -> bool:
-        """Whether a rule of `strict` fits."""
-        return self.found.result.verdict.warning or self.low or bool(self.control) or self.lengths
+    control: Sequence[LeftOut]  # Control points that disagree with the rest of the block
+    classes: Sequence[str]  # Verdicts on accuracy classes
+    # Names of what holds: differences at check points are `high` or `low`, the required accuracy of lengths
+    # is `met` or `missed`, `lengths` disagree with their standard deviations; `warning` of the adjustment
+    facts: frozenset[str]
 
 
 def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
@@ -93,16 +74,16 @@ def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> 
 
 RULES = (
     _rule("verdict", lambda e: not e.found.result.verdict.usable, NOT_USABLE),
-    _rule("missed", lambda e: e.missed, NOT_USABLE),
-    _rule("high", lambda e: e.high, NOT_USABLE),
-    _rule("warning", lambda e: e.strict and e.found.result.verdict.warning, NOT_USABLE),
+    _rule("missed", lambda e: "missed" in (*e.classes, *e.facts), NOT_USABLE),
+    _rule("high", lambda e: "high" in e.facts, NOT_USABLE),
+    _rule("warning", lambda e: e.strict and "warning" in e.facts, NOT_USABLE),
     _rule("control", lambda e: e.strict and bool(e.control), NOT_USABLE),
-    _rule("lengths", lambda e: e.strict and e.lengths, NOT_USABLE),
-    _rule("low", lambda e: e.low, NOT_USABLE),
-    _rule("none", lambda e: e.found.of_all is None and (not e.met or "not tested" in e.classes)),
-    _rule("found", lambda e: "not decided" in e.classes or "not tested" in e.classes),
+    _rule("lengths", lambda e: e.strict and "lengths" in e.facts, NOT_USABLE),
+    _rule("low", lambda e: "low" in e.facts, NOT_USABLE),
+    _rule("none", lambda e: e.found.of_all is None and ("met" not in e.facts or "not tested" in e.classes)),
+    _rule("found", lambda e: not {"not decided", "not tested"}.isdisjoint(e.classes)),
     _rule("produced", lambda e: "produced to meet" in e.classes),
-    _rule("met", lambda e: bool(e.classes) or e.met),
+    _rule("met", lambda e: bool(e.classes) or "met" in e.facts),
     _rule("found", lambda _: True),
 )
 """The rules of a statement; the first that fits gives the headline and the exit code."""
@@ -110,21 +91,25 @@ RULES = (
 
 def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
     """Return what the statement says of all that was found."""
-    texts, lengths = found.texts, found.standards.lengths
-    whole = None if lengths is None else lengths.test.together
+    texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
+    test = None if lengths is None else lengths.test
+    whole = None if test is None else test.together
     high, low = _rejected(found.of_all)
-    evidence = _Evidence(
-        found,
-        strict,
-        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
-        high=high,
-        low=low,
-        lengths=whole is not None and (whole.rejected_high or whole.rejected_low),
-    )
-    _, headline, exit_code = fitting_rules(RULES, evidence)[0]
+    holds = {
+        "high": high,
+        "low": low,
+        "missed": test is not None and test.met is False,
+        "met": test is not None and bool(test.met),
+        "lengths": whole is not None and (whole.rejected_high or whole.rejected_low),
+        "warning": found.result.verdict.warning,
+    }
+    facts = frozenset(name for name, fact in holds.items() if fact)
+    control = [each for each in found.left_out if each.p < limit_of(found.left_out)]
+    classes = [] if asprs is None else [*asprs.verdicts.values()]
+    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, strict, control, classes, facts))[0]
     remarks = _remarks(found)
-    remarks += [texts("control.wrong", point=each.point, p=each.p) for each in evidence.control[:NAMED]]
-    doubtful = evidence.doubtful or _doubtful(found.of_all)
+    remarks += [texts("control.wrong", point=each.point, p=each.p) for each in control[:NAMED]]
+    doubtful = bool(control) or not facts.isdisjoint({"warning", "low", "lengths"}) or _doubtful(found.of_all)
     return Judged(
         exit=exit_code,
         tone="bad" if exit_code else "look" if remarks or doubtful else "good",
@@ -142,7 +127,6 @@ def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool
 
 
 def _whole(of_all: Figures) -> Prediction | None:
-    """Return the test of as many components together as there are points with all of them."""
     return of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
 
 

@@ -28,8 +28,6 @@ PREDICTABLE = 0.01  # Least eigenvalue of R_g of a predictable direction
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A control point, predicted by the rest."""
-
     point: str  # Its name
     # (3,) predicted minus survey, east, north, up; linear unit; NaN if free or hardly predictable
     difference: Floats
@@ -99,14 +97,5 @@ def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats
     difference[held] = np.where(blind, np.nan, -(factor @ pseudo @ residual))
     sd[held] = np.where(blind, np.nan, np.sqrt(np.diag(own)))
     covariance[np.ix_(held, held)] = own
-    return LeftOut(
-        name,
-        difference,
-        sd,
-        covariance,
-        statistic,
-        rank,
-        _photocore.chi_square(statistic, rank, upper=True) if rank else float("nan"),
-        np.diag(redundancy),
-        values,
-    )
+    p = _photocore.chi_square(statistic, rank, upper=True) if rank else float("nan")
+    return LeftOut(name, difference, sd, covariance, statistic, rank, p, np.diag(redundancy), values)

@@ -12,6 +12,7 @@ from photogram import _photocore
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
 from photogram.results.features import Features, through, unit_deviations
+from photogram.results.network_sections import fit_of_images
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.comparison import control_places, in_order
 from photogram.results.statement.document import kinds_of
@@ -42,7 +43,6 @@ BLANK = " "  # Head of a column without a name
 
 
 def annexes(statement: Statement) -> list[Section]:
-    """Return the annexes; those without content are omitted by the page."""
     texts, result = statement.texts, statement.result
     checks = [
         check_points(statement),
@@ -80,7 +80,6 @@ def _radii(texts: Texts, own: Figures) -> Table:
 
 
 def _budget(texts: Texts, own: Budget) -> list[Table]:
-    """Return the sources of a budget, kinds and the largest finer ones, and the largest observations."""
     columns = Columns(texts)
     finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
     if len(own.at("camera")) < 2:
@@ -121,7 +120,6 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
 
 
 def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
-    """Return parameters and correlations of a camera, and its distortion with standard deviations."""
     texts, columns, sd = statement.texts, Columns(statement.texts), camera.sd
     of, estimated = units(camera.camera), camera.estimated
     axes = tuple(Axis.of(name, unit) for name, unit in zip(camera.names, of, strict=True))
@@ -161,7 +159,6 @@ def _camera(statement: Statement, camera: AdjustedCamera) -> list[Table]:
 
 
 def _adjustment(statement: Statement) -> list[Part]:
-    """Return sums by kind, tests, removed observations, residuals of control and check points."""
     texts, columns = statement.texts, Columns(statement.texts)
     kinds = kinds_of(statement.result)
     counts, redundancy, squares = zip(*kinds.values(), strict=True)
@@ -185,22 +182,17 @@ def _adjustment(statement: Statement) -> list[Part]:
 
 
 def _markers(statement: Statement) -> Table:
-    """Return rms and largest residual of the images of every control and check point."""
     texts, columns, result = statement.texts, Columns(statement.texts), statement.result
-    block, kinds, n = result.block, result.point_kinds, len(result.point_kinds)
-    squares = np.where(result.used_images[:, np.newaxis], result.residuals, 0.0) ** 2
-    total = np.bincount(result.image_points, weights=squares.sum(axis=1), minlength=n)
-    counts = np.bincount(result.image_points[result.used_images], minlength=n)
-    largest = np.zeros(n)
-    np.maximum.at(largest, result.image_points, np.sqrt(squares.sum(axis=1)))
-    rows = in_order(block, np.flatnonzero((kinds != "pass") & (counts > 0)))
+    block, kinds = result.block, result.point_kinds
+    fit = fit_of_images(result, result.image_points, len(kinds))
+    rows = in_order(block, np.flatnonzero((kinds != "pass") & (fit[:, 5] > 0)))
     number = partial(columns.number, decimals=2, unit=block.image_unit)
     quantities = [
         columns.text("point", [block.point_ids[row] for row in rows]),
         columns.text("use", [texts(f"use.{kind}") for kind in kinds[rows]]),
-        columns.number("photos", counts[rows]),
-        number("rms", np.sqrt(total[rows] / counts[rows])),
-        number("largest", largest[rows]),
+        columns.number("photos", fit[rows, 5].astype(int)),
+        number("rms", np.hypot(*fit[rows, :2].T)),
+        number("largest", fit[rows, 3]),
     ]
     return Table("markers", texts("table.markers"), quantities)
 
@@ -328,7 +320,6 @@ def statement_document(statement: Statement) -> Document:
 
 
 def _figures(statement: Statement) -> list[Part]:
-    """Return the table of the first sheet: with classes, and with RMSE without some points."""
     own, texts, rest = statement.of_all, statement.texts, statement.of_rest
     if own is None:
         return []

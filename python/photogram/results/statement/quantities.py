@@ -25,14 +25,11 @@ if TYPE_CHECKING:
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
 PRINCIPAL = ("f", "fx", "c")  # Names of principal distances
-MAX_SEARCHED_NAMES = 10_000  # Larger lists of names are not searched for the nearest name
 TOGETHER = 256  # Points of one block of distances
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """A quantity f(x)."""
-
     name: str  # As it was asked for: `point C08 z`
     subject: Phrase  # The same as a message
     items: tuple[Item, ...]  # What it is a function of: see :class:`photogram.results.Covariances`
@@ -60,7 +57,7 @@ def wanted(result: Result, asked: Any) -> Wanted:
     name, component = " ".join(words[1:-1]), words[-1]
     things = kinds[kind]
     if name not in things.ids:
-        raise InputError(unknown(kind, name, things.ids))
+        raise InputError(unknown_name(kind, name, things.ids))
     names = things.components[list(things.ids).index(name)]
     lower = [each.lower() for each in names]
     own = _AXES.get(component.lower()) if kind in ("point", "photo") and component not in names else None
@@ -74,7 +71,6 @@ def wanted(result: Result, asked: Any) -> Wanted:
 
 
 def component_of(name: str, axis: Phrase) -> Phrase:
-    """Return the name of a component of a point, photo, camera or unknown."""
     return Phrase("named.component", {"name": name, "axis": axis})
 
 
@@ -124,13 +120,7 @@ def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
         if known.issuperset(names):
             return names
     lacking = next((word for word in words if word not in known), words[0])
-    raise InputError(unknown("point", lacking, block.point_ids))
-
-
-def unknown(kind: str, name: str, names: Sequence[str]) -> Phrase:
-    """Return the message that there is no thing with a name; of many things without the nearest name."""
-    searched = len(names) < MAX_SEARCHED_NAMES
-    return unknown_name(kind, name, names) if searched else phrase("error.absent", kind=kind, name=name)
+    raise InputError(unknown_name("point", lacking, block.point_ids))
 
 
 def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:

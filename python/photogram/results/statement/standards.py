@@ -17,7 +17,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import counted
+from photogram.messages import counted, unknown_name
 from photogram.network.observations import Control
 from photogram.results.statement import asprs
 from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
@@ -32,7 +32,6 @@ from photogram.results.statement.lengths import (
     length_test,
     measured_lengths,
 )
-from photogram.results.statement.quantities import unknown
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 from photogram.statistics.error_radii import circular_error
@@ -116,7 +115,6 @@ class Nssda:
 
     @property
     def wording(self) -> str:
-        """Which sentence holds: `tested` with check points, `compiled` (to meet) without."""
         return "tested" if self.count else "compiled"
 
 
@@ -147,27 +145,7 @@ class Standards:
         return members(self.nssda, "ratio", "accuracy_r_equal", **more)
 
 
-def standards(
-    result: Result,
-    asked: Asked,
-    found: Compared,
-    of_all: Figures | None,
-    of_vegetated: Figures | None,
-    left_out: Sequence[LeftOut],
-) -> Standards:
-    """Return what the standards say that are asked for; refuse lengths between points that are not there."""
-    lengths = _lengths(result, asked) if asked.lengths else None
-    return Standards(
-        asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
-        if "asprs-2023" in asked.standards
-        else None,
-        nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
-        lengths=lengths,
-        iso_19157=_iso(result, asked, of_all, lengths) if "iso-19157" in asked.standards else [],
-    )
-
-
-def _asprs(
+def asprs_figures(
     result: Result,
     asked: Asked,
     found: Compared,
@@ -175,6 +153,7 @@ def _asprs(
     of_vegetated: Figures | None,
     left_out: Sequence[LeftOut],
 ) -> Asprs:
+    """Return the figures of the ASPRS, and the verdicts on the classes that were asked for."""
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
@@ -226,7 +205,6 @@ def _accuracies(of_all: Figures | None, of_vegetated: Figures | None) -> dict[st
 
 
 def _control_rmse(result: Result) -> tuple[float, float]:
-    """Return root mean squares of the standard deviations of control: radial in plan, and in height."""
     block, found = result.block, []
     turns = turned_to_east(block, block.point_positions)
     for row in np.flatnonzero(np.isfinite(block.point_sd).any(axis=1) & result.used_points).tolist():
@@ -257,13 +235,14 @@ def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     return Nssda(count, ratio, mean if ratio >= LEAST_RATIO else None, equal, ce95, vertical)
 
 
-def _lengths(result: Result, asked: Asked) -> Lengths:
+def tested_lengths(result: Result, asked: Asked) -> Lengths:
+    """Return calibrated lengths with their test; refuse lengths between points that are not there."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
     places = {name: row for row, name in enumerate(block.point_ids)}
     for name in names:
         if name not in places:
-            raise InputError(unknown("point", name, block.point_ids))
+            raise InputError(unknown_name("point", name, block.point_ids))
         if not result.used_points[places[name]]:
             raise InputError(phrase("adjusted.unused-point", point=name))
     rows = np.array([places[name] for name in names], dtype=np.int64)
@@ -297,9 +276,10 @@ def _lengths(result: Result, asked: Asked) -> Lengths:
     return Lengths(lines, ends, calibrated, limit, test, asked.expansion if turned else None)
 
 
-def _iso(
+def iso_measures(
     result: Result, asked: Asked, of_all: Figures | None, lengths: Lengths | None
 ) -> list[dict[str, Any]]:
+    """Return the figures as measures of ISO 19157."""
     more = {"unit": result.block.linear_unit, "date": asked.date}
     found: list[dict[str, Any]] = []
     if of_all is not None:

@@ -32,7 +32,13 @@ from photogram.results.statement.layout import layout
 from photogram.results.statement.leave_one_out import leave_one_out
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import standards
+from photogram.results.statement.standards import (
+    Standards,
+    asprs_figures,
+    iso_measures,
+    nssda,
+    tested_lengths,
+)
 from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
 from photogram.show.methods import Brief, Rows
@@ -251,6 +257,7 @@ def statement(
     taken_apart = budgets(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
+    lengths = tested_lengths(result, options) if options.lengths else None
     # As they were given, those with both coordinates in plan.
     checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
     control = control_places(result.block)
@@ -264,7 +271,16 @@ def statement(
         of_vegetated=of_vegetated,
         left_out=tuple(left_out),
         taken_apart=tuple(taken_apart),
-        standards=standards(result, options, found, of_all, of_vegetated, left_out),
+        standards=Standards(
+            asprs=asprs_figures(result, options, found, of_all, of_vegetated, left_out)
+            if "asprs-2023" in options.standards
+            else None,
+            nssda=None if of_all is None else nssda(of_all.moments, of_all.rmse_v1, of_all.n),
+            lengths=lengths,
+            iso_19157=iso_measures(result, options, of_all, lengths)
+            if "iso-19157" in options.standards
+            else [],
+        ),
         layout=layout(checks, np.concatenate([checks, control]), control) if len(checks) else None,
         removed=removed_observations(result, removed),
     )

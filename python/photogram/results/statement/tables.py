@@ -16,7 +16,7 @@ from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, decimals_of
-from photogram.show.quantity import Axis, Quantity, Table, column, frame, members
+from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
 
 if TYPE_CHECKING:
     from photogram import Statement
@@ -106,9 +106,6 @@ def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
     sd, difference = (np.array([getattr(each, name) for each in own]) for name in ("sd", "difference"))
     p, decimals = np.array([each.p for each in own]), decimals_for(sd)
     least = [float(each.eigenvalues.min(initial=math.nan)) for each in own]
-    only = {
-        name: [getattr(each, name) for each in own] for name in ("covariance", "redundancy", "eigenvalues")
-    }
     quantities = [
         columns.text("point", [each.point for each in own], name="point"),
         columns.directions(
@@ -119,7 +116,7 @@ def left_out_points(texts: Texts, own: Sequence[LeftOut]) -> Table:
         column("rank", [each.rank for each in own]),
         columns.number("p", p, kind="probability", name="p", marked=p < limit_of(own)),
         Quantity(least, name="least_eigenvalue"),
-        *(Quantity(values, member=name) for name, values in only.items()),
+        *members_of_each(own, "covariance", "redundancy", "eigenvalues"),
     ]
     return Table("leave_one_out", texts("annex.b"), quantities)
 

@@ -8,7 +8,7 @@ from datetime import date
 from string import Formatter
 from typing import Any
 
-from photogram.arguments.arrays import one_of, value_field
+from photogram.arguments.arrays import argument_error, one_of
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
@@ -33,12 +33,7 @@ class Texts(Words):
     `own` are sentences by code that replace those of the language, `unit` is the linear unit of the block.
     """
 
-    def __init__(
-        self,
-        language: str = "en",
-        own: Mapping[str, str] | None = None,
-        unit: str = "m",
-    ) -> None:
+    def __init__(self, language: str = "en", own: Mapping[str, str] | None = None, unit: str = "m") -> None:
         one_of("language", language, LANGUAGES)
         self.language, self.unit = language, unit
         english = table_of("en")
@@ -48,14 +43,11 @@ class Texts(Words):
                 absent = phrase("error.absent", kind="code", name=key)
                 raise InputError(unknown_name("code", key, alike) if alike else absent)
             if not isinstance(sentence, str):
-                raise InputError(
-                    phrase("error.at", what=key, message=phrase("error.text", value=value_field(sentence)))
-                )
+                raise argument_error(key, "text", value=sentence)
             known = fields_of(english[key])
             if strange := fields_of(sentence) - known:
-                raise InputError(
-                    phrase("request.field", code=key, field=sorted(strange)[0], names=sorted(known))
-                )
+                fields = {"field": sorted(strange)[0], "names": sorted(known)}
+                raise InputError(phrase("request.field", code=key, **fields))
             if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
                 raise InputError(phrase("request.form", code=key))
         super().__init__(language, own)
@@ -72,7 +64,6 @@ class Texts(Words):
         return super().__call__(code, **fields)
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
-        """Return a key with its sentence."""
         return key, self(key, **values)
 
     def _number(self, value: float, form: str) -> str:

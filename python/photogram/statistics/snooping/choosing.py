@@ -68,7 +68,6 @@ class Choosing:
 
     @property
     def suspects(self) -> Suspects:
-        """The groups."""
         return self.trial.suspects
 
     def choose(self) -> list[Chosen]:

@@ -39,7 +39,6 @@ class UnitWeight:
         return UnitWeight(self.known, left, self.degrees_of_freedom - dimension)
 
     def fisher(self, statistic: float, dimension: int) -> float:
-        """Return F of a group."""
         others = self.without(statistic, dimension)
         if dimension == 0 or not others.degrees_of_freedom > 0:
             return math.nan

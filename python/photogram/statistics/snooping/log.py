@@ -10,8 +10,6 @@ from photogram.words import Phrase, phrase
 
 @dataclass(frozen=True)
 class Rival:
-    """An alternative group that may contain the error."""
-
     name: str
     statistic: float  # T when the other was chosen
     dimension: int
@@ -81,8 +79,6 @@ NEAR = 3.0  # Likelihood ratio of alternatives in the log
 
 @dataclass(frozen=True)
 class Round:
-    """A round of data snooping."""
-
     number: int  # From 1; 0 for the robust start
     status: str  # of the adjustment at the start of the round
     weighted_sum_of_squares: float  # Omega and f at the start

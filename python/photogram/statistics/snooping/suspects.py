@@ -47,30 +47,24 @@ class Suspects(ABC):
         """Return the rows of a group that may be removed alone; None if only all together."""
 
     @abstractmethod
-    def name(self, group: int) -> Phrase:
-        """Return the name of a group."""
+    def name(self, group: int) -> Phrase: ...
 
     @abstractmethod
-    def row_name(self, row: int) -> str:
-        """Return the component of a row."""
+    def row_name(self, row: int) -> str: ...
 
     @abstractmethod
-    def unit(self, row: int) -> str:
-        """Return the unit of a row."""
+    def unit(self, row: int) -> str: ...
 
     @abstractmethod
-    def photo_name(self, photo: int) -> Phrase:
-        """Return the name of a photo."""
+    def photo_name(self, photo: int) -> Phrase: ...
 
     def __len__(self) -> int:
         return len(self.kinds)
 
     def kind(self, group: int) -> str:
-        """Return the observation type of a group."""
         return self.kind_names[int(self.kinds[group])]
 
     def rows(self, group: int) -> Indices:
-        """Return the rows of a group."""
         return np.arange(self.row_starts[group], self.row_starts[group + 1])
 
     @cached_property

@@ -28,8 +28,6 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of data snooping."""
-
     level: float = LEVEL  # Joint level of all tests, or the false discovery rate
     fdr: bool = False  # Whether `level` is the false discovery rate
     known: bool = True  # Whether the unit weight is known: chi-square decides, otherwise F

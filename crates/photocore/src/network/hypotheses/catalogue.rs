@@ -7,10 +7,8 @@ use nalgebra::Vector3;
 use super::super::model::{Bundle, Owner};
 use super::super::stations::Stations;
 use super::super::trial::Trial;
-use super::Facts;
-use super::{attitudes, cameras, control, form, positions, shutter};
+use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages};
-use crate::geometry::{ObjectSpace, PoseNumbers};
 
 /// An error that a set of observations has in common.
 pub(super) struct Cause {
@@ -56,11 +54,12 @@ pub(super) struct Catalogue<'a> {
 }
 
 impl<'a> Catalogue<'a> {
+    /// Without any error yet, at the adjusted values.
     pub fn new(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Self {
         let problem = &trial.assembled.problem;
         let bundle = &problem.model;
         let photos = bundle.cameras.len();
-        let mut own = Self {
+        Self {
             causes: vec![],
             bundle,
             stations: bundle.evaluated(&found.values),
@@ -72,20 +71,7 @@ impl<'a> Catalogue<'a> {
             cameras: vec![vec![]; photos],
             shutters: vec![None; photos],
             camera_of_photo: trial.camera_of_photo(),
-        };
-        let points = own.control_points(trial);
-        control::add(&mut own, &points);
-        cameras::add(&mut own, trial);
-        // Poses that are made of several blocks, or are vectors, have no unknowns of their own that could be displaced.
-        if bundle.mounts.is_empty() && matches!(bundle.poses, PoseNumbers::Angles(_)) {
-            attitudes::add(&mut own);
-            if bundle.space == ObjectSpace::Rectangular {
-                positions::add(&mut own);
-                form::add(&mut own, &points);
-                shutter::add(&mut own, trial);
-            }
         }
-        own
     }
 
     /// Adds a hypothesis with its parameters; their columns.
@@ -118,7 +104,7 @@ impl<'a> Catalogue<'a> {
     }
 
     /// Points with observed or fixed coordinates: the point of the network, its place in the model.
-    fn control_points(&self, trial: &Trial) -> Vec<(usize, usize)> {
+    pub fn control_points(&self, trial: &Trial) -> Vec<(usize, usize)> {
         let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "control");
         let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.points.iter().copied()).collect();
         let given = |place: usize| self.sd[self.bundle.of_point(place)].iter().any(|sd| sd.is_finite());

@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use super::super::suspects::{Home, Row, Subject, Suspect};
 use super::super::trial::Trial;
 use super::effect::Sample;
+use super::facts::Facts;
+use super::hypothesis::{About, Hypothesis};
 use super::judged::{Criteria, Judged};
-use super::{About, Facts, Hypothesis};
 use crate::Threads;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Linearized};
 

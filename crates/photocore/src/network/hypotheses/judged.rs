@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Facts;
+use super::facts::Facts;
 use crate::adjustment::{Tail, VISIBLE, chi_square, detectable_noncentrality, fisher};
 
 /// Degrees of freedom from which on an estimated unit weight counts as known for the MDB.
