@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.console import output
+from photogram.cli.console import print_document
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, with_job
 from photogram.cli.options import Quiet, pair
 from photogram.lazy_dataclasses import dataclass
@@ -71,8 +71,6 @@ def convert_lens(
     The report contains root mean square and largest difference of 60 x 40 pixels, the largest one's position,
     and the motion of the axes. If the camera has covariances, the new camera has covariances, too.
     """
-    from photogram.show.forms import summary
-
     if plots and out is None:
         raise misuse("--plots", "requires", options="--out DIR")
     source, known = _camera(job, path, camera)
@@ -84,7 +82,7 @@ def convert_lens(
     job.finish(
         {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
         {} if json is None else {json: found.to_json()},
-        summary=lambda: output.print("\n".join(summary(found.document())), markup=False),
+        summary=lambda: print_document(found.document()),
         code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
     )
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rich.markup import escape
 
 from photogram.cli.command_classes import misuse
-from photogram.cli.console import output, print_remark, print_sections
+from photogram.cli.console import output, print_document, print_remark, print_sections
 from photogram.cli.job import Job, OutputFile, OutputFolder, Without
 from photogram.cli.options import PictureFormat
 from photogram.lazy_dataclasses import dataclass
@@ -162,14 +162,14 @@ class Documents:
         tables: Sequence[str] = (),
         code: int | None = None,
     ) -> None:
-        """Write a result and further files, print its report, exit by its verdict."""
-        from photogram.show.forms import summary
+        """Write a result and further files, print its report or tables, exit by its verdict."""
 
         def summarize() -> None:
             print_sections(above, "the report")
-            lines = summary(result.document(), *tables) if tables else result.report().splitlines()
-            for line in lines:
-                output.print(escape(line))
+            if tables:
+                print_document(result.document(), *tables)
+            else:
+                output.print(escape(result.report().removesuffix("\n")))
 
         document, page = self.as_json(result), self.page(job, command, out, result.document)
         texts = {out / TEXT: result.report().encode()} if text and out is not None else {}

@@ -1,4 +1,4 @@
-"""Complete calibration of a measuring comparator from a grid plate (Fritz, NOAA TR NOS 57, 1973).
+"""Calibration of measuring comparators with a grid plate (Fritz, NOAA TR NOS 57, 1973).
 
 session = comparator.read(["measurements.csv"])[0]
 calibration = comparator.calibrate(session)

@@ -1,4 +1,4 @@
-"""Corrections applied to tables of measurements."""
+"""Application of a correction to tables of measurements."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from photogram.words import Phrase, phrase
 
 CORRECTED = ("corrected_x_um", "corrected_y_um", "sd_x_um", "sd_y_um", "in_range")
 READINGS = ("reading_x_um", "reading_y_um", "in_range")
-EDGE = 1.25  # limit of extrapolation with a remark, in half ranges from the middle
-ROUNDING = 1e-6  # of places on the edge, in half ranges
+EDGE = 1.25  # extrapolation limit for a warning, in half ranges from the centre
+ROUNDING = 1e-6  # of readings on the edge, in half ranges
 
 
 def correct_table(
     correction: Correction, table: Table, *, invert: bool = False, extrapolate: bool = False
 ) -> tuple[bytes, list[Message]]:
-    """Return a table with corrected coordinates and their standard deviations added, and remarks.
+    """Return a table with corrected coordinates and standard deviations, and warnings.
 
-    The standard deviations are those of the correction, without those of the readings. The column `in_range`
-    is yes inside the calibrated range. With `invert` readings are computed from corrected coordinates.
+    Standard deviations are propagated from the correction without the readings. The column `in_range` is yes
+    inside the calibrated range. With `invert`, readings are computed from corrected coordinates.
     """
     places = []
     for row in table.records.rows():
@@ -48,7 +48,7 @@ def correct_table(
         columns, readings = CORRECTED, xy_um
         with np.errstate(over="ignore", invalid="ignore"):
             variances = np.diagonal(correction.covariance_of(xy_um), axis1=1, axis2=2)
-            # Rounding may leave a variance of zero below it.
+            # Rounding may make a zero variance negative.
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
     if not np.isfinite(values).all():
         place = table.records.records[int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])]
@@ -72,7 +72,7 @@ def _of_coordinates(message: Phrase) -> Phrase:
 def _outside(
     correction: Correction, table: Table, readings: Floats, reach: Floats, *, extrapolate: bool
 ) -> list[Message]:
-    """Return a remark on places outside the calibrated range; refuse those far outside."""
+    """Return a warning on readings outside the calibrated range; reject distant ones."""
     if np.isnan(reach).all():
         return [Message(phrase("comparators.unknown-range"))]
     outside = int((reach > 1 + ROUNDING).sum())

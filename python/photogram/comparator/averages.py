@@ -1,4 +1,4 @@
-"""Average residuals (subroutine AVGRES), and the standard deviation of the grid by them (equation 64)."""
+"""Average residuals (subroutine AVGRES), and the grid standard deviation from them (equation 64)."""
 
 from __future__ import annotations
 
@@ -15,51 +15,51 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.reduction import GridErrors, Reduction
 from photogram.lazy_dataclasses import dataclass
 
-SAME_PLACE = 0.25  # Locations nearer to each other than this part of the spacing of the plate are one
+SAME_PLACE = 0.25  # Locations closer than this part of the plate spacing are equal
 
 
 @dataclass(frozen=True, eq=False)
 class LocationAverages:
-    """Average comparator residuals of the cases in which the plate lay at one place of the comparator."""
+    """Average comparator residuals of the cases with one plate position."""
 
     cases: tuple[int, ...]  # Numbers of these cases
-    # (m,) numbers of the comparator locations: those of the plate with corner 1 nearest the
-    # comparator's zero
+    # (m,) numbers of the comparator locations: the points of the plate with corner 1 nearest the zero of the
+    # comparator
     locations: Indices
-    xy_um: Floats  # (m, 2) where they are: mean comparator coordinates
-    residuals_um: Floats  # (m, 2) averages of the comparator residuals there
+    xy_um: Floats  # (m, 2) locations: mean comparator coordinates
+    residuals_um: Floats  # (m, 2) averages of the comparator residuals
 
 
 @dataclass(frozen=True, eq=False)
 class PlateAverages:
     """Average residuals of the cases of one plate, in the axes of its first case.
 
-    X and Y are exchanged against the axes of the plate where that case is left-handed (`left_handed`), as the
-    report prints them.
+    X and Y are exchanged relative to the plate if that case is left-handed (`left_handed`), as in the printed
+    report.
     """
 
     plate: int  # Number of the plate
     left_handed: bool  # Whether X and Y are exchanged
     cases: tuple[int, ...]  # Numbers of the cases
     points: Indices  # (l,) points of the plate that were measured
-    counts: Indices  # (l,) in how many cases
+    counts: Indices  # (l,) number of cases per point
     grid_um: Floats  # (l, 2) averages of the grid residuals by point: the corrections of the grid
     squares_um2: Floats  # (2,) sums of squares of all grid residuals in X and in Y
-    # Averages of the comparator residuals, for each place where the plate lay; none where the pattern
-    # of the plate does not meet itself when the plate is turned
+    # Averages of the comparator residuals for each plate position. Empty if the pattern of the rotated plate
+    # does not coincide with itself
     by_location: tuple[LocationAverages, ...]
-    # (l, 2) coordinates of the last case with corner 1 nearest the comparator's zero, else of the last
+    # (l, 2) coordinates of the last case with corner 1 nearest the zero of the comparator, else of the last
     # case; NaN where missing
     xy_um: Floats
 
     @property
     def location_um(self) -> Floats:
-        """(m, 2) averages by location, of all places."""
+        """(m, 2) averages of all locations."""
         return np.vstack([np.empty((0, 2)), *(place.residuals_um for place in self.by_location)])
 
     @property
     def corrections_um(self) -> Floats:
-        """(l, 2) corrections of the grid in the axes of the plate: to be added to the given coordinates."""
+        """(l, 2) additive corrections of the grid in the axes of the plate."""
         return exchanged(self.grid_um, self.left_handed)
 
 
@@ -95,7 +95,10 @@ def average_residuals(
 def _by_location(
     grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
 ) -> tuple[LocationAverages, ...]:
-    """Average by location; cases whose plate lay elsewhere have other locations, whatever their numbers."""
+    """Average by location.
+
+    Cases with other plate positions have separate locations, independent of their numbers.
+    """
     maps = {case.orientation.corner: locations(grid, case.orientation.corner) for case in cases}
     rows = []
     for case in cases:
@@ -130,7 +133,6 @@ def _by_location(
 
 
 def _means(rows: Indices, values: Floats, count: int) -> Floats:
-    """Average values by row; NaN where there are none."""
     counts = np.bincount(rows, minlength=count)
     sums = np.column_stack([np.bincount(rows, weights=values[:, axis], minlength=count) for axis in range(2)])
     means: Floats = np.divide(
@@ -141,11 +143,11 @@ def _means(rows: Indices, values: Floats, count: int) -> Floats:
 
 @dataclass(frozen=True)
 class ListedGridSigma:
-    """What the listing prints under the average residuals (figure 29), micrometres.
+    """Standard deviations below the average residuals in the listing, micrometres.
 
-    "STANDARD DEVIATION", roots of the sums of squares of both axes over 2 N - 1; "RANDOM ERRORS" in X and in
-    Y, NaN for one case; "UNBIASED GRID STANDARD ERROR", 0 where the difference of variances is negative, or
-    for one case.
+    "STANDARD DEVIATION" (figure 29): roots of the sums of squares of both axes over 2 N - 1. "RANDOM ERRORS"
+    in X and in Y: NaN for one case. "UNBIASED GRID STANDARD ERROR": 0 for one case, or if the difference of
+    variances is negative.
     """
 
     mean_comparator_um: float
@@ -155,7 +157,7 @@ class ListedGridSigma:
 
 
 def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
-    """Compute the figures of the listing."""
+    """Compute the standard deviations of the listing."""
     points, cases = len(averages.points), len(averages.cases)
     squares = (averages.grid_um**2).sum(axis=0)
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))
@@ -175,10 +177,10 @@ def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
 
 
 def text_grid_sigma(averages: PlateAverages) -> float:
-    """Compute the grid sigma by equation 64, for unequal numbers of cases a point, both axes pooled.
+    """Compute the grid sigma by equation 64, pooled over both axes.
 
-    Returns micrometres; 0 where the difference of variances is negative, NaN where every point was measured
-    once.
+    Numbers of cases per point may differ. Returns micrometres; 0 if the difference of variances is negative,
+    NaN if every point was measured once.
     """
     counts = averages.counts.astype(float)
     total, points = counts.sum(), len(counts)
@@ -192,13 +194,13 @@ def text_grid_sigma(averages: PlateAverages) -> float:
 
 
 class GridSigma:
-    """Grid and random standard deviations of a stage whose squares are unbiased.
+    """Grid and random standard deviations of a stage from unbiased sums of squares.
 
-    The adjustment is linear in the errors to first order: residuals are W times (grid errors turned into the
-    comparator + random errors). The expectations of two sums of squares, of the average residuals and of all
-    residuals, follow from W and are linear in the variances; they are equated with the sums. Rigid, linear
-    and polynomial parameters are thus taken into account for any placements and points. No matrix of the size
-    of the readings is formed: see :mod:`photogram.comparator.reduction`.
+    The adjustment is linear in the errors to first order: residuals are W times errors. These are grid
+    errors, rotated into the comparator, plus random errors. W gives the expectations of two sums of squares,
+    for average residuals and for all residuals. They are linear in the variances and are equated with the
+    sums. This accounts for rigid, linear and polynomial parameters with any placements and points. No matrix
+    of the size of the readings is formed: see :mod:`photogram.comparator.reduction`.
     """
 
     def __init__(
@@ -223,18 +225,18 @@ class GridSigma:
         sigmas = np.full(len(squares), math.nan)
         if np.linalg.cond(forms / forms.max(axis=1, keepdims=True)) <= 1e8:
             sigmas = np.sqrt(np.maximum(np.linalg.solve(forms, squares), 0.0))
-        # Of a grid coordinate of each plate, and of a measured coordinate, micrometres; NaN if the cases do
-        # not separate them, 0 if the estimate of a variance is negative
+        # Standard deviations of a grid coordinate of each plate and of a measured coordinate, micrometres.
+        # NaN if the cases do not separate them, 0 if the estimated variance is negative
         self.by_plate = dict(zip(plates, sigmas.tolist(), strict=False))
         self.random = float(sigmas[-1])
 
     def corrected(self, plate: int, known_um: Mapping[int, float | None]) -> float:
-        """Return the standard deviation of coordinates of a plate that average residuals have corrected.
+        """Return the standard deviation of grid coordinates after averaged corrections.
 
-        Averages contain a part of the errors of the comparator, and do not show errors that are equal in grid
-        and comparator: with few cases corrected coordinates may be worse than good given ones. `known_um` are
-        the standard deviations of given coordinates; None: those computed. The root mean square over the
-        coordinates, micrometres; NaN if it cannot be determined.
+        Averages contain a part of the comparator errors, and do not show equal errors of grid and comparator.
+        With few cases, corrected coordinates may be worse than accurate given ones. `known_um` contains the
+        standard deviations of given coordinates; None: use the computed ones. The result is the root mean
+        square over the coordinates, micrometres; NaN if it cannot be determined.
         """
         errors = self.errors[plate]
         squares = self.random**2 * self.reduction.averages_of_units(errors)

@@ -1,4 +1,4 @@
-"""The whole calibration: every stage of the report, and the joint adjustment behind it."""
+"""Complete calibration: every stage of the report, and the joint adjustment."""
 
 from __future__ import annotations
 
@@ -58,22 +58,22 @@ from photogram.show.page import Document
 from photogram.statistics.findings import Findings
 from photogram.words import phrase
 
-# Bytes that any calibration takes, and what each pointing adds, with listing and document
+# Bytes of any calibration, and bytes per pointing, with listing and document
 BASE, PER_POINTING = 64 << 20, 3500
 
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """One case through all stages.
+    """Results of one case in all stages.
 
     Attributes
     ----------
     placed
-        Means, grid, orientation.
+        Means, grid and orientation.
     closeouts
-        Returns to the first point and, where there were, to the second.
+        Returns to the first point and, if any, to the second.
     free, linear, polynomial
-        Single-case adjustments: rigid, linear, and polynomials (None where there are too few points).
+        Single-case adjustments: rigid, linear, and polynomials (None for too few points).
     """
 
     placed: PlacedCase
@@ -95,9 +95,9 @@ class Pointing:
     Attributes
     ----------
     operators
-        For each operator: each point over his cases, and everything.
+        For each operator: precision of each point over his cases, and in total.
     points, total
-        Each point over all cases, and everything.
+        Precision of each point over all cases, and in total.
     """
 
     operators: dict[int, tuple[dict[int, Precision], Precision]]
@@ -107,16 +107,16 @@ class Pointing:
 
 @dataclass(frozen=True, eq=False)
 class PlateResult:
-    """Average residuals of one plate and what follows for its grid, after one stage.
+    """Average residuals of one plate and the resulting grid precision after a stage.
 
     Attributes
     ----------
     averages
         Average residuals.
     listed
-        The figures of the listing.
+        Standard deviations of the listing.
     text_um, unbiased_um
-        Standard deviation of a grid coordinate by equation 64, and without bias.
+        Standard deviation of a grid coordinate by equation 64, and the unbiased one.
     """
 
     averages: PlateAverages
@@ -127,18 +127,18 @@ class PlateResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Documented, Judged, Brief):
-    """A calibrated comparator.
+    """Result of a comparator calibration.
 
     Attributes
     ----------
     session, options
-        What was measured, and how it was computed.
+        Measurements and options of the calibration.
     cases
-        The cases.
+        Results of the cases.
     pointing
         Pooled pointing precision.
     linear, nonlinear
-        Combined adjustments; `nonlinear` is None without polynomials.
+        Combined adjustments; without polynomials, `nonlinear` is None.
     averages
         For each stage (`case_linear`, `case_nonlinear`, `linear`, `nonlinear`) and each plate: average
         residuals and the grid.
@@ -147,18 +147,19 @@ class Calibration(Documented, Judged, Brief):
     polynomial_tests, case_test
         Significance of the polynomials; equality of the variances of the cases (None for one case).
     joint
-        The rigorous adjustment; None where it was not asked for.
+        Rigorous adjustment; None if it was not requested.
     joint_check
-        Largest difference between the report's weighted mean and a joint adjustment under its assumptions
-        (grid without error, equal weights, no polynomials), in standard deviations.
+        Largest difference between the weighted mean of the report and a joint adjustment with its
+        assumptions, in standard deviations. The assumptions are a fixed grid, equal weights, and no
+        polynomials.
     screening
-        Measured points that do not agree with the adjustment of the others, and the harm they do.
+        Measured points inconsistent with the adjustment of the others, and their effect.
     pointing_tests
         Tests of all pointings, case by case.
     far_pointings
-        Single pointings that do not agree with the others of their case.
+        Single pointings inconsistent with the others of their case.
     messages
-        Problems, the gravest first, and remarks.
+        Problems, most serious first, and warnings.
     """
 
     session: Session
@@ -180,18 +181,18 @@ class Calibration(Documented, Judged, Brief):
 
     @property
     def usable(self) -> bool:
-        """Whether the correction may be used: `verdict` says why not."""
+        """Whether the correction may be used; `verdict` gives the reasons."""
         return self.verdict.usable
 
     @property
     def correction(self) -> Correction:
-        """The correction by the method of the report: linear parameters and polynomials of all cases."""
+        """Correction by the method of the report: linear parameters and polynomials."""
         found = self.nonlinear.correction if self.nonlinear else self.linear.correction
         return replace(found, identity=self.identity)
 
     @property
     def identity(self) -> Identity:
-        """What was calibrated, when, and over which range of readings."""
+        """Comparator, date, and calibrated range of readings."""
         return Identity.of(self.session, [case.placed.means_um for case in self.cases])
 
     @property
@@ -210,11 +211,11 @@ class Calibration(Documented, Judged, Brief):
         return self.averages[self.last_stage]
 
     def sigma_grid_um(self, plate: int) -> float:
-        """Return the computed standard deviation of a grid coordinate, in the way that the options name."""
+        """Return the standard deviation of a grid coordinate that the options select."""
         return _chosen_sigma(self.plates[plate], self.options)
 
     def document(self) -> Document:
-        """Return the document of the calibration: analysis of variance, parameters, tests, pictures."""
+        """Return the document with analysis of variance, parameters, tests and plots."""
         from photogram.comparator.document import calibration_document
 
         return calibration_document(self)
@@ -235,7 +236,7 @@ def _chosen_sigma(result: PlateResult, options: Options) -> float:
 
 
 def needed_memory(pointings: int) -> int:
-    """Return the largest number of bytes that a calibration of so many pointings needs."""
+    """Return the maximum memory (bytes) of a calibration for a number of pointings."""
     return BASE + PER_POINTING * pointings
 
 
@@ -245,18 +246,18 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     Parameters
     ----------
     session
-        What was measured.
+        Measurements of the calibration.
     options
-        Choices; see :class:`Options`.
+        Options; see :class:`Options`.
 
     Raises
     ------
     InputError
-        Measurements that cannot be used; file, record number and record are named as far as they are known.
+        If measurements are invalid. The message names file, record number and record, if known.
     AdjustmentError
-        Too few points, or placements that do not determine the parameters.
+        If there are too few points, or if placements do not determine the parameters.
     OutOfMemoryError
-        There is less memory than so many pointings take.
+        If the pointings require more memory than available.
     """
     options = options or Options()
     session.check()
@@ -311,7 +312,6 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
 
 
 def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> CaseResult:
-    """Adjust one case alone."""
     closeouts, remarks = close_out(case)
     placed, more = place_case(case, grid, as_listed=options.order == "listing")
     messages += remarks + more
@@ -332,7 +332,10 @@ def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> 
 
 
 def _check_handedness(session: Session, cases: Sequence[CaseResult]) -> None:
-    """Refuse a handedness that no case has; if only some cases differ, the plate was turned over."""
+    """Reject a handedness that contradicts all cases.
+
+    If it contradicts only some cases, the plate was turned over.
+    """
     hands, specified = ("right", "left"), session.left_handed
     if specified is None or any(case.placed.orientation.left_handed == specified for case in cases):
         return
@@ -360,7 +363,6 @@ def _averages(
     linear: CombinedLinear,
     nonlinear: CombinedPolynomial | None,
 ) -> dict[str, dict[int, PlateResult]]:
-    """Average the residuals of every stage, plate by plate."""
     stages: dict[str, list[Residuals]] = {"case_linear": [case.linear.residuals for case in cases]}
     polynomials = [case.polynomial.residuals for case in cases if case.polynomial]
     if len(polynomials) == len(cases):
@@ -372,7 +374,7 @@ def _averages(
     placed = [case.placed for case in cases]
     result: dict[str, dict[int, PlateResult]] = {}
     for name, residuals in stages.items():
-        # Of single-case stages the report prints the averages only.
+        # The report prints only averages for single-case stages.
         sigmas = GridSigma(session.grids, placed, combined[name]).by_plate if name in combined else {}
         result[name] = {}
         for plate in dict.fromkeys(case.case.plate for case in placed):
@@ -387,7 +389,7 @@ def _averages(
 
 
 def _grid_sigma(session: Session, plates: Mapping[int, PlateResult], options: Options) -> float:
-    """Return the standard deviation of a grid coordinate for the analysis of variance, of all plates."""
+    """Return the grid standard deviation of all plates for the analysis of variance."""
     squares, points = 0.0, 0
     for plate, result in plates.items():
         sigma = session.grids[plate].sigma_um
@@ -426,7 +428,7 @@ def _joint(
 
 
 def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: CombinedLinear) -> float:
-    """Compare the weighted mean with a joint adjustment under the same assumptions."""
+    """Return the largest difference of weighted mean and joint adjustment, in sd."""
     fixed = Weights(dict.fromkeys(session.grids, 0.0), random_um=max(linear.sigma0_um, LEAST_UM))
     joint = adjust_jointly(placed, session.grids, linear, fixed, polynomial=False).correction
     differences = np.abs(parameters_of(linear.correction) - parameters_of(joint))[:3]
@@ -434,7 +436,7 @@ def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: Combine
 
 
 def corrected_grid(calibration: Calibration, plate: int) -> Grid:
-    """Return a plate with its final average residuals added; points without measurement are unchanged."""
+    """Return a plate corrected by its final average residuals at measured points."""
     session, averages = calibration.session, calibration.plates[plate].averages
     placed = [case.placed for case in calibration.cases]
     known = {number: grid.sigma_um for number, grid in session.grids.items()}
@@ -445,7 +447,7 @@ def corrected_grid(calibration: Calibration, plate: int) -> Grid:
 
 
 def adjusted_grid(calibration: Calibration, plate: int) -> Grid:
-    """Return a plate of the joint adjustment, which weighs given coordinates and measurements."""
+    """Return a plate of the joint adjustment of given coordinates and measurements."""
     assert calibration.joint is not None
     session, joint = calibration.session, calibration.joint.plates[plate]
     sigma = math.sqrt(float(np.diagonal(joint.covariance_um2, axis1=1, axis2=2).mean()))

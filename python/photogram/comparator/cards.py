@@ -1,7 +1,8 @@
-"""The punched cards of the program CALIB: header, data and special grid cards (NOAA TR NOS 57, section II).
+"""Punched cards of the program CALIB: header, data and special grid (NOAA TR NOS 57, section II).
 
-A deck is a header card, data cards in the order measured, one blank card. Decks follow each other; a header
-with comparator number 0 (a blank card) ends the job. Blanks in numbers count as zeros, as on the CDC 6600.
+A deck consists of a header card, data cards in the order measured, and one blank card. Decks follow each
+other. A header with comparator number 0 (a blank card) ends the job. Blanks in numbers count as zeros, as on
+the CDC 6600.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
 SPECIAL_GRID, MAX_COMPARATOR = 3, 15
-CASES = 20  # with operators in a header
+CASES = 20  # operators in a header
 MAX_LEG = 4
 
 
@@ -31,20 +32,20 @@ class Header:
 
     left_handed: bool  # Columns 1 and 2
     sorted_input: bool
-    # Column 3: the least count is not one micrometre (on comparator 11, unit digits are read apart)
+    # Column 3: the least count is not one micrometre (comparator 11 has separate unit digits)
     other_least_count: bool
-    skip_card: bool  # Column 4: one card is passed over before the data
-    plot_each_case: bool  # Column 5, as the text has it (the listing does the reverse)
+    skip_card: bool  # Column 4: skip one card before the data
+    plot_each_case: bool  # Column 5, as in the text (the listing reverses it)
     comparator: int  # Columns 6-7; 0 ends the job
     secondary: bool  # Column 8 holds R: the right stage of a stereocomparator
-    operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 for none
+    operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 if none
     date: str  # Columns 72-79
     master: int  # Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow
 
 
 @dataclass(frozen=True)
 class _Format:
-    """Columns (first, last) of a data card; x and y are Fw.d with `decimals` in metres."""
+    """Columns (first, last) of a data card; x and y are Fw.d in metres (`decimals`)."""
 
     plate_case: tuple[int, int]
     leg: int
@@ -55,14 +56,14 @@ class _Format:
     plate: tuple[int, int] | None = None
 
 
-# Formats 122 and, with the centre of the range (TRANS, F9.6) behind it, 143
+# Formats 122 and 143, with an additional centre of the range (TRANS, F9.6)
 STANDARD = _Format((3, 7), 8, (9, 10), (12, 21), (22, 31), 8)
 TRANS = (61, 69)
-TRANS_ON_CARDS = 15  # The comparator whose cards hold it
+TRANS_ON_CARDS = 15  # The comparator whose cards contain it
 SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)  # Format 146: right stage of the STK1
 PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))  # Format 123
 PSK_RIGHT = _Format((6, 7), 8, (9, 10), (40, 45), (50, 55), 6, plate=(2, 5))  # Format 124
-# Subroutine MICRON: unit digits read apart in columns 3 and 4
+# Subroutine MICRON: separate unit digits in columns 3 and 4
 LEAST_COUNT = _Format((5, 7), 8, (9, 10), (11, 19), (20, 29), 6)
 
 
@@ -116,7 +117,7 @@ def _header(record: Record) -> Header:
 
 
 def _format(header: Header) -> _Format:
-    """Return the format of the data cards (numbers of comparators: report, section II)."""
+    """Return the data card format (comparator numbers: report, section II)."""
     if header.secondary:
         return SECONDARY
     if header.comparator == 11 and header.other_least_count:
@@ -125,7 +126,7 @@ def _format(header: Header) -> _Format:
 
 
 def join_least_count(coarse: int, unit: int) -> int:
-    """Join a coarse reading with its unit digit that was read apart (subroutine MICRON)."""
+    """Join a coarse reading and its separate unit digit (subroutine MICRON)."""
     tens, digit = divmod(coarse, 10)
     if abs(digit - unit) <= 5:
         return 10 * tens + unit
@@ -144,15 +145,13 @@ def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
 
 
 def check_number(place: Failing, what: str, number: int, low: int, high: int) -> None:
-    """Refuse the number of a case or leg outside its range."""
+    """Reject a case or leg number outside its range."""
     if not low <= number <= high:
         message = phrase("error.range", value=number, low=low, high=high)
         raise place.error(phrase("error.at", what=what, message=message))
 
 
 class _Deck:
-    """The cards of one calibration, read from its header on."""
-
     def __init__(self, cards: Iterator[Record], header: Header, first: Record, grids: Iterable[Grid]) -> None:
         self.header = header
         self.first = first
@@ -166,7 +165,6 @@ class _Deck:
             self.messages.append(first.message(phrase("comparators.special-grid", plate=special.number)))
 
     def _special_grid(self) -> Grid:
-        """Read the cards of a special grid; a mark in column 80 is on the last one."""
         points, xy = [], []
         for card in self.cards:
             points.append(_integer(card, *STANDARD.point))
@@ -231,7 +229,7 @@ class _Deck:
         )
 
     def _plate(self, card: Record, digits: int) -> int:
-        """Return the number of the plate with the last digits of a card; blank: the only plate."""
+        """Return the plate number that ends with given digits; blank: the only plate."""
         if digits == 0 and len(self.grids) == 1:
             return next(iter(self.grids))
         plates = [number for number in self.grids if digits in (number, number % 100)]
@@ -247,16 +245,16 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
     Parameters
     ----------
     path
-        The file: 80 columns a record.
+        File with 80 columns per record.
     grids
-        Plates, instead of the one that a header names.
+        Plates that replace the one in the header.
     left_handed
-        Whether the comparator is left-handed against the plate, instead of what the headers say.
+        Whether the comparator is left-handed relative to the plate. It overrides the headers.
 
     Raises
     ------
     InputError
-        The file cannot be read, or a card cannot be understood; the message names the record.
+        If the file or a card cannot be read. The message names the record.
     """
     source = Source.read(path)
     cards = (source.record(number) for number in range(1, len(source.lines) + 1))
@@ -273,12 +271,12 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
 
 
 def to_cards(session: Session) -> bytes:
-    """Return a session as a deck in the standard format 122, with the blank card behind it.
+    """Return a session as a deck in the standard format 122, ending with a blank card.
 
     Raises
     ------
     InputError
-        The session has another plate than one of the three master grids, or does not fit the columns.
+        If the session does not use exactly one of the three master grids, or exceeds the columns.
     """
     number = next(iter(session.grids))
     if len(session.grids) != 1 or number not in BUILT_IN:

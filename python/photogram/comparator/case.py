@@ -1,4 +1,4 @@
-"""One case before its adjustment: orientation of its plate, intersections of legs, means, close-out."""
+"""Preparation of one case: plate orientation, leg intersections, means, close-out."""
 
 from __future__ import annotations
 
@@ -26,37 +26,36 @@ from photogram.messages import Message
 from photogram.network.neighbours import mutually_nearest
 from photogram.words import Phrase, phrase
 
-# Quarter turns that bring a corner of the plate to the place of its first corner (least X and Y), with the
-# listing's KROTC.
+# Quarter rotations that move a corner of the plate to its first corner (least X and Y), with KROTC of the
+# listing.
 CORNERS = {1: (-1, -1), 4: (1, -1), 3: (1, 1), 2: (-1, 1)}
 TURNS = {1: 0, 4: -1, 3: 2, 2: 1}
-MATCH = 0.05  # A turned point must meet another one within this part of the spacing
-_SQUARED = 1e150  # Micrometres beyond which squares leave the range of double precision
+MATCH = 0.05  # A rotated point must match another one within this part of the spacing
+_SQUARED = 1e150  # Micrometres above which squares exceed double precision
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """How a plate lies on the comparator."""
+    """Orientation of a plate on the comparator."""
 
-    # 1 to 4, the listing's KROTC: the corner nearest the comparator's zero is that with least X and Y
-    # (1), least X and greatest Y (2), greatest X and Y (3), greatest X and least Y (4)
+    # KROTC of the listing, the plate corner nearest the comparator zero. 1: least X, least Y. 2: least X,
+    # greatest Y. 3: greatest X, greatest Y. 4: greatest X, least Y
     corner: int
     nearest_point: int  # The point of the plate in that corner
-    left_handed: bool  # Whether the axes of the comparator are left-handed against those of the plate
+    left_handed: bool  # Whether the axes of the comparator are left-handed relative to the plate
 
 
 def exchanged(xy: Floats, left_handed: bool) -> Floats:
-    """Exchange X and Y where the comparator is left-handed (subroutine FLIPM)."""
+    """Exchange X and Y if the comparator is left-handed (subroutine FLIPM)."""
     return xy[..., ::-1] if left_handed else xy
 
 
 def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientation:
-    """Detect from the measurements how a plate lies.
+    """Detect the orientation of a plate from the measurements.
 
-    The sign of the determinant of the affine transformation grid -> comparator is the handedness. The program
-    compares sums of distances of two points each from the comparator's zero (8 and 12 for point 1, and so
-    on); here the places of these points follow from the transformation, so that they need not be measured,
-    nor be on the plate.
+    The sign of the determinant of the affine transformation grid -> comparator gives the handedness. The
+    program compares distances of pairs of points from the comparator zero (8 and 12 for point 1, and so on).
+    Here, the transformation gives these positions, so the points may be unmeasured or missing on the plate.
     """
     plate = grid.xy_um[grid.rows_of(points)]
     largest = np.abs([plate, xy_um]).max(initial=0.0)
@@ -88,18 +87,17 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
 
 
 def locations(grid: Grid, corner: int) -> Indices | None:
-    """Return the number of the comparator location at which each point of the plate lies (subroutine COMPVS).
+    """Return the comparator location number of each plate point (subroutine COMPVS).
 
-    Locations are numbered like the points of a plate that lies with corner 1 nearest the comparator's zero.
-
-    Returns (l,) numbers, row by row of the plate; None where the turned pattern does not meet itself.
+    Locations are numbered like the points of a plate with corner 1 nearest the comparator zero. Returns (l,)
+    numbers by row of the plate; None if the rotated pattern does not coincide with itself.
     """
     low, high = grid.xy_um.min(axis=0), grid.xy_um.max(axis=0)
     centred = grid.xy_um - (low + high) / 2
     turned = centred
     for _ in range(TURNS[corner] % 4):
         turned = np.column_stack([-turned[:, 1], turned[:, 0]])
-    # Typical of neighbours; the least distance may be that of two points outside the pattern.
+    # Typical spacing; the least distance may belong to two points outside the pattern.
     spacing = math.sqrt(float((high - low).prod()) / len(centred))
     if spacing == 0:
         return None
@@ -111,12 +109,12 @@ def locations(grid: Grid, corner: int) -> Indices | None:
 
 
 LEGS = (1, 2, 3, 4)
-# Sine of the angle below which lines do not intersect usefully; those of a plate cross at right angles
+# Sine of the angle below which line intersections are rejected; plate lines are perpendicular
 PARALLEL = 1e-3
 
 
 def intersect_legs(legs_um: Floats) -> Floats:
-    """Return the intersection of the lines through legs 1 and 3, and 2 and 4; (4, 2) mean coordinates."""
+    """Return the intersection of the lines through legs 1 and 3, and 2 and 4."""
     first, second, third, fourth = legs_um
     along, across = third - first, fourth - second
     # Solve first + s along = second + t across for s (Cramer).
@@ -129,9 +127,10 @@ def intersect_legs(legs_um: Floats) -> Floats:
 
 
 def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
-    """Replace the leg readings of each point by one intersection; return the points as well, and remarks.
+    """Replace the leg readings of each point by one intersection.
 
-    The readings of each leg are averaged first. A point with fewer than four legs is left out, with a remark.
+    Readings of each leg are averaged first. Points with fewer than four legs are omitted with a warning. The
+    results are the case, the intersected points and the warnings.
     """
     if not case.legs.any():
         return case, frozenset(), []
@@ -168,25 +167,25 @@ def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
     return without, frozenset(reduced), messages
 
 
-SCALES = (0.5, 2.0)  # outside measurements and grid have different units
+SCALES = (0.5, 2.0)  # outside it, units of measurements and grid differ
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCase:
-    """A case with its means."""
+    """Case with its means."""
 
     case: Case
-    readings: list[PointReadings]  # in the order of the grouping
-    points: Indices  # (n,) their numbers, and how often each was read
+    readings: list[PointReadings]  # in grouping order
+    points: Indices  # (n,) point numbers and numbers of readings
     counts: Indices
     means_um: Floats  # (n, 2) mean comparator coordinates
     grid_um: Floats  # (n, 2) grid coordinates, X and Y exchanged if the comparator is left-handed
     orientation: Orientation
-    from_legs: frozenset[int]  # points that were measured on their legs
+    from_legs: frozenset[int]  # points measured on their legs
 
     @property
     def number(self) -> int:
-        """Number of the case."""
+        """Case number."""
         return self.case.number
 
     @property
@@ -196,7 +195,7 @@ class PlacedCase:
 
 
 def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[PlacedCase, list[Message]]:
-    """Reduce legs, group readings (as the listing if `as_listed`), form means, and detect the orientation."""
+    """Reduce legs, group readings, form means, and detect the orientation of a case."""
     name = phrase("comparators.case", case=case.number)
     reduced, from_legs, messages = reduce_legs(case)
     if (count := len(np.unique(reduced.points))) < 3:
@@ -230,7 +229,7 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
 
 
 def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
-    """Remark on points whose readings do not vary at all, as if they had been copied."""
+    """Warn about points with several identical readings, possibly copies."""
     points = [reading.point for reading in readings if reading.identical]
     if not points:
         return []
@@ -249,14 +248,14 @@ def _refuse_equal_places(case: Case, points: Indices, means: Floats) -> None:
         raise place.error(phrase("comparators.equal-points", **fields))
 
 
-SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: close on the second point too, measure the case again
-FEW_READINGS = 9  # a case with so few readings must be closed
+SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: check the second point, measure the case again
+FEW_READINGS = 9  # largest number of readings of a case that requires a close-out
 ENOUGH = 3  # pointings of a close-out
 
 
 @dataclass(frozen=True, eq=False)
 class Closeout:
-    """Returns to a point: how many pointings each visit has, and their means (visits, 2)."""
+    """Returns to a point: numbers of pointings per visit, and means (visits, 2)."""
 
     point: int
     counts: tuple[int, ...]
@@ -264,12 +263,12 @@ class Closeout:
 
     @property
     def sequential_shifts_um(self) -> Floats:
-        """(visits - 1, 2) mean of each return less that of the visit before."""
+        """(visits - 1, 2) mean of each return minus the previous mean."""
         return np.diff(self.means_um, axis=0)
 
     @property
     def total_shift_um(self) -> Floats | None:
-        """(2,) mean of the last visit less that of the first; None where there was no return."""
+        """(2,) mean of the last visit minus the first one; None without a return."""
         if len(self.counts) < 2:
             return None
         shift: Floats = self.means_um[-1] - self.means_um[0]
@@ -277,7 +276,7 @@ class Closeout:
 
     @property
     def verdict(self) -> str:
-        """`none` (no return), `good`, `suspect` (more than 2 um) or `remeasure` (4 um or more)."""
+        """`none` (no return), `good`, `suspect` (over 2 um) or `remeasure` (4 um or more)."""
         if self.total_shift_um is None:
             return "none"
         largest = float(np.abs(self.sequential_shifts_um).max(initial=np.abs(self.total_shift_um).max()))
@@ -287,7 +286,7 @@ class Closeout:
 
 
 def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
-    """Check the returns to the first point of a case and, if it was visited again, to the second."""
+    """Check the returns to the first point of a case and, if any, to the second."""
     first, *others = dict.fromkeys(case.points.tolist())
     closeouts = [_visits(case, first)]
     if others and len((second := _visits(case, others[0])).counts) > 1:

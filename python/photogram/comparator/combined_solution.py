@@ -1,4 +1,4 @@
-"""All cases together: one set of comparator parameters (NOAA TR NOS 57, equations 56 to 63)."""
+"""Combination of all cases: one set of parameters (NOAA TR NOS 57, equations 56 to 63)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 @dataclass(frozen=True, eq=False)
 class CombinedLinear:
-    """The linear parameters of all cases."""
+    """Combined linear parameters of all cases."""
 
     correction: Correction  # Scales and lack of orthogonality
     sigma0_um: float  # Standard error of unit weight and its degrees of freedom (equation 57)
@@ -28,25 +28,25 @@ class CombinedLinear:
 
 @dataclass(frozen=True, eq=False)
 class SinglePolynomial:
-    """The polynomials of one case, and what they leave of the residuals of its linear adjustment."""
+    """Polynomials of one case, and the residuals after its linear adjustment."""
 
     polynomial: Polynomial
     residuals: Residuals
 
     @property
     def covariance(self) -> Floats:
-        """(18, 18) of the coefficients in metre units (m^2 times powers of 1/m), x first (equation 61)."""
+        """(18, 18) coefficient covariance in metre units, x first (equation 61)."""
         return self.residuals.sigma0_um**2 * self.polynomial.cofactors
 
 
 @dataclass(frozen=True, eq=False)
 class CombinedPolynomial:
-    """The polynomials of all cases."""
+    """Combined polynomials of all cases."""
 
     correction: Correction  # Linear parameters and polynomials
     polynomial: Polynomial
     sigma_um: tuple[float, float]  # (2,) standard deviations of the residuals in x and in y (equation 62)
-    degrees_of_freedom: int  # Of each of them
+    degrees_of_freedom: int  # Degrees of freedom of each
     cases: tuple[RigidFit, ...]  # Rigid fit of each case after the whole correction
 
     @property
@@ -56,7 +56,7 @@ class CombinedPolynomial:
 
     @property
     def covariance(self) -> Floats:
-        """(18, 18) of the coefficients in metre units, x first (equation 61)."""
+        """(18, 18) coefficient covariance in metre units, x first (equation 61)."""
         return self.sigma0_um**2 * self.polynomial.cofactors
 
 
@@ -65,14 +65,14 @@ def combine_linear(
 ) -> CombinedLinear:
     """Form the generalised weighted mean of the linear parameters of the cases.
 
-    With P_j the inverse cofactors of case j: mean = (sum P)^-1 sum P x, and its sum of squares adds to those
+    With the inverse cofactors P_j of case j: mean = (sum P)^-1 sum P x. Its sum of squares adds to the sums
     of the cases.
     """
     linear = [fit.parameters for fit in fits]
     values = np.array([[each.scale_x, each.scale_y, each.nonorthogonality_rad] for each in linear])
     weights = [np.linalg.inv(fit.cofactors[:3, :3]) for fit in fits]
     total = np.sum(weights, axis=0)
-    # Deviations from the first case: scales near one would lose digits.
+    # Deviations from the first case avoid cancellation for scales near one.
     offsets = values - values[0]
     mean = np.linalg.solve(total, np.sum([w @ x for w, x in zip(weights, offsets, strict=True)], axis=0))
     squares = sum(sum(fit.residuals.squares_um2[:2]) for fit in fits)
@@ -92,7 +92,6 @@ def combine_linear(
 def _refit(
     cases: Sequence[PlacedCase], correction: Correction, lost: float, *, as_listed: bool
 ) -> tuple[RigidFit, ...]:
-    """Fit each corrected case rigidly onto its grid."""
     return tuple(
         fit_rigid(case.points, correction.apply(case.means_um), case.grid_um, lost=lost, as_listed=as_listed)
         for case in cases
@@ -100,9 +99,9 @@ def _refit(
 
 
 def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = False) -> SinglePolynomial:
-    """Fit polynomials to the residuals of the linear adjustment of one case (equations 59 to 61).
+    """Fit polynomials to the linear residuals of one case (equations 59 to 61).
 
-    `as_listed` omits the change of sign of the residuals in the grid system.
+    `as_listed` omits the sign change of the grid residuals.
     """
     parameters = fit.parameters
     linear = case.means_um @ parameters.linear_matrix.T
@@ -119,7 +118,7 @@ def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = Fal
 def combine_polynomial(
     cases: Sequence[PlacedCase], linear: CombinedLinear, *, as_listed: bool = False
 ) -> CombinedPolynomial:
-    """Fit one pair of polynomials to the residuals that the combined linear parameters leave in all cases."""
+    """Fit polynomials to the residuals of the combined linear parameters of all cases."""
     places = np.vstack([fit.residuals.xy_um for fit in linear.cases])
     residuals = np.vstack([fit.residuals.comparator_um for fit in linear.cases])
     polynomial = fit_polynomial(places, residuals)

@@ -1,4 +1,4 @@
-"""The correction of any measurements on a calibrated comparator (NOAA TR NOS 57, equations 34 and 63)."""
+"""Correction of measurements on a calibrated comparator (NOAA TR NOS 57, equations 34 and 63)."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from photogram.words import phrase
 
 @dataclass(frozen=True)
 class Identity:
-    """Whose a correction is.
+    """Identification of a correction.
 
     Attributes
     ----------
     comparator, secondary
-        Number of the comparator; whether it is the right stage of a stereocomparator.
+        Comparator number; whether it is the right stage of a stereocomparator.
     date
-        Of the measurement, as text.
+        Date of the measurement, as text.
     plates
         Numbers of the plates.
     cases
-        How many cases there were.
+        Number of cases.
     temperature_c
-        Of the plates, degrees Celsius; None where it is not known.
+        Temperature of the plates, degrees Celsius; None if unknown.
     low_um, high_um
-        Least and largest mean readings, x and y: within them the correction was calibrated.
+        Least and largest mean readings, x and y, which define the calibrated range.
     """
 
     comparator: int
@@ -53,7 +53,7 @@ class Identity:
 
     @classmethod
     def of(cls, session: Session, means_um: Sequence[Floats]) -> Identity:
-        """Return that of a session and the mean readings (n, 2) of its cases."""
+        """Return the identity of a session with mean readings (n, 2) of its cases."""
         readings = np.vstack(means_um)
         (low_x, low_y), (high_x, high_y) = readings.min(axis=0).tolist(), readings.max(axis=0).tolist()
         return cls(
@@ -69,23 +69,23 @@ class Identity:
 
     @property
     def frame(self) -> Frame:
-        """The calibrated range: arguments of readings from -1 to 1 lie in it."""
+        """Frame of the calibrated range, which has arguments of readings from -1 to 1."""
         return Frame.of(np.array([self.low_um, self.high_um]))
 
     @property
     def range_text(self) -> str:
-        """The calibrated range, as a reader is told."""
+        """Calibrated range as text."""
         (low_x, low_y), (high_x, high_y) = self.low_um, self.high_um
         return f"x {low_x:.0f} to {high_x:.0f}, y {low_y:.0f} to {high_y:.0f} um"
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Identity:
-        """Return what the fields of a JSON document describe.
+        """Return the identity from the members of a JSON document.
 
         Raises
         ------
         KeyError, TypeError, ValueError
-            It is no such document.
+            If the document is invalid.
         """
         numbers = np.array([document["low_um"], document["high_um"]], dtype=float)
         if numbers.shape != (2, 2) or not (numbers[0] < numbers[1]).all():
@@ -105,30 +105,30 @@ class Identity:
 
 
 PARAMETERS = 21  # scale x, scale y, lack of orthogonality, nine coefficients of x, nine of y
-# Their names in models of cameras; scales less 1, coefficients in mm
+# Parameter names in camera models; scales less 1, coefficients in mm
 MODEL = ("mx", "my", "lean", *(f"{axis}{term}" for axis in "xy" for term in "ABCDEFGHJ"))
-MM = 1000.0  # in micrometres
+MM = 1000.0  # micrometres
 MAX_STEPS = 20  # of Newton's iteration
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Corrects readings of a comparator: first linearly, then by the polynomials.
+    """Correction of comparator readings: a linear step, then polynomials.
 
-    x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34); corrected = x' + P_x(x', y'), y' +
-    P_y(x', y') (equation 63).
+    x' = Sx x + Sy sin(alpha) y, y' = Sy cos(alpha) y (equation 34). The corrected coordinates are x' +
+    P_x(x', y'), y' + P_y(x', y') (equation 63).
 
     Attributes
     ----------
     scale_x, scale_y, nonorthogonality_rad
         Sx, Sy, alpha.
     polynomial
-        P_x and P_y; None without.
+        P_x and P_y; None for a linear correction.
     covariance
         (21, 21) of Sx, Sy, alpha (rad) and the coefficients (micrometres, in the frame of the polynomial), x
         then y.
     identity
-        What was calibrated, when, and over which range; None where that is not known.
+        Comparator, date and range of the calibration; None if unknown.
     """
 
     scale_x: float
@@ -171,16 +171,16 @@ class Correction:
         Parameters
         ----------
         xy_um
-            (n, 2) readings in micrometres from the zero of the comparator, to which the polynomials are tied.
+            (n, 2) readings in micrometres from the zero of the comparator, the origin of the polynomials.
         """
         corrected = self.linear(xy_um)
         return corrected if self.polynomial is None else corrected + self.polynomial.evaluate(corrected)
 
     def reach(self, xy_um: Floats) -> Floats:
-        """Return how far out readings (n, 2) lie: up to 1 within the calibrated range, 2 as far again.
+        """Return the relative distances of readings (n, 2) from the centre of the range.
 
-        (n,) the larger of both axes, from the middle of the range in half ranges. Beyond 1 the polynomials
-        extrapolate. NaN where the range is not known.
+        (n,) the larger value of both axes, in half ranges: 1 at the edge of the calibrated range. Beyond 1
+        the polynomials extrapolate. NaN if the range is unknown.
         """
         if self.identity is not None:
             arguments = self.identity.frame.arguments(xy_um)
@@ -191,16 +191,16 @@ class Correction:
         return np.asarray(np.abs(arguments).max(axis=1))
 
     def invert(self, corrected_um: Floats) -> Floats:
-        """Return the readings (n, 2) that `apply` corrects to the given coordinates (n, 2).
+        """Return the readings (n, 2) that `apply` maps to corrected coordinates (n, 2).
 
         Raises
         ------
         InputError
-            Newton's iteration does not come to rest: the place is far outside the calibrated range.
+            If Newton's iteration does not converge because a position is far outside the calibrated range.
         """
         linear = np.array(corrected_um, dtype=float)
         try:
-            # What overflows on the way does not come to rest, or is not finite in the end.
+            # Overflow causes a failure of convergence, or a final value that is not finite.
             with np.errstate(over="ignore", invalid="ignore"):
                 if self.polynomial is not None:
                     linear = self._before_polynomial(self.polynomial, linear)
@@ -217,7 +217,7 @@ class Correction:
             jacobian = np.eye(2) + polynomial.jacobian(place)
             step = np.linalg.solve(jacobian, excess[..., np.newaxis])[..., 0]
             place = place - step
-            # Rounding of coordinates of a metre is 1e-10 um.
+            # Coordinates of a metre have rounding errors of 1e-10 um.
             if np.abs(step).max(initial=0.0) < 1e-8:
                 return place
         raise InputError(phrase("comparators.no-inverse"))
@@ -225,15 +225,15 @@ class Correction:
     def covariance_of(self, xy_um: Floats, measured_um2: Floats | None = None) -> Floats:
         """Return the covariance of corrected readings (n, 2, 2) in um^2.
 
-        It holds for the position relative to the centre of the frame of the polynomials: rotation and shift
-        of corrected coordinates are free.
+        It refers to the position relative to the centre of the polynomial frame. Rotation and shift of
+        corrected coordinates are free.
 
         Parameters
         ----------
         xy_um
             (n, 2) readings.
         measured_um2
-            (2, 2) or (n, 2, 2) covariance of the readings themselves; None for that of the correction alone.
+            (2, 2) or (n, 2, 2) covariance of the readings; None: only the correction contributes.
         """
         by_parameters, by_reading = partials_of(self, np.asarray(xy_um, dtype=float))
         covariance = by_parameters @ self.covariance @ by_parameters.transpose(0, 2, 1)
@@ -242,24 +242,25 @@ class Correction:
         return np.asarray(covariance)
 
     def as_camera(self, camera: Camera, *, weighted: bool = True) -> Camera:
-        """Return a camera whose plates are measured on this comparator and not corrected: `on_comparator`.
+        """Return a camera with uncorrected readings on this comparator: `on_comparator`.
 
         Its image coordinates are readings in mm from the zero of the comparator. The parameters of the
-        correction are observations of a block with their full covariance, and independent of those of the
-        camera. `xp`, `yp` count, corrected, from the reading `x0`, `y0`: the centre of the polynomials.
+        correction are observations of a block with their full covariance, independent of the camera
+        parameters. `xp`, `yp` are corrected coordinates relative to the reading `x0`, `y0`, the centre of the
+        polynomials.
 
         Parameters
         ----------
         camera
-            A camera of the model `brown` in mm, unbalanced (r0 = 0) and without affinity and shear, which the
-            comparator has itself.
+            A camera of the model `brown` in mm, unbalanced (r0 = 0) and without affinity and shear, which
+            belong to the comparator.
         weighted
-            Whether the correction is observed; otherwise it is known.
+            Whether the correction is weighted by its covariance; otherwise it is fixed.
 
         Raises
         ------
         InputError
-            Another camera.
+            If the camera has another model, unit or an affine parameter.
         """
         deviations = _deviations(camera)
         frame = self.polynomial.frame if self.polynomial else Frame.metres()
@@ -287,7 +288,7 @@ class Correction:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the correction as the members of a JSON document, units in their names."""
+        """Return the members of the JSON document, with units in their names."""
         document: dict[str, Any] = {
             "scale_x": self.scale_x,
             "scale_y": self.scale_y,
@@ -307,12 +308,12 @@ class Correction:
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Correction:
-        """Return the correction that :meth:`document` described.
+        """Return the correction from a document of :meth:`document`.
 
         Raises
         ------
         KeyError, TypeError, ValueError
-            It is no such document.
+            If the document is invalid.
         """
         polynomial = None
         if (members := document["polynomial"]) is not None:
@@ -335,12 +336,12 @@ class Correction:
 
     @classmethod
     def read(cls, path: Path) -> Correction:
-        """Read a correction, or the one in the document of a calibration.
+        """Read a correction file, or the correction in a calibration document.
 
         Raises
         ------
         InputError
-            The file cannot be read or holds none.
+            If the file cannot be read or does not contain a correction.
         """
         with json.holding("correction of a comparator", path):
             document = orjson.loads(read_bytes(path))
@@ -350,7 +351,7 @@ class Correction:
 
 
 def parameters_of(correction: Correction) -> Floats:
-    """Return (21,) the parameters in the order of the covariance."""
+    """Return the parameters (21,) in the order of the covariance."""
     polynomial = correction.polynomial
     coefficients = np.zeros(18) if polynomial is None else polynomial.scaled_um.ravel()
     linear = correction.scale_x, correction.scale_y, correction.nonorthogonality_rad
@@ -358,11 +359,11 @@ def parameters_of(correction: Correction) -> Floats:
 
 
 def partials_of(correction: Correction, xy_um: Floats) -> tuple[Floats, Floats]:
-    """Return partials of corrected readings by parameters (n, 2, 21) and by readings (n, 2, 2)."""
+    """Return partials by parameters (n, 2, 21) and by readings (n, 2, 2)."""
     polynomial, linear = correction.polynomial, correction.linear(xy_um)
     frame = polynomial.frame if polynomial else Frame.metres()
     inner = np.eye(2) + (polynomial.jacobian(linear) if polynomial else np.zeros((len(linear), 2, 2)))
-    # Counted from the reading at the centre of the frame: a shift is not part of the correction.
+    # Relative to the reading at the centre of the frame: a shift is not part of the correction.
     x, y = (xy_um - np.linalg.solve(correction.matrix, frame.centre_um)).T
     lean, scale_y = correction.nonorthogonality_rad, correction.scale_y
     s, c = math.sin(lean), math.cos(lean)
@@ -375,7 +376,7 @@ def partials_of(correction: Correction, xy_um: Floats) -> tuple[Floats, Floats]:
 
 
 def _deviations(camera: Camera) -> dict[str, float]:
-    """Return the standard deviations of the parameters of a camera that has a comparator of its own."""
+    """Return standard deviations of the parameters of a camera without affinity."""
     deviations = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     affine = ("b1", "b2", "r0")
     if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in affine):
@@ -386,7 +387,6 @@ def _deviations(camera: Camera) -> dict[str, float]:
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Floats:
-    """Return numbers of a document."""
     array = np.array(value)
     if array.shape != shape or array.dtype.kind not in "iuf":
         size = " x ".join(map(str, shape)) or "1"

@@ -1,4 +1,4 @@
-"""Plain tables: comma-separated values with `# key = value` lines above the names of the columns."""
+"""Plain tables: comma-separated values below lines `# key = value`."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from photogram.io.rows import Row
 from photogram.messages import unknown_name
 from photogram.words import phrase
 
-MICROMETRES = {"um": 1.0, "mm": 1000.0}  # by the ending of the name of a column
-NOTE = "note"  # the key of lines without effect
+MICROMETRES = {"um": 1.0, "mm": 1000.0}  # by the suffix of a column name
+NOTE = "note"  # the key of comments
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A line above the table."""
+    """Setting line above the table."""
 
     key: str
     text: str
     place: Place
 
     def integer(self) -> int:
-        """Return a number that is not negative."""
+        """Return a non-negative integer."""
         return self.place.whole(self.text, self.key)
 
     def number(self) -> float:
@@ -33,7 +33,7 @@ class Setting:
         return self.place.number(self.text, self.key)
 
     def switch(self) -> bool:
-        """Return yes or no."""
+        """Return a Boolean given as yes or no."""
         if self.text.lower() not in ("yes", "no"):
             choice = phrase("error.choice", value=self.text, names=["yes", "no"])
             raise self.place.error(phrase("error.at", what=self.key, message=choice))
@@ -42,14 +42,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class Table:
-    """A table with coordinates."""
+    """Table with coordinates."""
 
     records: rows.Table
     settings: Mapping[str, Setting]
     unit: str  # um or mm
 
     def text(self, key: str) -> str:
-        """Return the text of a setting; empty if the table does not have it."""
+        """Return the text of a setting; empty if it is missing."""
         return self.settings[key].text if key in self.settings else ""
 
     def coordinates_um(self, row: Row) -> tuple[float, float] | None:
@@ -64,7 +64,10 @@ class Table:
 
 
 def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -> Table:
-    """Read a table with coordinates and further columns; `keys` are its possible settings, None for any."""
+    """Read a table with coordinates and other columns.
+
+    `keys` are the possible settings, None for any.
+    """
     records = rows.Table.read(path, comment="#", spelling=str.lower)
     records.require(*columns)
     settings: dict[str, Setting] = {}

@@ -1,4 +1,4 @@
-"""The document of a calibration (JSON members: `docs/comparator.md`), and the tests of its verdict."""
+"""Document of a calibration (JSON members: `docs/comparator.md`), and tests of its verdict."""
 
 from __future__ import annotations
 
@@ -106,7 +106,6 @@ def _highlights(calibration: Calibration) -> list[Fact]:
 
 
 def _joint(joint: JointFit) -> list[Part]:
-    """Return facts and linear parameters of the joint adjustment."""
     freedom = joint.degrees_of_freedom
     facts = [
         Fact(
@@ -124,7 +123,6 @@ def _joint(joint: JointFit) -> list[Part]:
 
 
 def _pictures(calibration: Calibration) -> list[Part]:
-    """Return the pictures of the calibration as layers."""
     layers = [
         Drawing(f"picture-{name}", name.replace("-", " ").capitalize(), "", sketch)
         for name, sketch in plotters(calibration).items()
@@ -133,7 +131,6 @@ def _pictures(calibration: Calibration) -> list[Part]:
 
 
 def _members(calibration: Calibration) -> dict[str, Any]:
-    """Return the members of the JSON document that are no tables."""
     own, usable, joint = calibration.linear, calibration.usable, calibration.joint
     plates = [_plate(calibration, result) for result in calibration.plates.values()]
     lines = {
@@ -191,7 +188,7 @@ def _members(calibration: Calibration) -> dict[str, Any]:
 
 
 def _pointing(calibration: Calibration) -> dict[str, Any]:
-    """Return the precision by point (of each case, and over all cases), by case, by operator, and in all."""
+    """Return the precision by point, by case, by operator, and in total."""
     pointing, placed = calibration.pointing, [case.placed for case in calibration.cases]
     return {
         "points": [
@@ -278,11 +275,11 @@ def _joint_members(joint: JointFit, *, usable: bool) -> dict[str, Any]:
     }
 
 
-FAR = 3.0  # a grid with larger differences, in standard deviations, is another grid
+FAR = 3.0  # larger differences indicate another grid, in standard deviations
 
 
 def comparator_findings(calibration: Calibration) -> Findings:
-    """Return the tests of a calibration: readings have no standard deviation of their own, t decides."""
+    """Return the tests of a calibration. They are t tests without prior deviations."""
     screening = calibration.screening
     places = [
         (case.number, point, axis)
@@ -325,7 +322,6 @@ def comparator_findings(calibration: Calibration) -> Findings:
 
 
 def _grids(joint: JointFit) -> list[Systematic]:
-    """Return the tests of the corrections of the plates against their standard deviations."""
     return [
         Systematic(
             kind=phrase("test.plate", plate=str(plate)),

@@ -1,7 +1,7 @@
 """Fits of one case: rigid (FIDFIT2) and linear, with their residuals.
 
-A general linear transformation is taken apart into two scales, lack of orthogonality and rotation exactly,
-not to first order (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
+A general linear transformation is decomposed into two scales, lack of orthogonality and rotation. The
+decomposition is exact (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ class Residuals:
     """Residuals of the points of one case, in the handedness of the comparator."""
 
     points: Indices  # (n,) numbers of the points
-    xy_um: Floats  # (n, 2) comparator coordinates that the residuals belong to (X ADJ, Y ADJ), micrometres
-    # (n, 2) grid transformed into the comparator system less measured: what to add to the measurement
+    xy_um: Floats  # (n, 2) comparator coordinates of the residuals (X ADJ, Y ADJ), micrometres
+    # (n, 2) grid transformed into the comparator system minus measured coordinates
     comparator_um: Floats
-    # (n, 2) measurement transformed into the grid system less given grid: what to add to the given grid
+    # (n, 2) measurement transformed into the grid system minus given grid
     grid_um: Floats
-    # Unknowns that a coordinate axis has lost to the adjustment: SIGMA divides by points less this
+    # Unknowns per coordinate axis: SIGMA divides by the number of points minus this
     lost: float
 
     @property
@@ -38,12 +38,12 @@ class Residuals:
 
     @property
     def sigma_um(self) -> tuple[float, ...]:
-        """Root of each sum of squares over points less `lost` (SIGMA); NaN without redundancy."""
+        """Roots of sums of squares over points minus `lost` (SIGMA); NaN if not redundant."""
         return tuple(self._sigma(square, 1) for square in self.squares_um2)
 
     @property
     def sigma0_um(self) -> float:
-        """Standard error of unit weight, comparator x and y (equations 52, 60); NaN without redundancy."""
+        """Standard error of unit weight in x and y (equations 52, 60); NaN if undefined."""
         return self._sigma(sum(self.squares_um2[:2]), 2)
 
     def _sigma(self, square: float, axes: int) -> float:
@@ -52,14 +52,14 @@ class Residuals:
 
 
 def rotation_matrix(rotation_rad: float) -> Floats:
-    """Return M = [[cos, sin], [-sin, cos]]: grid = M (corrected comparator coordinates) + translation."""
+    """Return M = [[cos, sin], [-sin, cos]] of grid = M corrected + translation."""
     c, s = math.cos(rotation_rad), math.sin(rotation_rad)
     return np.array([[c, s], [-s, c]])
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Two scales, lack of orthogonality, rotation.
+    """Scales, lack of orthogonality and rotation of a linear transformation.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Decomposition:
     nonorthogonality_rad
         Angle between the y axis and the normal to the x axis; positive if the y axis leans toward +x.
     rotation_rad
-        Rotation of the plate against the comparator.
+        Rotation of the plate relative to the comparator.
     """
 
     scale_x: float
@@ -78,7 +78,7 @@ class Decomposition:
 
     @classmethod
     def of_inverse(cls, matrix: Floats) -> Decomposition:
-        """Take apart the matrix A = [[a, b], [c, d]] of comparator = A grid + shift (equation 47)."""
+        """Decompose the matrix A of comparator = A grid + shift (equation 47)."""
         (a, b), (c, d) = matrix.tolist()
         determinant = a * d - b * c
         return cls(
@@ -90,21 +90,21 @@ class Decomposition:
 
     @property
     def linear_matrix(self) -> Floats:
-        """N S, the correction of readings for scales and lack of orthogonality (equation 34), 2 x 2."""
+        """Matrix N S for scales and lack of orthogonality (equation 34), 2 x 2."""
         lean = self.nonorthogonality_rad
         return np.array([[self.scale_x, self.scale_y * math.sin(lean)], [0.0, self.scale_y * math.cos(lean)]])
 
     @property
     def matrix(self) -> Floats:
-        """R = M N S of grid = R comparator + shift (equation 36), 2 x 2."""
+        """Matrix R = M N S of grid = R comparator + shift (equation 36), 2 x 2."""
         product: Floats = rotation_matrix(self.rotation_rad) @ self.linear_matrix
         return product
 
 
 def decomposition_jacobian(matrix: Floats) -> Floats:
-    """Return the partials of scales, lack of orthogonality and rotation by a, b, c, d (equation 54), 4 x 4.
+    """Return the partials of scales, skew and rotation by A (equation 54), 4 x 4.
 
-    In closed form: the listing divides by b and d, which vanish when the plate lies exactly along the axes.
+    Closed form. The listing divides by b and d, which vanish for a plate exactly along the axes.
     """
     (a, b), (c, d) = matrix.tolist()
     determinant = a * d - b * c
@@ -121,12 +121,12 @@ def decomposition_jacobian(matrix: Floats) -> Floats:
     )
 
 
-RIGID_LOST = 1.5  # Half of rotation and two translations: what each axis loses
+RIGID_LOST = 1.5  # Half of rotation and two translations: unknowns per axis
 
 
 @dataclass(frozen=True, eq=False)
 class RigidFit:
-    """A rigid fit: grid = M(rotation) comparator + translation, in the handedness of the comparator."""
+    """Rigid fit: grid = M(rotation) comparator + translation, comparator handedness."""
 
     rotation_rad: float
     translation_um: Floats
@@ -136,11 +136,11 @@ class RigidFit:
 def fit_rigid(
     points: Indices, xy_um: Floats, grid_um: Floats, *, lost: float = RIGID_LOST, as_listed: bool = False
 ) -> RigidFit:
-    """Fit measured coordinates onto grid coordinates of the same handedness by rotation and translation.
+    """Fit measured to grid coordinates of equal handedness, without scale.
 
-    The rotation is that of the least-squares similarity transformation, which is that of the rigid one as
-    well. `lost` are the unknowns of each axis, for the standard errors. `as_listed` turns residuals back with
-    the cosine and sine of the similarity transformation, without taking its scale out (1e-5 of them or so).
+    The least-squares similarity transformation has the same rotation as the rigid one. `lost` is the number
+    of unknowns per axis, for the standard errors. `as_listed` rotates residuals back with the unnormalised
+    cosine and sine of the similarity transformation, which changes them by some 1e-5.
     """
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     d, g = xy_um - middle, grid_um - grid_middle
@@ -158,36 +158,36 @@ def fit_rigid(
     )
 
 
-LEAST_POINTS = 4  # Three points determine the transformation; the fourth says how good it is
+LEAST_POINTS = 4  # Three points determine the transformation; the fourth checks it
 AFFINE_LOST = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class AffineFit:
-    """A linear fit of one case."""
+    """Linear fit of one case."""
 
     coefficients: Floats  # (2, 2) and (2,): comparator = coefficients grid + shift (equation 40)
     shift_um: Floats
     parameters: Decomposition  # Scales, lack of orthogonality, rotation
-    cofactors: Floats  # (4, 4) of the parameters in that order, per um^2 of the variance of unit weight
-    residuals: Residuals  # In both systems
+    cofactors: Floats  # (4, 4) of these parameters in order, per um^2 of the variance of unit weight
+    residuals: Residuals  # Residuals in both systems
 
     @property
     def covariance(self) -> Floats:
-        """(4, 4) of scale x, scale y, lack of orthogonality (rad), rotation (rad) (equation 53)."""
+        """(4, 4) covariance of scales, lack of orthogonality and rotation (equation 53)."""
         return self.residuals.sigma0_um**2 * self.cofactors
 
     @property
     def translation_um(self) -> Floats:
-        """(2,) of grid = M N S comparator + translation: grid coordinates of the comparator's zero."""
+        """(2,) grid coordinates of the comparator zero in grid = M N S comparator + shift."""
         return np.asarray(-np.linalg.solve(self.coefficients, self.shift_um))
 
 
 def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
-    """Fit two scales, lack of orthogonality, rotation and translation; the grid is without error.
+    """Fit scales, lack of orthogonality, rotation and translation to a fixed grid.
 
-    The form x + v = A X + T is linear; QR on centred coordinates replaces the listing's adjugate of the
-    normal equations. Measured and grid coordinates (n, 2) have the same handedness.
+    The form x + v = A X + T is linear. QR on centred coordinates replaces the adjugate of the normal
+    equations in the listing. Measured and grid coordinates (n, 2) have the same handedness.
     """
     if len(points) < LEAST_POINTS:
         raise AdjustmentError(phrase("comparators.few-points", count=len(points), least=LEAST_POINTS))

@@ -1,4 +1,4 @@
-"""Grid plates: built in, from a file, or made square."""
+"""Grid plates: built in, from a file, or square."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ MOST_EXPANSION = 1e-3  # per kelvin; steel has 1.2e-5, glass 8e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Brief):
-    """A grid plate.
+    """Grid plate with calibrated points.
 
     Attributes
     ----------
     number
-        Of the plate.
+        Number of the plate.
     points
         (l,) point numbers.
     xy_um
         (l, 2) calibrated coordinates in the axes of the plate, micrometres.
     sigma_um
-        Standard deviation of a calibrated coordinate; None where it is not known.
+        Standard deviation of a calibrated coordinate; None if unknown.
     adopted
-        Date of the calibration, as text, and what it rests on.
+        Date and basis of the calibration, as text.
     temperature_c, expansion_per_k
-        At which the coordinates hold (degrees Celsius), and by which part of themselves they grow a kelvin;
-        None where that is not known.
+        Reference temperature of the coordinates (degrees Celsius), and relative expansion per kelvin; None if
+        unknown.
     source
-        The file that it was read from.
+        Source file.
     """
 
     number: int
@@ -80,7 +80,7 @@ class Grid(Brief):
     def square(
         cls, columns: int = 5, spacing_um: float = 50_000.0, number: int = 1, sigma_um: float | None = None
     ) -> Grid:
-        """Return a plate of `columns` x `columns` points, centred, numbered along +X, then +Y."""
+        """Return a centred square plate with points numbered along +X, then +Y."""
         steps = (np.arange(columns) - (columns - 1) / 2) * spacing_um
         y, x = np.meshgrid(steps, steps, indexing="ij")
         return cls(
@@ -93,7 +93,7 @@ class Grid(Brief):
         Raises
         ------
         InputError
-            Its temperature or its expansion is not known.
+            If its temperature or its expansion is unknown.
         """
         if self.temperature_c is None or self.expansion_per_k is None:
             self._refuse("temperature_c, expansion_per_k", "error.empty")
@@ -101,13 +101,13 @@ class Grid(Brief):
         return replace(self, xy_um=self.xy_um * growth, temperature_c=temperature_c)
 
     def rows_of(self, points: Indices) -> Indices:
-        """Return the rows of points, which must all be on the plate."""
+        """Return the rows of points of the plate."""
         order = np.argsort(self.points)
         rows: Indices = order[np.searchsorted(self.points, points, sorter=order)]
         return rows
 
     def to_csv(self) -> bytes:
-        """Return the plate as the file that :func:`read_grid` reads."""
+        """Return the plate as a file for :func:`read_grid`."""
         lines = [f"# grid = {self.number}"]
         lines += [f"# adopted = {self.adopted}"] if self.adopted else []
         lines += [f"# sigma_um = {self.sigma_um:g}"] if self.sigma_um is not None else []
@@ -119,15 +119,20 @@ class Grid(Brief):
 
 
 def read_grid(path: Path) -> Grid:
-    """Read a plate: columns point, x_um, y_um (or x_mm, y_mm); `# grid = number`, `# sigma_um = ...` above.
+    """Read a plate with columns point, x_um, y_um (or x_mm, y_mm).
 
-    Further settings above the table: `# adopted = date`, `# owner = ...`, `# temperature_c = 20`,
-    `# expansion_per_k = 8.5e-6`, `# note = ...`. Points with blank coordinates are left out.
+    Settings above the table are:
+
+    * `# grid = number`, `# sigma_um = ...`
+    * `# adopted = date`, `# owner = ...`, `# note = ...`
+    * `# temperature_c = 20`, `# expansion_per_k = 8.5e-6`
+
+    Points with blank coordinates are omitted.
 
     Raises
     ------
     InputError
-        The file cannot be read, is not such a table, or has an unknown setting.
+        If the file cannot be read, is not such a table, or has an unknown setting.
     """
     table = read_table(path, "point", keys=KEYS)
     points, xy = [], []
@@ -153,7 +158,7 @@ def read_grid(path: Path) -> Grid:
 
 
 def with_corrections(grid: Grid, points: Indices, corrections_um: Floats, sigma_um: float, when: str) -> Grid:
-    """Return a plate with corrections of some points, their standard deviation, and their origin."""
+    """Return a plate with corrected points, their standard deviation and origin."""
     xy_um = grid.xy_um.copy()
     xy_um[grid.rows_of(points)] += corrections_um
     return replace(
@@ -168,12 +173,12 @@ def with_corrections(grid: Grid, points: Indices, corrections_um: Floats, sigma_
 def built_in_grid(number: int) -> Grid:
     """Return a master grid of the program: 773, 1320 or 778.
 
-    Point 11 of 773 and point 13 of 778 are missing: a digit or sign of them is not legible in the report.
+    Point 11 of 773 and point 13 of 778 are missing because a digit or sign is illegible in the report.
 
     Raises
     ------
     InputError
-        There is no such plate.
+        If the number is not one of these.
     """
     if number not in BUILT_IN:
         raise InputError(unknown_name("built-in grid", str(number), map(str, BUILT_IN)))
@@ -187,7 +192,7 @@ def find_grid(name: str) -> Grid:
     Raises
     ------
     InputError
-        The name is neither a built-in number nor a file of a plate.
+        If the name is neither a built-in number nor a plate file.
     """
     file = path("name", name)
     if is_whole_number(name) and not file.exists():

@@ -1,9 +1,9 @@
-"""The rigorous adjustment: cases, comparator, polynomials and grid at once, with their covariances.
+"""Rigorous joint adjustment of cases, comparator, polynomials and grid, with covariances.
 
-The engine underneath (`photocore::programs::comparator`) takes grid points as local unknowns, each weighted
-by the standard deviation of the grid, cases as kept ones, and the comparator as the border. Weights: the
-variance of a mean is that of the comparator, random, plus that of a pointing over their number; the random
-part, and the grid's where it is not known, are estimated from the residuals.
+The engine (`photocore::programs::comparator`) uses grid points as local unknowns, weighted by the standard
+deviation of the grid. Cases are retained unknowns, and the comparator is the border. The variance of a mean
+is the random comparator variance plus the pointing variance over the number of pointings. The random part,
+and an unknown grid variance, are estimated from the residuals.
 """
 
 from __future__ import annotations
@@ -27,70 +27,68 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
 
 DEGREE = 4
-OWN_TERMS = 6  # Terms of the polynomials that the linear parameters do not repeat: the first six
+OWN_TERMS = 6  # The first six polynomial terms, which are independent of the linear parameters
 MAX_ROUNDS = 100
 SETTLED = 1e-6  # relative change of standard deviations
-LEAST_UM = 1e-3  # Standard deviations are not estimated below a nanometre
+LEAST_UM = 1e-3  # Lower limit of estimated standard deviations, a nanometre
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What the weights come from."""
+    """Standard deviations that define the weights."""
 
-    # Standard deviation of a grid coordinate, by plate: zero holds the grid fixed; None estimates it
+    # Standard deviation of a grid coordinate, by plate: zero fixes the grid; None estimates it
     grid_um: Mapping[int, float | None]
     pointing_um: tuple[float, float] = (0.0, 0.0)  # Standard deviations of a single pointing in x and in y
-    random_um: float | None = None  # Standard deviation of the comparator itself; None estimates it
+    random_um: float | None = None  # Standard deviation of the comparator; None estimates it
 
 
 @dataclass(frozen=True, eq=False)
 class JointCase:
-    """A case after the joint adjustment."""
+    """Case after the joint adjustment."""
 
-    number: int  # Of the case
+    number: int  # Number of the case
     rotation_rad: float  # grid = M(rotation) corrected + translation, in the handedness of the comparator
     translation_um: Floats
-    # (3, 3) of rotation (rad) and the grid coordinates of the centre of the polynomials' frame (um)
+    # (3, 3) of rotation (rad) and the grid coordinates of the polynomial frame's centre (um)
     covariance: Floats
-    residuals: Residuals  # In both systems
-    # (n, 2) residuals of measured coordinates over their standard deviations; NaN where nothing checks
-    # them
+    residuals: Residuals  # Residuals in both systems
+    # (n, 2) residuals of measured coordinates over their standard deviations; NaN if not checked
     standardized: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class JointPlate:
-    """A plate after the joint adjustment, in its own axes."""
+    """Plate after the joint adjustment, in its own axes."""
 
-    points: Indices  # (l,) points measured
-    corrections_um: Floats  # (l, 2) adjusted less given coordinates
-    covariance_um2: Floats  # (l, 2, 2) of the adjusted coordinates
+    points: Indices  # (l,) measured points
+    corrections_um: Floats  # (l, 2) adjusted minus given coordinates
+    covariance_um2: Floats  # (l, 2, 2) covariance of the adjusted coordinates
     sigma_um: float  # Standard deviation of a given coordinate, and whether it was estimated
     estimated: bool
-    # Variance of the corrections over the one assumed; near 1 when the latter is right. None for a
-    # fixed grid
+    # Variance of the corrections over the assumed one; near 1 if the latter is correct. None for a fixed grid
     variance_ratio: float | None
-    # Of the corrections against the standard deviation a priori; None where it was estimated or fixed
+    # Test of the corrections against the a priori sd; None if it was estimated or fixed
     test: GlobalTest | None
 
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """The joint adjustment."""
+    """Result of the joint adjustment."""
 
-    correction: Correction  # Comparator and polynomials with the covariance of all of them
-    # Standard deviation of unit weight; dimensionless, 1 where weights are right. Covariances are
-    # scaled by its square
+    correction: Correction  # Comparator and polynomials with their joint covariance
+    # Standard deviation of unit weight; dimensionless, 1 for correct weights. Covariances are scaled by its
+    # square
     sigma0: float
-    degrees_of_freedom: int  # Of the last adjustment
+    degrees_of_freedom: int  # Degrees of freedom of the last adjustment
     iterations: int
-    random_um: float  # Standard deviation of the comparator itself
+    random_um: float  # Standard deviation of the comparator
     cases: tuple[JointCase, ...]  # Cases in the order measured, plates by number
     plates: dict[int, JointPlate]
 
     @property
     def covariance(self) -> Floats:
-        """(3, 3) of scale x, scale y, lack of orthogonality (rad)."""
+        """(3, 3) covariance of scale x, scale y, lack of orthogonality (rad)."""
         return self.correction.covariance[:3, :3]
 
 
@@ -102,7 +100,7 @@ def adjust_jointly(
     *,
     polynomial: bool = True,
 ) -> JointFit:
-    """Adjust everything together, from the combined linear adjustment, with or without polynomials."""
+    """Adjust all cases jointly, starting from the combined linear adjustment."""
     problem = _Problem(cases, grids, linear, weights, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
     grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}
@@ -122,9 +120,9 @@ def adjust_jointly(
 
 
 class _Problem:
-    """The problem of the extension module, and its last solution.
+    """Problem of the extension module, and its last solution.
 
-    Points are numbered through all plates; placements are counted from the middle of the range.
+    Points are numbered through all plates. Placements refer to the centre of the range.
     """
 
     solution: _photocore.ComparatorSolution
@@ -164,11 +162,10 @@ class _Problem:
         self.coefficient_sd = [math.inf if polynomial else 0.0] * OWN_TERMS
 
     def _pointing(self) -> Floats:
-        """Return (m, 2) variances of the means by the errors of pointings."""
         return np.asarray(np.array(self.weights.pointing_um) ** 2 / self.counts[:, np.newaxis])
 
     def solve(self, grid: Mapping[int, float], random: float) -> None:
-        """Adjust with given standard deviations of grid coordinates and of the comparator."""
+        """Adjust with given standard deviations of grid and comparator."""
         self.variance = random**2 + self._pointing()
         sd = np.array([grid[plate] for plate in self.plate_of.tolist()])
         try:
@@ -195,22 +192,22 @@ class _Problem:
             raise AdjustmentError(phrase("comparators.not-converged"))
 
     def random(self) -> float:
-        """Estimate the standard deviation of the comparator: weighted squares equal their redundancy."""
+        """Estimate the comparator sd by equating weighted squares and redundancy."""
         squares = float((self.solution.residuals**2 / self.variance).sum())
         ratio = squares / float(self.solution.redundancy.sum())
         variance = ratio * float(self.variance.mean()) - float(self._pointing().mean())
         return math.sqrt(max(variance, LEAST_UM**2))
 
     def grid_ratio(self, plate: int, sigma_um: float) -> float:
-        """Return the weighted squares of the corrections of a plate over their redundancy."""
+        """Return the weighted squares of plate corrections over their redundancy."""
         squares, redundancy = self._grid_squares(plate, sigma_um)
         return squares / float(redundancy.sum()) if redundancy.sum() > 1e-9 else 1.0
 
     def _grid_test(self, plate: int, sigma_um: float) -> GlobalTest | None:
         """Test the corrections of a plate against their standard deviation.
 
-        Their weighted squares are nearly c times chi-square with g degrees of freedom, of the same mean and
-        variance (Satterthwaite): c = sum r^2 / sum r, g = sum r / c.
+        Their weighted squares are nearly c times chi-square with g degrees of freedom (Satterthwaite). The
+        same mean and variance give c = sum r^2 / sum r, g = sum r / c.
         """
         squares, redundancy = self._grid_squares(plate, sigma_um)
         if redundancy.sum() <= 1e-9:
@@ -219,16 +216,15 @@ class _Problem:
         return global_test(squares / part, float(redundancy.sum()) / part)
 
     def _grid_squares(self, plate: int, sigma_um: float) -> tuple[float, Floats]:
-        """Return the weighted squares of the corrections of a plate, and their redundancy numbers."""
         rows = self.plate_of == plate
         corrections = self.solution.grid_xy[rows] - self.grid_xy[rows]
         return float((corrections**2).sum()) / sigma_um**2, self.solution.grid_redundancy[rows]
 
     def fit(self, random: float, grid: Mapping[int, float]) -> JointFit:
-        """Return the last solution, and the standard deviations that it was weighted with."""
+        """Return the last solution with its standard deviations."""
         solution, dof = self.solution, self.solution.degrees_of_freedom
         scale = solution.sum_of_squares / dof if dof > 0 else 1.0
-        # Among the 21 parameters of a correction terms of degree 1 and 0 are zero in this frame.
+        # Terms of degree 1 and 0 of the 21 correction parameters are zero in this frame.
         place = np.concatenate([np.arange(3 + OWN_TERMS), 3 + COUNT + np.arange(OWN_TERMS)])
         values, covariance = np.zeros(PARAMETERS), np.zeros((PARAMETERS, PARAMETERS))
         values[place] = solution.comparator

@@ -1,6 +1,6 @@
-"""Measurements in files: decks of cards, or plain tables.
+"""Measurement files: card decks or plain tables.
 
-Tables have columns case, point, x_um, y_um and, where need be, plate, leg, operator.
+Tables have the columns case, point, x_um, y_um and optionally plate, leg, operator.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "tempera
 def read(
     paths: Sequence[Path | str], grids: Iterable[Grid] = (), *, left_handed: bool | None = None
 ) -> list[Session]:
-    """Read measurements: files named *.csv are tables, all others are decks of cards.
+    """Read measurements: files named *.csv are tables, all others are card decks.
 
     Parameters
     ----------
     paths
-        Tables, which make one calibration together, or files of decks, of which each makes one.
+        Tables of one calibration, or card decks with one calibration each.
     grids
-        Plates, instead of those that the files name.
+        Plates that replace the ones in the files.
     left_handed
-        Whether the comparator is left-handed against the plate, instead of what the files say.
+        Whether the comparator is left-handed relative to the plate. It overrides the files.
 
     Raises
     ------
     InputError
-        A file that cannot be read or understood; tables and decks together; no file.
+        If a file cannot be read, if tables and decks are mixed, or if no file is given.
     """
     files = [Path(path) for path in paths]
     if not files:
@@ -60,27 +60,32 @@ def read_csv(
 ) -> Session:
     """Read the tables of one calibration.
 
-    Each has the columns `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`), and may have `plate` (number
-    of the grid), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows stand in the order measured;
-    those with blank coordinates are missing. Lines above the table may set `# grid = 1320` (a built-in grid,
-    or a file beside the table), `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`,
-    `# range_centre_um = 125000` (middle of the range of the comparator), `# temperature_c = 21.7` (of the
-    plate while it was measured); `# note = ...` sets nothing.
+    Required columns are `case`, `point` and `x_um`, `y_um` (or `x_mm`, `y_mm`). Optional columns are `plate`
+    (grid number), `leg` (1 to 4; 0 or blank: intersection) and `operator`. Rows are in the order measured;
+    rows with blank coordinates are missing readings.
+
+    Settings above the table are:
+
+    * `# grid = 1320`: a built-in grid, or a file in the same folder
+    * `# comparator = 3`, `# date = 7/17/72`, `# left_handed = yes`
+    * `# range_centre_um = 125000`: centre of the comparator range
+    * `# temperature_c = 21.7`: plate temperature during the measurement
+    * `# note = ...`: a comment
 
     Parameters
     ----------
     paths
-        The files.
+        Table files.
     grids
-        Plates, instead of those that the tables name.
+        Plates that replace the ones in the tables.
     left_handed
-        Whether the comparator is left-handed against the plate, instead of what the tables say.
+        Whether the comparator is left-handed relative to the plate. It overrides the tables.
 
     Raises
     ------
     InputError
-        A file that is no such table, no plate, a case measured twice, a key that nothing reads, tables that
-        set one thing differently.
+        If a file is not such a table, if a plate is missing, if a case is repeated, or if a key is unknown.
+        If settings of tables differ.
     """
     if not paths:
         raise InputError(phrase("comparators.files"))
@@ -112,7 +117,7 @@ def read_csv(
 
 
 def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) -> T | None:
-    """Return a setting of the tables of a calibration, None if no table has it."""
+    """Return a setting of the tables of a calibration, None if it is missing."""
     settings = [table.settings[key] for table in tables if key in table.settings]
     values = [value_of(setting) for setting in settings]
     for setting, value in zip(settings, values, strict=True):
@@ -131,7 +136,7 @@ def _range_centre_um(setting: Setting) -> float:
 
 
 def _named_grids(table: Table) -> list[Grid]:
-    """Return the plates that a table names: built in, or files beside it."""
+    """Return the plates named in a table: built in, or files in its folder."""
     names = [name.strip() for name in table.text("grid").split(",") if name.strip()]
     folder = table.records.path.parent
     return [find_grid(name if is_whole_number(name) else str(folder / name)) for name in names]
@@ -152,7 +157,7 @@ def _reading(row: Row, xy_um: tuple[float, float], only_plate: int) -> Reading:
 
 
 def to_csv(session: Session) -> bytes:
-    """Return the measurements of a session as a table that :func:`read_csv` reads, in micrometres."""
+    """Return the measurements in micrometres as a table for :func:`read_csv`."""
     lines = [f"# comparator = {session.comparator}"]
     lines += [f"# grid = {', '.join(str(number) for number in session.grids)}"]
     lines += [f"# date = {session.date}"] if session.date else []

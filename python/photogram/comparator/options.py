@@ -1,4 +1,4 @@
-"""How a calibration is computed: the report's text, its listing, or better."""
+"""Options of a calibration: text of the report, its listing, or improvements."""
 
 from __future__ import annotations
 
@@ -9,39 +9,41 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Options:
-    """Choices; the defaults follow the text of the report where its listing departs from it.
+    """Options of a calibration.
+
+    The defaults follow the text of the report if its listing deviates.
 
     Attributes
     ----------
     pointing_dof
-        Degrees of freedom of pointings pooled over cases: `text` (readings less means, unbiased) or `listing`
-        (readings less points).
+        Degrees of freedom of pointings pooled over cases: `text` (readings minus means, unbiased) or
+        `listing` (readings minus points).
     grid_sigma
-        Standard deviation of the grid from average residuals: `unbiased` (expectations of the sums of squares
-        with all fitted parameters accounted for), `text` (equation 64) or `listing` (2 N - 1).
+        Grid standard deviation from average residuals: `unbiased` (expected sums of squares with all fitted
+        parameters), `text` (equation 64) or `listing` (2 N - 1).
     variance_grid
-        Grid in the analysis of variance: `a priori` (as both text and listing; `computed` where a plate has
-        none), or `computed`.
+        Grid sd in the analysis of variance: `a priori` (text and listing; `computed` if unknown), or
+        `computed`.
     case_polynomial_residuals
-        Grid residuals of the polynomials of one case: `consistent` (measured less given, as everywhere) or
-        `listing` (the reverse).
+        Grid residuals of the polynomials of one case: `consistent` (measured minus given) or `listing` (given
+        minus measured).
     nanometres
         Sigmas after the linear stage in the analysis of variance: `exact`, or `truncated` to whole nanometres
-        as the listing stores them.
+        as in the listing.
     free_residuals
-        Comparator residuals of rigid fits: `report` (turned with the scale of the similarity transformation,
-        which changes them by 1e-5 of themselves) or `exact`.
+        Comparator residuals of rigid fits: `report` (includes the scale of the similarity transformation, a
+        relative change of 1e-5) or `exact`.
     order
-        Points in the order `measured`, or in that of the listing's subroutine GROUP (`listing`).
+        Order of points: `measured`, or the order of subroutine GROUP (`listing`).
     pages
-        Pages of the listing: `all`, or only those that the program printed (`published`), without problems,
+        Pages of the listing: `all`, or only those printed by the program (`published`), without problems,
         tests and joint adjustment.
     polynomial
         Whether to fit polynomials.
     joint
-        Whether to adjust everything together as well.
+        Whether to compute the joint adjustment.
     estimate_grid
-        Whether the joint adjustment estimates the standard deviation of the grid even where one is known.
+        Whether the joint adjustment estimates the grid standard deviation even if one is given.
     """
 
     pointing_dof: Literal["text", "listing"] = "text"
@@ -58,7 +60,7 @@ class Options:
 
     @classmethod
     def as_published(cls) -> Options:
-        """Return the choices that give the figures and pages of the program of 1971."""
+        """Return options that reproduce values and pages of the program of 1971."""
         return cls(
             pointing_dof="listing",
             grid_sigma="listing",

@@ -1,8 +1,8 @@
-"""Outliers among pointings and among means of points after the adjustment, and remarks on them.
+"""Outliers among pointings and point means after the adjustment, and messages on them.
 
-Standard deviations are not known beforehand: residuals are compared with those of the other measurements
-(externally studentized, :mod:`photogram.statistics`). Outliers of the adjustment are removed and the rest is
-adjusted again until none is left; the difference of the corrections is the effect of the outliers.
+Prior standard deviations are unknown. Residuals are compared with the other measurements (externally
+studentized, :mod:`photogram.statistics`). Outliers of the adjustment are removed and the rest is readjusted
+until none remains. The change of the corrections is the effect of the outliers.
 """
 
 from __future__ import annotations
@@ -35,69 +35,69 @@ from photogram.statistics.limits import externally_studentized, studentized_limi
 from photogram.words import phrase
 
 MAX_ROUNDS = 30  # of removal: each removes residuals of at least half the largest
-LEAST_POINTS = 6  # of a case; the search ends before a case has fewer
-# Nothing below a nanometre is an outlier: residuals of measurements without error are rounding
+LEAST_POINTS = 6  # per case; the search ends before a case has fewer
+# Outliers are at least a nanometre: residuals of error-free measurements are rounding errors
 LEAST_UM = 1e-3
-MATCH = 0.1  # A point measured where another is expected is within this part of their distance of it
+MATCH = 0.1  # A point measured instead of another one is within this part of their distance
 
 
 @dataclass(frozen=True)
 class FarPointing:
-    """A pointing that does not agree with the others of its case."""
+    """Pointing that is inconsistent with the others of its case."""
 
-    case: int  # Numbers of case and point; which pointing of the case, from 0
+    case: int  # Numbers of case and point; index of the pointing in the case, from 0
     point: int
     row: int
-    deviation_um: float  # From the mean of the point, in the coordinate that is off
-    ratio: float  # The deviation over its standard deviation, by the other pointings of the case
-    limit: float  # Of the ratio
+    deviation_um: float  # Deviation from the mean of the point, in the inconsistent coordinate
+    ratio: float  # The deviation over its standard deviation, from the other pointings of the case
+    limit: float  # Critical value of the ratio
 
 
 @dataclass(frozen=True)
 class Outlier:
-    """A measured point that does not agree with the adjustment of the others."""
+    """Measured point that is inconsistent with the adjustment of the others."""
 
     case: int  # Numbers
     point: int
-    # Measured less expected comparator coordinates, by the adjustment without outliers
+    # Measured minus expected comparator coordinates, from the adjustment without outliers
     off_um: tuple[float, float]
-    ratio: float  # The residual over its standard deviation when it was taken out
-    instead: int | None  # The point of the plate that is expected there; None for none
+    ratio: float  # The residual over its standard deviation at its removal
+    instead: int | None  # The plate point expected at this position, or None
 
     @property
     def distance_um(self) -> float:
-        """How far it is off."""
+        """Distance of measured and expected position."""
         return math.hypot(*self.off_um)
 
 
 @dataclass(frozen=True)
 class Screening:
-    """What the search for outliers of the adjustment found."""
+    """Result of the search for outliers of the adjustment."""
 
-    outliers: tuple[Outlier, ...]  # Case by case, point by point
-    limit: float  # Of the ratios, for all coordinates together at the level of 5 percent
-    # How much the outliers change corrected coordinates: root mean square over the measured places,
-    # free of rotation and translation. 0 without outliers
+    outliers: tuple[Outlier, ...]  # By case, then by point
+    limit: float  # Critical value of the ratios of all coordinates at the level of 5 percent
+    # Effect of the outliers on corrected coordinates: root mean square over the measured points, without
+    # rotation and translation. 0 without outliers
     change_um: float
-    sigma_um: float  # Standard deviation of unit weight of the adjustment without them
-    # Of each case, (k, 2): the test values of all its points before any was taken out, without signs
+    sigma_um: float  # Standard deviation of unit weight without the outliers
+    # (k, 2) absolute test values of all points of each case before the first removal
     ratios: tuple[Floats, ...]
-    freedom: float  # Degrees of freedom of that adjustment
+    freedom: float  # Degrees of freedom without the outliers
 
     @property
     def harmful(self) -> bool:
-        """Whether outliers falsify corrected coordinates by more than a coordinate is uncertain."""
+        """Whether outliers change corrected coordinates by more than their uncertainty."""
         return self.change_um > self.sigma_um
 
 
 @dataclass(frozen=True, eq=False)
 class PointingTests:
-    """Tests of the pointings of a case against the others of the case."""
+    """Tests of the pointings of a case against the others."""
 
     case: Case  # The case
-    deviations: Floats  # (k, 2) from the mean of the point, or of its leg
+    deviations: Floats  # (k, 2) from the mean of the point or leg
     ratios: Floats  # (k, 2) externally studentized; 0 for single pointings
-    freedom: int  # Degrees of freedom of the standard deviation in x, and of that in y
+    freedom: int  # Degrees of freedom of the standard deviation in x, and in y
 
 
 def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
@@ -124,7 +124,7 @@ def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
 
 
 def far_pointings(tests: Sequence[PointingTests], others: int = 0) -> list[FarPointing]:
-    """Return outlying pointings; `others` is the number of tests that share the level with these."""
+    """Return outlying pointings; `others` tests share the level with these."""
     outlying = []
     number = sum(test.ratios.size for test in tests) + others
     for test in tests:
@@ -179,7 +179,7 @@ def screen(
         for k, point, ratio in sorted(removed)
     )
     change = 0.0
-    if outliers:  # root mean square at the measured places, without rotation and shift
+    if outliers:  # root mean square at the measured points, without rotation and shift
         places = np.vstack([case.means_um for case in cases])
         corrected = stage.correction.apply(places), clean.correction.apply(places)
         residuals = fit_rigid(np.arange(len(places)), *corrected).residuals.grid_um
@@ -191,7 +191,7 @@ def screen(
 def _ratios(
     cases: Sequence[PlacedCase], stage: CombinedLinear | CombinedPolynomial
 ) -> tuple[list[Floats], float]:
-    """Return externally studentized residuals of each case, (k, 2) without signs.
+    """Return absolute studentized residuals (k, 2) per case, and the trace of R R^T.
 
     And the degrees of freedom: the trace of R R^T.
     """
@@ -227,7 +227,7 @@ def _outlier(
     point: int,
     ratio: float,
 ) -> Outlier:
-    """Compare a measured point with where the adjustment of the others expects it and its neighbours."""
+    """Compare a measured point with its expected position and its neighbours."""
     fit = stage.cases[index]
     row = int(np.flatnonzero(case.points == point)[0])
     measured = stage.correction.apply(case.means_um[row : row + 1])[0]
@@ -242,7 +242,7 @@ def _outlier(
 
 Found = TypeVar("Found", FarPointing, Outlier)
 
-MAX_NAMED = 40  # outliers of each kind, the largest ones
+MAX_NAMED = 40  # largest outliers of each type
 
 
 def problems(
@@ -252,7 +252,7 @@ def problems(
     far: Sequence[FarPointing],
     joint: JointFit | None,
 ) -> list[Message]:
-    """Return problems: an unusable correction, grids worse than their standard deviations, outliers."""
+    """Return problems: harmful outliers, inaccurate grids, single outliers."""
     messages = []
     if screening.harmful:
         fields = {"change": screening.change_um, "sd": screening.sigma_um}
@@ -278,7 +278,6 @@ def problems(
 def _outliers(
     screening: Screening, cases: Sequence[PlacedCase], places: Mapping[tuple[int, int], Place]
 ) -> list[Message]:
-    """Name the outliers of the adjustment; one message for a point that is an outlier in all its cases."""
     plate_of = {case.number: case.case.plate for case in cases}
     measured: dict[tuple[int, int], list[int]] = {}
     for case in cases:
@@ -313,7 +312,7 @@ def _more(count: int, code: str) -> list[Message]:
 
 
 def plate_remarks(session: Session, cases: Sequence[PlacedCase]) -> list[Message]:
-    """Return remarks on plates whose grid calibration is not valid, and on points without measurement."""
+    """Return warnings on invalid grid calibrations and unmeasured points."""
     remarks = []
     for plate in dict.fromkeys(case.case.plate for case in cases):
         count = len(session.grids[plate].points)

@@ -1,4 +1,4 @@
-"""Readings of each point brought together (subroutine GROUP), and how precisely they were pointed."""
+"""Readings grouped by point (subroutine GROUP), and their pointing precision."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from photogram.lazy_dataclasses import dataclass, field
 
 
 def group(points: Indices) -> Indices:
-    """Return the order of readings in which equal points stand together, points and readings as measured."""
+    """Return the order of readings grouped by point, otherwise as measured."""
     _, first, inverse = np.unique(points, return_index=True, return_inverse=True)
     order: Indices = np.argsort(first[inverse], kind="stable")
     return order
 
 
 def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
-    """Return each point with the rows of its readings, points and rows in the order measured."""
+    """Return each point with the rows of its readings, in the order measured."""
     order = group(points)
     starts = np.flatnonzero(np.diff(points[order])) + 1
     rows = np.split(order, starts) if len(points) else []
@@ -28,10 +28,10 @@ def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
 
 
 def group_as_listed(points: Indices) -> Indices:
-    """Return the order of readings that the listing makes."""
+    """Return the order of readings in the listing."""
     order = list(range(len(points)))
     numbers = points.tolist()
-    # Where the readings of each point stand; those before `start` have moved away.
+    # Positions of the readings of each point; those before `start` were moved.
     places: dict[int, list[int]] = {}
     for place, number in enumerate(numbers):
         places.setdefault(number, []).append(place)
@@ -51,13 +51,13 @@ def group_as_listed(points: Indices) -> Indices:
     return np.array(order, dtype=np.int64)
 
 
-# Multiples of the semi-axes for an ellipse that holds so many percent (report; the program draws 39)
+# Multiples of the semi-axes for percentages of confidence (report; the program draws 39)
 CONFIDENCE_FACTORS = {39: 1.00, 50: 1.18, 95: 2.45, 99: 3.03}
 
 
 @dataclass(frozen=True)
 class Ellipse:
-    """An error ellipse: semi-axes in micrometres, angle of the major axis from +x toward +y in radians."""
+    """Error ellipse: semi-axes (um) and angle of the major axis from +x to +y (rad)."""
 
     major_um: float
     minor_um: float
@@ -65,7 +65,7 @@ class Ellipse:
 
     @classmethod
     def of(cls, variance_x: float, variance_y: float, covariance: float) -> Ellipse:
-        """Return the ellipse of a covariance matrix; where both variances are equal it lies at 45 degrees."""
+        """Return the ellipse of a covariance matrix; at 45 degrees for equal variances."""
         width = math.hypot(variance_x - variance_y, 2 * covariance)
         total = variance_x + variance_y
         angle = (
@@ -78,14 +78,14 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Precision:
-    """Variances of single readings, pooled over one point or many."""
+    """Variances of single readings, pooled over one or more points."""
 
-    readings: int  # How many went in
+    readings: int  # Number of readings
     points: int
-    degrees_of_freedom: int  # Readings less means
-    variance_um2: tuple[float, float]  # Of a single reading in x and in y; NaN without degrees of freedom
-    covariance_um2: float  # Of x and y of a single reading
-    mean_variance_um2: tuple[float, float]  # Of the mean of a point, in x and in y (equations 4 and 22)
+    degrees_of_freedom: int  # Readings minus means
+    variance_um2: tuple[float, float]  # of a single reading in x and y; NaN without degrees of freedom
+    covariance_um2: float  # Covariance of x and y of a single reading
+    mean_variance_um2: tuple[float, float]  # of the mean of a point (equations 4 and 22)
 
     @property
     def sd_um(self) -> tuple[float, float]:
@@ -111,13 +111,13 @@ class Precision:
 
     @property
     def correlation(self) -> float:
-        """Correlation of x and y (equation 7); NaN where one of them does not vary."""
+        """Correlation of x and y (equation 7); NaN if one of them is constant."""
         product = math.prod(self.sd_um)
         return self.covariance_um2 / product if product > 0 else math.nan
 
     @property
     def listed_correlation_percent(self) -> float:
-        """As the listing has it: 100 where exactly one coordinate does not vary, 0 where neither does."""
+        """Percentage of the listing: 100 if one coordinate is constant, 0 if both are."""
         x, y = self.variance_um2
         if x > 0 and y > 0:
             return 100 * self.correlation
@@ -131,29 +131,29 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class PointReadings:
-    """The readings of one point in one case, summed up."""
+    """Summary of the readings of one point in one case."""
 
-    point: int  # Number of the point; of its readings
+    point: int  # Point number; number of readings
     count: int
-    mean_um: Floats = field(repr=False)  # (2,) their mean (equation 1)
+    mean_um: Floats = field(repr=False)  # (2,) mean (equation 1)
     squares_um2: tuple[float, float]  # Sums of (x - mean)^2 and (y - mean)^2
     products_um2: float  # Sum of (x - mean)(y - mean)
 
     @property
     def identical(self) -> bool:
-        """Whether several readings are all the same, in both coordinates."""
+        """Whether several readings are equal in both coordinates."""
         return self.count > 1 and self.squares_um2 == (0.0, 0.0)
 
     @property
     def precision(self) -> Precision:
-        """Equations 2 to 7; zero for a single reading, as the listing has it."""
+        """Equations 2 to 7; zero for a single reading, as in the listing."""
         if self.count == 1:
             return Precision(1, 1, 0, (0.0, 0.0), 0.0, (0.0, 0.0))
         return pool([self])
 
 
 def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
-    """Sum up readings, point by point in the order of their first reading."""
+    """Summarise readings by point, in the order of their first reading."""
     order = group(points)
     starts = np.flatnonzero(np.diff(points[order], prepend=points[order[:1]] - 1))
     counts = np.diff([*starts, len(points)])
@@ -177,9 +177,10 @@ def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
 
 
 def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
-    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31), or divide by `listed_dof` instead.
+    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31).
 
-    Each variance is weighted by its degrees of freedom: sums of squares over readings less means.
+    Each variance is weighted by its degrees of freedom: sums of squares over readings minus means, or over
+    `listed_dof`.
     """
     readings = list(points)
     total = sum(point.count for point in readings)
@@ -204,11 +205,10 @@ def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> P
 def pool_points(
     cases: Sequence[Sequence[PointReadings]], *, as_listed: bool = False
 ) -> tuple[dict[int, Precision], Precision]:
-    """Pool many cases: each point over its cases (equations 25 to 27), then everything (28 to 32).
+    """Pool each point over all cases (equations 25 to 27), then everything (28 to 32).
 
-    `as_listed` divides as the listing does, where that departs from the text: the sums of a point by all its
-    readings less one (not less the number of its cases), those of all points by all readings less the number
-    of points.
+    `as_listed` divides as in the listing. The divisor for a point is the number of its readings minus one.
+    The divisor for all points is the number of readings minus the number of points.
     """
     by_number: dict[int, list[PointReadings]] = {}
     for case in cases:

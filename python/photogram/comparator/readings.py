@@ -1,4 +1,4 @@
-"""Readings of a comparator as they were recorded, and the cases and the session that they make."""
+"""Recorded comparator readings, cases and sessions."""
 
 from __future__ import annotations
 
@@ -16,35 +16,34 @@ from photogram.messages import Message, unknown_name
 from photogram.show.methods import Brief
 from photogram.words import Phrase, phrase
 
-# A reading this far from the others on its point was taken on another point, or is in another unit
+# A larger distance from the other readings of a point indicates another point or unit
 FURTHEST_UM = 1000.0
 
 
-LARGEST_UM = 1e8  # A hundred metres: larger coordinates are no measurements, and their powers would overflow
+LARGEST_UM = 1e8  # A hundred metres: larger coordinates are invalid, and their powers would overflow
 
 
-CENTRE_UM = 125_000.0  # Middle of the range of most comparators (TRANS)
-# And of those of the program with other ranges: STK1, PSK, other
+CENTRE_UM = 125_000.0  # Centre of the range of most comparators (TRANS)
+# Centres of the program's comparators with other ranges: STK1, PSK, other
 CENTRES_UM = {10: 1_000_000.0, 11: 1_500_000.0, 12: 300_000.0, 13: 300_000.0, 14: 1_000_000.0}
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One pointing.
+    """Single pointing.
 
     Attributes
     ----------
     plate, case, operator
-        Numbers; plate 0 stands for the only plate of the session.
+        Numbers; plate 0 is the only plate of the session.
     leg
-        0: on the intersection of the lines; 1 to 4: on a leg, numbered round the cross, so that 1 is opposite
-        3.
+        0: intersection of the lines. 1 to 4: a leg of the cross, with 1 opposite to 3.
     point
         Number of the grid point.
     xy_um
         Coordinates in micrometres.
     place
-        Where it was read.
+        Location of the record in the file.
     """
 
     plate: int
@@ -58,7 +57,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """All pointings of one operator on a plate in one placement, in the order in which they were made.
+    """All pointings of one operator on a plate in one placement, in measured order.
 
     Attributes
     ----------
@@ -69,7 +68,7 @@ class Case:
     xy_um
         (n, 2) comparator coordinates in micrometres.
     places
-        Where each pointing was read.
+        Location of each record in the file.
     """
 
     number: int
@@ -82,16 +81,16 @@ class Case:
 
     @property
     def place(self) -> Place:
-        """Where its first pointing was read."""
+        """Location of its first pointing in the file."""
         return self.places[0]
 
     def check(self, grid: Grid) -> None:
-        """Refuse points that the plate has not, and readings far from the others on their point.
+        """Reject points missing on the plate, and readings far from the others of a point.
 
         Raises
         ------
         InputError
-            The first reading at fault, with its place.
+            If a reading is invalid. The message locates the first one.
         """
         if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
             raise InputError(phrase("comparators.lengths", case=self.number))
@@ -122,7 +121,6 @@ class Case:
 
 
 def _medians(groups: Indices, values: Floats) -> Floats:
-    """Return the medians of columns by group, numbered from 0."""
     counts = np.bincount(groups)
     first = np.cumsum(counts) - counts
     medians = np.empty((len(counts), values.shape[1]))
@@ -134,7 +132,7 @@ def _medians(groups: Indices, values: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Session(Brief):
-    """Everything measured for one calibration of one comparator.
+    """All measurements of one calibration of one comparator.
 
     Attributes
     ----------
@@ -143,25 +141,25 @@ class Session(Brief):
     grids
         The plates by their numbers.
     comparator
-        Number of the comparator; `secondary` for the right stage of a stereocomparator.
+        Comparator number; `secondary` for the right stage of a stereocomparator.
     date
         Date of measurement, as text.
     left_handed
-        Whether the comparator is left-handed against the plate; None where nothing is said. The measurements
-        decide; what they contradict is an error.
+        Whether the comparator is left-handed relative to the plate; None if not specified. The measurements
+        determine the handedness; a contradiction is an error.
     sorted_input, least_count_one_micrometre
-        Options of the header that the title page repeats.
+        Options of the header that the title page prints.
     plot_each_case
-        Whether tables and pictures of the corrections of every case are wanted, too.
+        Whether to produce correction tables and plots of every case.
     range_centre_um
-        Middle of the range of the comparator in x and in y (TRANS of the listing); None for that of the
-        program for this comparator.
+        Centre of the comparator range in x and in y (TRANS of the listing); None: default of the program for
+        this comparator.
     temperature_c
-        Of the plates while they were measured, degrees Celsius; None where it is not known.
+        Plate temperature during the measurement, degrees Celsius; None if unknown.
     source
         File of the first record.
     messages
-        Remarks made while reading.
+        Warnings of the reader.
     """
 
     cases: tuple[Case, ...]
@@ -180,7 +178,7 @@ class Session(Brief):
 
     @property
     def centre_um(self) -> float:
-        """Middle of the range of the comparator, in x and in y: of the table of corrections."""
+        """Centre of the comparator range in x and y, for the table of corrections."""
         if self.range_centre_um is not None:
             return self.range_centre_um
         if self.secondary or (self.comparator == 11 and self.least_count_one_micrometre):
@@ -188,19 +186,19 @@ class Session(Brief):
         return CENTRES_UM.get(self.comparator, CENTRE_UM)
 
     def grid_of(self, case: Case) -> Grid:
-        """Return the plate that a case was measured on.
+        """Return the plate of a case.
 
         Raises
         ------
         InputError
-            No plate with that number was given.
+            If the plate number is unknown.
         """
         if case.plate not in self.grids:
             raise case.place.error(unknown_name("plate", str(case.plate), map(str, self.grids)))
         return self.grids[case.plate]
 
     def expanded(self) -> Session:
-        """Return the session with its plates as they were while they were measured, and what is not known."""
+        """Return the session with plates at measuring temperature, and warnings."""
         t, grids, remarks = self.temperature_c, dict(self.grids), []
         for number, grid in self.grids.items():
             known = grid.temperature_c is not None and grid.expansion_per_k is not None
@@ -214,13 +212,13 @@ class Session(Brief):
         return replace(self, grids=grids, messages=[*self.messages, *remarks])
 
     def check(self) -> None:
-        """Refuse a session that contradicts itself.
+        """Reject an inconsistent session.
 
         Raises
         ------
         InputError
-            No case, a case measured twice, an unknown plate or point, readings far from others on their
-            point.
+            If cases are missing or repeated, if a plate or point is unknown, or if readings are far from the
+            others of their point.
         """
         if not self.cases:
             raise InputError(phrase("error.empty-file", content="measurements"), file=self.source)
@@ -239,13 +237,12 @@ def _repeated(case: int, first: Place) -> Phrase:
 
 
 def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
-    """Put readings that follow each other with one case number together.
+    """Combine consecutive readings with one case number.
 
     Raises
     ------
     InputError
-        A case that comes back after another one (it was measured twice), or that changes its plate or its
-        operator on the way.
+        If a case resumes after another one (it was measured twice), or if its plate or operator changes.
     """
     runs: dict[int, list[Reading]] = {}
     last: int | None = None

@@ -1,14 +1,14 @@
-"""What the adjustments leave of errors: traces of products with their reduction R, in linear memory.
+"""Residual effects of errors: traces of products with the reduction R, in linear memory.
 
-Residuals are R times errors of the readings. With polynomials the stages of the report follow each other,
-rigid and linear parameters, polynomials, rigid parameters again, so that
+With polynomials, the stages of the report are rigid and linear parameters, polynomials, and rigid parameters
+again. This gives
 
-    R = (I - P) (I - B B^T) (I - P - L L^T) = I - P - U W^T,
+    R = (I - P) (I - B B^T) (I - P - L L^T) = I - P - U W^T.
 
-where P projects on rotation and translations of every case (three columns on the rows of one case each), L
-holds the linear parameters without what P takes of them, B the polynomials (orthonormal both), and
-U = [L, (I - P) B], W = [L, (I - P - L L^T) B]. P U = P W = 0, and no sum of squares needs more than small
-products of U, W and the errors of the grid.
+P projects on rotation and translations of every case (three columns on the rows of one case each). L contains
+the linear parameters without their projection by P, B the polynomials (both orthonormal). Further, U = [L, (I
+- P) B], W = [L, (I - P - L L^T) B] and P U = P W = 0. Sums of squares require only small products of U, W and
+the errors of the grid.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class GridErrors:
-    """Errors e of the coordinates of one plate and their effect on comparator residuals, v = E e."""
+    """Coordinate errors e of one plate and their effect on residuals, v = E e."""
 
     cases: Indices  # Indices of the cases on the plate
-    rows: Indices  # (n,) the measured point and the point of the plate of each non-zero block of E
+    rows: Indices  # (n,) measured point and plate point of each non-zero block of E
     columns: Indices
-    turns: Floats  # (n, 2, 2) the blocks: rotations, mirrored where the comparator is left-handed
-    counts: Indices  # (l,) in how many cases each point was measured
+    turns: Floats  # (n, 2, 2) blocks: rotations, mirrored if the comparator is left-handed
+    counts: Indices  # (l,) number of cases per point
 
     @classmethod
     def of(
@@ -43,7 +43,7 @@ class GridErrors:
         cases: Sequence[PlacedCase],
         stage: CombinedLinear | CombinedPolynomial,
     ) -> GridErrors:
-        """Return them from the cases, and for each the rows of its points on its plate."""
+        """Return the errors of a plate from its cases and point rows."""
         own = [k for k, case in enumerate(cases) if case.case.plate == plate]
         starts = np.cumsum([0, *(len(case.points) for case in cases)])
         points, columns = np.unique(np.concatenate([grid_rows[k] for k in own]), return_inverse=True)
@@ -60,7 +60,7 @@ class GridErrors:
         )
 
     def gathered(self, values: Floats) -> Floats:
-        """Return E^T times columns: (points measured, 2, ...) to (points of the plate, 2, ...)."""
+        """Return E^T times columns: (measured points, 2, ...) to (plate points, 2, ...)."""
         turned = np.einsum("nji,nj...->ni...", self.turns, values[self.rows])
         flat = turned.reshape(len(turned), -1)
         sums = [np.bincount(self.columns, weights=column, minlength=len(self.counts)) for column in flat.T]
@@ -68,13 +68,13 @@ class GridErrors:
         return gathered.reshape(len(self.counts), *turned.shape[1:])
 
     def average(self, values: Floats) -> Floats:
-        """Return columns turned into the grid system and averaged by point (sign apart)."""
+        """Return columns rotated into the grid system and averaged by point, up to sign."""
         return np.asarray((self.gathered(values).T / self.counts).T)
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """R, for m measured points in the order of the cases; columns have the shape (m, 2)."""
+    """Reduction R for m measured points in case order; columns have shape (m, 2)."""
 
     starts: Indices  # First row of each case
     rigid: Floats  # (m, 2, 3) the columns of P, each on the rows of its case
@@ -83,7 +83,7 @@ class Reduction:
 
     @classmethod
     def of(cls, stage: CombinedLinear | CombinedPolynomial) -> Reduction:
-        """Return what takes errors of readings to the residuals of a stage."""
+        """Return the reduction of reading errors to residuals of a stage."""
         places = [fit.residuals.xy_um for fit in stage.cases]
         everywhere = np.vstack(places)
         reduction = cls(
@@ -115,14 +115,14 @@ class Reduction:
         return np.asarray(values - np.einsum("nij,njk->nik", self.rigid, np.repeat(parts, lengths, axis=0)))
 
     def variances(self) -> Floats:
-        """Return the diagonal of R R^T, (m, 2): what errors of variance one leave in each coordinate."""
+        """Return the diagonal of R R^T, (m, 2): residual variances for unit variance."""
         inner = _product(self.right, self.right)
         rigid = (self.rigid**2).sum(axis=2)
         mixed = 2 * (self.left * self.right).sum(axis=2)
         return np.asarray(1 - rigid - mixed + ((self.left @ inner) * self.left).sum(axis=2))
 
     def squares_of_units(self) -> float:
-        """Sum of squares of R: what errors of readings of variance one leave."""
+        """Sum of squares of R: expected squares of residuals for unit variance."""
         left, right = _product(self.left, self.left), _product(self.right, self.right)
         trace = float((self.left * self.right).sum())
         return 2 * len(self.left) - 3 * len(self.starts) - 2 * trace + float((left * right).sum())
@@ -138,7 +138,7 @@ class Reduction:
         )
 
     def averages_of_units(self, errors: GridErrors) -> float:
-        """Sum of squares of A R, with A what averages by point."""
+        """Sum of squares of A R, with A the average by point."""
         left, right = errors.average(self.left), errors.average(self.right)
         rigid = (self.rigid[errors.rows] ** 2).sum(axis=(1, 2)) / errors.counts[errors.columns] ** 2
         return (
@@ -150,13 +150,13 @@ class Reduction:
     def averages_of_errors(self, averaged: GridErrors, errors: GridErrors, *, lost: bool = False) -> float:
         """Sum of squares of A R E, A of one plate, E of the same or another.
 
-        With `lost` that of I - A R E, of one plate: what averages do not show of its errors.
+        With `lost`, sum of squares of I - A R E of one plate: the errors that averages do not show.
         """
         left, right = averaged.average(self.left), errors.gathered(self.right)
         total = float((_product(left, left) * _product(right, right)).sum())
         if averaged is not errors:
             return total
-        # A E = I; A P E = X Y^T, three columns a case.
+        # A E = I; A P E = X Y^T, three columns per case.
         y = self._rigid_effects(errors)
         x = np.asarray((y.T / errors.counts).T)
         total += float((_product(x, x) * _product(y, y)).sum())
@@ -166,7 +166,7 @@ class Reduction:
         return total + 2 * len(errors.counts) - 2 * float((x * y).sum() + (left * right).sum())
 
     def _rigid_effects(self, errors: GridErrors) -> Floats:
-        """Return E^T P's columns: (l, 2, 3 times the cases of the plate)."""
+        """Return E^T times the columns of P: (l, 2, 3 times the cases of the plate)."""
         turned = np.einsum("nji,njk->nik", errors.turns, self.rigid[errors.rows])
         case = np.searchsorted(self.starts, errors.rows, side="right") - 1
         place = np.searchsorted(errors.cases, case)
@@ -188,7 +188,7 @@ def _rigid(xy_um: Floats) -> Floats:
 
 
 def _linear(arguments: Floats) -> Floats:
-    """Return the columns x in x, y in y, y in x: scales and lack of orthogonality (n, 2, 3)."""
+    """Return the columns of scales and lack of orthogonality, (n, 2, 3)."""
     columns = np.zeros((len(arguments), 2, 3))
     columns[:, 0, 0], columns[:, 1, 1], columns[:, 0, 2] = arguments[:, 0], arguments[:, 1], arguments[:, 1]
     return columns

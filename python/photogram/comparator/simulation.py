@@ -1,4 +1,4 @@
-"""Simulated calibrations, with the truth behind them: for tests, for planning, for the packaged example."""
+"""Simulated calibrations with true values, for tests, planning and the packaged example."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ IDEAL = Correction(1.0, 1.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A simulated session and what is true in it.
+    """Simulated session and its true values.
 
     Attributes
     ----------
     session
-        What would have been measured.
+        Simulated measurements.
     correction
         The true correction.
     grid_errors_um
-        (l, 2) true less given grid coordinates, in the axes of the plate.
+        (l, 2) true minus given grid coordinates, in the axes of the plate.
     """
 
     session: Session
@@ -62,38 +62,38 @@ def simulate_calibration(
     date: str = "",
     seed: int = 0,
 ) -> Simulation:
-    """Simulate the measurement of a plate in several placements, a quarter turn from each other.
+    """Simulate the measurement of a plate in placements rotated by 90 degrees each.
 
     Parameters
     ----------
     grid
-        The plate as it is given.
+        Plate with given coordinates.
     correction
-        What the readings would have to be corrected by.
+        True correction of the readings.
     cases, rotation_rad, centre_um
-        Number of placements, rotation of the first, and corrected comparator coordinates of the middle of the
-        plate.
+        Number of placements, rotation of the first, and corrected comparator coordinates of the plate centre.
     left_handed
-        Whether the comparator is left-handed against the plate.
+        Whether the comparator is left-handed relative to the plate.
     sequence
-        Points in the order of the pointings of a case; None for five on each, row by row, and three on the
-        first again.
+        Points in the order of the pointings of a case. None: five on each, row by row, and three on the first
+        again.
     pointing_um, random_um, grid_um
-        Standard deviations of a single pointing, of the comparator (once for each point and case), and of the
+        Standard deviations of a single pointing, of the comparator (one error per point and case), and of the
         given grid coordinates.
     grid_errors_um
-        (l, 2) true less given grid coordinates, instead of random ones.
+        (l, 2) true minus given grid coordinates, instead of random ones.
     least_count_um
-        Readings are rounded to multiples of this; 0 does not round.
+        Least count for rounding of readings; 0 disables rounding.
     operators
-        One for each four cases.
+        Operators, one per four cases.
     comparator, date, seed
         Number, date, and seed of the random numbers.
 
     Raises
     ------
     InputError
-        No operator, a rotation that is infinite, a negative seed, errors of another shape.
+        If `operators` is empty, if the rotation is infinite, if the seed is negative, or if the errors have
+        another shape.
     """
     if not operators or not math.isfinite(rotation_rad) or seed < 0:
         raise InputError(phrase("comparators.simulation"))
@@ -124,11 +124,11 @@ def simulate_calibration(
 
 
 DAYS = ("1970-01-15", "1970-07-02", "1971-01-20", "1971-06-28", "1972-01-11", "1972-07-17")
-STEP = 20e-6  # Of the x scale, before the fourth calibration
+STEP = 20e-6  # Step of the x scale before the fourth calibration
 
 
 def simulated_years() -> list[Calibration]:
-    """Calibrate comparator 3 of the example six times on grid 1320, whose errors stay the same."""
+    """Simulate six calibrations of comparator 3 on grid 1320 with constant errors."""
     grid = built_in_grid(1320)
     errors = np.random.default_rng(1320).standard_normal(grid.xy_um.shape) * (grid.sigma_um or 0.0)
     x = np.array([0.012, -0.004, -0.006, 0.003, 0.001, -0.001, 0.0, 0.0, 0.0])

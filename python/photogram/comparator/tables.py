@@ -1,4 +1,4 @@
-"""The tables of a calibration, each declared once: document and listing are written from them."""
+"""Tables of a calibration for document and listing."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LINEAR_AXES = (
 
 
 def variance(calibration: Calibration) -> Table:
-    """Return the analysis of variance: standard deviations of each axis and of both, line by line."""
+    """Return the analysis of variance: standard deviations of each axis and both."""
     own, plates = calibration.variance, calibration.plates
     stages = {
         "Before the calibration, everything": own.before,
@@ -64,7 +64,7 @@ def variance(calibration: Calibration) -> Table:
 def linear(
     found: Correction | Decomposition, covariance: Floats, freedom: int = 0, key: str = "linear"
 ) -> Table:
-    """Return scales, their ratio, lack of orthogonality with deviations by the covariance of the three."""
+    """Return scales, their ratio and lack of orthogonality with their sd."""
     x, y, lean = (getattr(found, name) for name in LINEAR)
     of_ratio = np.array([1 / y, -x / y**2])
     sd = np.sqrt([*np.diag(covariance)[:2], of_ratio @ covariance[:2, :2] @ of_ratio, covariance[2, 2]])
@@ -118,7 +118,7 @@ def _powers(names: Sequence[str]) -> Quantity:
 
 
 def cases(calibration: Calibration) -> Table:
-    """Return the cases with the adjustments of each alone, and with their parts in those of all."""
+    """Return the cases with separate and combined adjustments."""
     found, last, combined = calibration.cases, calibration.last_fits, calibration.linear.cases
     heads = {"free": "Unit weight, free", "linear": "after linear", "nonlinear": "after polynomials"}
     alone = [
@@ -181,7 +181,6 @@ def cases(calibration: Calibration) -> Table:
 
 
 def _stages(case: CaseResult) -> dict[str, Residuals]:
-    """Return the residuals of the adjustments of a case alone."""
     found = {"free": case.free.residuals, "linear": case.linear.residuals}
     return found | ({"nonlinear": case.polynomial.residuals} if case.polynomial else {})
 
@@ -208,7 +207,7 @@ def _closeouts(case: CaseResult) -> list[dict[str, object]]:
 
 
 def outliers(screening: Screening) -> Table:
-    """Return measured points that do not agree with the adjustment of the others."""
+    """Return measured points inconsistent with the adjustment of the others."""
     found = screening.outliers
     instead = ["none" if each.instead is None else str(each.instead) for each in found]
     columns = [
@@ -227,7 +226,7 @@ def outliers(screening: Screening) -> Table:
 
 
 def far_pointings(found: Sequence[FarPointing]) -> Table:
-    """Return single pointings that do not agree with the others of their case."""
+    """Return single pointings inconsistent with the others of their case."""
     columns = [
         of_each(found, "case", kind="name", head="Case"),
         of_each(found, "point", kind="name", head="Point"),

@@ -33,20 +33,20 @@ class AxisSigma:
         return math.sqrt((self.x**2 + self.y**2) / 2)
 
     def truncated(self) -> AxisSigma:
-        """Return both cut to whole nanometres, as SIGX and SIGY in the INTEGER array CAL of the listing."""
+        """Return both truncated to whole nanometres, as in the INTEGER array CAL."""
         return AxisSigma(math.floor(self.x * NM) / NM, math.floor(self.y * NM) / NM)
 
 
 @dataclass(frozen=True)
 class VarianceAnalysis:
-    """The lines of figure 30, standard deviations in micrometres."""
+    """Lines of figure 30, standard deviations in micrometres."""
 
-    before: AxisSigma  # Of the free adjustments: everything
-    after_linear: AxisSigma  # What the linear parameters leave; what the polynomials leave (None without)
+    before: AxisSigma  # Total error of the free adjustments
+    after_linear: AxisSigma  # Residual error after the linear parameters, and after the polynomials (or None)
     after_nonlinear: AxisSigma | None
-    pointing: AxisSigma  # Of a mean
-    grid: float  # Of a grid coordinate
-    linear: float  # Their shares; 0 where the difference of variances is negative (`negative` names it)
+    pointing: AxisSigma  # Pointing error of a mean
+    grid: float  # Error of a grid coordinate
+    linear: float  # Components; 0 if the difference of variances is negative (`negative` names it)
     nonlinear: float
     random: float
     negative: tuple[str, ...]  # Names of the components whose estimated variance is negative
@@ -65,7 +65,10 @@ class VarianceAnalysis:
 
 
 def difference(total: float, *parts: float) -> tuple[float, bool]:
-    """Return the root of total^2 less squares of the parts (0 if negative), and whether it was."""
+    """Return the root of total^2 minus squares of the parts, and whether it is < 0.
+
+    The root of a negative difference is 0.
+    """
     variance = total**2 - sum(part**2 for part in parts)
     return math.sqrt(max(0.0, variance)), variance < 0
 
@@ -79,11 +82,11 @@ def analyse_variance(
     *,
     as_listed: bool = False,
 ) -> VarianceAnalysis:
-    """Split the total error of the free adjustments into linear, nonlinear, grid, pointing and random.
+    """Split the total error into linear, nonlinear, grid, pointing and random parts.
 
-    Without polynomials the nonlinear share is 0. `pointing` is the pooled precision of all pointings
-    (equation 30). `as_listed` cuts the sigmas after the linear stage (SIGX, SIGY) to whole nanometres first:
-    the listing reads them from the INTEGER array of its cards.
+    Without polynomials the nonlinear part is 0. `pointing` is the pooled precision of all pointings (equation
+    30). `as_listed` truncates the sigmas after the linear stage (SIGX, SIGY) to whole nanometres, as the
+    INTEGER array of cards in the listing.
     """
     before = _pooled(free, sum(len(fit.residuals.points) - 1.5 for fit in free))
     # nu of equation 57 counts both axes.
@@ -115,7 +118,7 @@ def _pooled(fits: Sequence[RigidFit], dof: float) -> AxisSigma:
     return AxisSigma(math.sqrt(squares[0]), math.sqrt(squares[1]))
 
 
-# Terms that are tested: those of first and zeroth degree belong to the linear parameters as well
+# Tested terms: terms of first and zeroth degree belong to the linear parameters as well
 OWN_TERMS = 6
 
 
@@ -123,11 +126,11 @@ OWN_TERMS = 6
 class TermTest:
     """Student's test of one term, given all others."""
 
-    axis: str  # `x` or `y`, and the term, its argument counted from the middle of the measured range
+    axis: str  # `x` or `y`, and the term, its argument relative to the centre of the measured range
     term: str
     coefficient_um: float  # Its effect at the edge of the range, and the standard deviation
     sd_um: float
-    probability: float | None  # Of a ratio as large as this (two-sided) without the term
+    probability: float | None  # Two-sided probability of an equal or larger ratio without the term
 
     @property
     def ratio(self) -> float:
@@ -137,24 +140,24 @@ class TermTest:
 
 @dataclass(frozen=True)
 class PolynomialTest:
-    """Fisher's test of all terms together, and Student's of each."""
+    """Fisher's test of all terms together, and Student's test of each."""
 
-    ratio: float  # F, and its two degrees of freedom
+    ratio: float  # F and its two degrees of freedom
     degrees_of_freedom: tuple[int, int]
-    probability: float | None  # Of so large a ratio without polynomials
+    probability: float | None  # Probability of an equal or larger ratio without polynomials
     terms: tuple[TermTest, ...]  # Each term
 
 
 @dataclass(frozen=True)
 class CaseVarianceTest:
-    """Tests of equal variances of the cases: Hartley's F-max, as the report says, and two more."""
+    """Tests of equal case variances: Hartley's F-max of the report, and two more."""
 
     f_max: float  # Largest variance of unit weight of a single case over the smallest
-    degrees_of_freedom: int  # The fewest of a case
-    # Of so large a ratio for equal variances, and the ratio of probability 0.05
+    degrees_of_freedom: int  # Least degrees of freedom of a case
+    # Probability of an equal or larger ratio for equal variances, and the ratio of probability 0.05
     f_max_probability: float | None
     f_max_limit: float | None
-    bartlett_probability: float | None  # Of Bartlett's and Levene's tests
+    bartlett_probability: float | None  # Probabilities of Bartlett's and Levene's tests
     levene_probability: float | None
 
 
@@ -180,19 +183,17 @@ def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> P
 
 
 def _fisher(ratio: float, first: float, second: float) -> float | None:
-    """Return the probability that Fisher's variable exceeds a ratio."""
     return None if math.isnan(ratio) else float(np.exp(log_fisher(ratio, first, second)))
 
 
 def _chi_square(x: ArrayLike, dof: float) -> Floats:
-    """Return the probability that a chi-square variable exceeds x."""
     return np.asarray(np.exp(log_chi_square(x, dof)))
 
 
 def compare_case_variances(residuals: Sequence[Floats]) -> CaseVarianceTest | None:
-    """Compare the variances of unit weight of linear adjustments, by their residuals (n, 2) in micrometres.
+    """Compare the variances of unit weight of linear fits from residuals (n, 2), um.
 
-    If degrees of freedom differ, F-max has the fewest, on the safe side. None for one case.
+    F-max uses the least degrees of freedom, which is conservative. None for one case.
     """
     if len(residuals) < 2:
         return None
@@ -220,7 +221,7 @@ def _bartlett(variances: Floats, dof: Indices) -> float:
 
 
 def _levene(groups: Sequence[Floats]) -> float | None:
-    """Return the probability of Levene's statistic, with deviations from medians (Brown and Forsythe)."""
+    """Return the probability of Levene's statistic from medians (Brown and Forsythe)."""
     away = [np.abs(values - np.median(values)) for values in groups]
     counts, means = np.array([len(values) for values in away]), np.array([values.mean() for values in away])
     between = counts @ (means - counts @ means / counts.sum()) ** 2 / (len(groups) - 1)
@@ -229,10 +230,10 @@ def _levene(groups: Sequence[Floats]) -> float | None:
 
 
 def _f_max_tail(ratio: float, groups: int, dof: int) -> float:
-    """Return the probability that the largest of variances is `ratio` times the smallest, or more.
+    """Return the probability that the ratio of extreme variances is at least `ratio`.
 
-    1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), with G the distribution of
-    chi squared: x is the smallest. Gauss-Legendre nodes.
+    It is 1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), by Gauss-Legendre
+    nodes. G is the chi-squared distribution and x the smallest variance.
     """
     u, weights, x = _nodes(dof)
     inside = 1 - _chi_square(ratio * x, dof) - u
@@ -241,7 +242,7 @@ def _f_max_tail(ratio: float, groups: int, dof: int) -> float:
 
 @cache
 def _nodes(dof: int) -> tuple[Floats, Floats, Floats]:
-    """Return Gauss-Legendre nodes and weights from 0 to 1, and quantiles of chi squared at the nodes."""
+    """Return Gauss-Legendre nodes and weights from 0 to 1, and chi-squared quantiles."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     u = (nodes + 1) / 2
     return u, weights / 2, np.array([critical_chi_square(1 - each, dof) for each in u.tolist()])

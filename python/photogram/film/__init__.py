@@ -1,4 +1,4 @@
-"""Film and plates: certificates of their cameras, what years make of these, interior orientations."""
+"""Calibration certificates of film and plate cameras, comparison over years, interior orientation."""
 
 from photogram.arguments.on_demand import attach_checked
 

@@ -1,4 +1,4 @@
-"""Certificates of film cameras: marks, distances between them, principal distance, lens."""
+"""Calibration certificates of film cameras: fiducial marks, distances, principal distance, lens."""
 
 from __future__ import annotations
 
@@ -40,23 +40,23 @@ from photogram.words import Phrase, phrase
 SD_DESIGN = 0.02
 SD_C = 0.003
 SD_PRINCIPAL_POINT = 0.003
-SD_UNKNOWN_POINT = 0.02  # Of an unknown principal point, or if distances alone determine the marks (mm)
-APART = 3.0  # Notable distance of the points of symmetry and autocollimation, in standard deviations
+SD_UNKNOWN_POINT = 0.02  # If the principal point is unknown, or distances alone determine the marks (mm)
+APART = 3.0  # Significant distance of the points of symmetry and autocollimation, in standard deviations
 PRINTED = 2e-3  # Largest difference of printed coefficients from the table of distortion, millimetres
 
 
 @dataclass(frozen=True, eq=False)
 class CalibratedMarks:
-    """Places of n fiducial marks.
+    """Coordinates of n fiducial marks.
 
     Attributes
     ----------
     names
-        By side, the data strip at the left.
+        Names of the marks by side, data strip at the left.
     xy, covariance
-        (n, 2) mm, and (2n, 2n) mm^2, x and y of a mark behind each other; singular where the figure is free.
+        (n, 2) mm, and (2n, 2n) mm^2, ordered x, y per mark. Singular if the marks are a free network.
     adjusted
-        The adjustment of distances that they are from; None where coordinates are given.
+        The adjustment of distances that determined the marks; None if coordinates are given.
     """
 
     names: tuple[str, ...]
@@ -67,49 +67,51 @@ class CalibratedMarks:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Certificate(Documented, Judged, Brief):
-    """A certificate, mm, the data strip at the left. :meth:`read` reads files.
+    """Calibration certificate in mm, data strip at the left. :meth:`read` reads files.
 
     Parameters
     ----------
     name
-        The camera.
+        Name of the camera.
     camera_type
-        As `Wild RC10`: for the usual places of its marks.
+        Camera type, such as `Wild RC10`. It selects the usual coordinates of the marks.
     day
-        Of the calibration.
+        Date of the calibration.
     c, sd_c
-        Calibrated focal length, and its standard deviation (0.003).
+        Calibrated focal length and its standard deviation (0.003).
     reference
-        What coordinates refer to: `fiducial-centre`, `autocollimation` or `symmetry`.
+        Origin of the coordinates: `fiducial-centre`, `autocollimation` or `symmetry`.
     autocollimation, symmetry
-        In the frame of the marks.
+        Coordinates of both points in the frame of the marks.
     sd_principal_point
-        Of these (0.003).
+        Standard deviation of the principal point (0.003).
     places
-        Of marks by name.
+        Coordinates of the marks, by name.
     sd_places, covariance
-        Of coordinates (0.002), or all of them as names `ll.x` .. with their matrix.
+        Standard deviation of a coordinate (0.002), or all coordinate names `ll.x` ... with their covariance
+        matrix.
     distances
-        Between marks.
+        Calibrated distances between marks.
     design, sd_design
-        Where marks are meant to be, and how near they are to that (0.02): by default as is usual of the type.
+        Nominal coordinates of the marks and their standard deviation (0.02), by default the usual ones of the
+        type.
     lines
-        How and where lines of marks cross.
+        Angles and intersections of the lines through marks.
     radial, tangential
-        The table of distortion that belongs to c; decentring.
+        The distortion table that belongs to c, and the decentring distortion.
     radial_coefficients
-        K0, K1 ... as a report prints them: mm, with r in mm.
+        Printed coefficients K0, K1 ...: mm, with r in mm.
     typed
-        Figures as they were typed, by fields: `ll.x`, `ml-mr`; those that are missing are written anew.
+        Transcribed values by field: `ll.x`, `ml-mr`. Missing ones are generated.
     remarks
-        What was said while it was read.
+        Warnings of the reader.
     file
-        From which it was read.
+        File of the certificate.
 
     Raises
     ------
     InputError
-        A reference that is not known; a principal point that is the origin, and elsewhere.
+        If the reference is unknown, or if the principal point is the origin but has other coordinates.
     """
 
     name: str = ""
@@ -148,14 +150,14 @@ class Certificate(Documented, Judged, Brief):
         Parameters
         ----------
         path
-            TOML, or a table `fiducials` (docs/certificates.md).
+            TOML file, or a table `fiducials` (docs/certificates.md).
         camera
-            Which one, where a table has several.
+            Camera to read if a table contains several.
 
         Raises
         ------
         InputError
-            The file cannot be read, or has what is not known or cannot be used.
+            If the file cannot be read, or has unknown or invalid content.
         """
         file = Path(path)
         if file.suffix.lower() == ".toml":
@@ -165,7 +167,7 @@ class Certificate(Documented, Judged, Brief):
         return cls(**read_table(file, camera))
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what it is in a few lines."""
+        """Return a short summary of the certificate."""
         rows = [
             ("marks", listed(list(self.places) or self._of_distances())),
             ("distances", f"{len(self.distances)}"),
@@ -176,7 +178,7 @@ class Certificate(Documented, Judged, Brief):
         return f"Certificate {self.name}, {self.day or 'without a date'}", rows
 
     def check(self) -> tuple[DistanceDifference, ...]:
-        """Compare distances with coordinates where both are given; explain those beyond 0.010 mm."""
+        """Compare distances with coordinates and explain differences beyond 0.010 mm."""
         figures = {
             f"{mark}.{axis}": repr(v)
             for mark, xy in self.places.items()
@@ -196,14 +198,14 @@ class Certificate(Documented, Judged, Brief):
         return {**({} if usual is None else usual.places(names)), **self.design}
 
     def fiducials(self) -> CalibratedMarks:
-        """Return the places of the marks with their covariance: as given, or from distances.
+        """Return coordinates and covariance of the marks, as given or from distances.
 
         Raises
         ------
         InputError
-            There are neither coordinates nor distances; marks of distances without a design place.
+            If both coordinates and distances are missing, or if a mark lacks design coordinates.
         AdjustmentError
-            Distances that do not belong to the design places.
+            If the distances contradict the design coordinates.
         """
         return self._marks
 
@@ -240,12 +242,12 @@ class Certificate(Documented, Judged, Brief):
         return SD_DESIGN if usual is None or mark in self.design else usual.sd(mark)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return the fits of the table of distortion with one odd term, two, three.
+        """Return the fits of the distortion table with one, two and three odd terms.
 
         Raises
         ------
         InputError
-            There is no table, or one that is too short.
+            If the table is missing or too short.
         """
         if self.radial is None or self.c is None:
             raise self._error("films.no-distortion")
@@ -256,12 +258,12 @@ class Certificate(Documented, Judged, Brief):
         return SD_C if self.sd_c is None else self.sd_c
 
     def curve(self, terms: int | None = None) -> Curve:
-        """Return the fitted curve of distortion with some odd terms; as many as the table asks for when None.
+        """Return the distortion curve with `terms` odd terms; None: chosen by tests.
 
         Raises
         ------
         InputError
-            As :meth:`curves`; fewer angles than unknowns.
+            As :meth:`curves`, or if there are fewer angles than unknowns.
         """
         if terms is None:
             return chosen(self.curves())
@@ -271,7 +273,7 @@ class Certificate(Documented, Judged, Brief):
 
     @property
     def principal_point(self) -> tuple[tuple[float, float], float, str]:
-        """Where it is in the frame of the marks (mm), its standard deviation, and which point that is."""
+        """Principal point in the frame of the marks (mm), its sd (mm) and its name."""
         given = {"autocollimation": self.autocollimation, "symmetry": self.symmetry}
         if self.reference in given:
             given[self.reference] = (0.0, 0.0)
@@ -284,12 +286,12 @@ class Certificate(Documented, Judged, Brief):
     def lens(
         self, model: Literal["brown_forward", "brown"] = "brown_forward", terms: int | None = None
     ) -> LensParameters:
-        """Return c and the radial terms with their covariance; without a table c alone.
+        """Return c and the radial terms with their covariance; without a table only c.
 
         Raises
         ------
         InputError
-            There is no focal length; as :meth:`curve`.
+            If the focal length is missing, or as :meth:`curve`.
         """
         one_of("model", model, ("brown_forward", "brown"))
         if self.c is None:
@@ -301,19 +303,20 @@ class Certificate(Documented, Judged, Brief):
     def camera(
         self, model: Literal["brown_forward", "brown"] = "brown_forward", terms: int | None = None
     ) -> Camera:
-        """Return the camera as blocks take it: c, principal point, lens, observed with their covariance.
+        """Return the camera with c, principal point and lens weighted by their covariance.
 
         Parameters
         ----------
         model
-            `brown_forward`: the same mapping as the curve of distortion; `brown`: corrections, converted.
+            `brown_forward`: the same mapping as the distortion curve. `brown`: converted to corrections.
         terms
-            Odd terms of the curve; as many as the table asks for when None.
+            Odd terms of the curve. If None, tests choose their number.
 
         Raises
         ------
         InputError
-            There is no focal length, a table that does not determine the terms, decentring for `brown`.
+            If the focal length is missing, if the table does not determine the terms, or if `brown` is used
+            with decentring.
         """
         lens = self.lens(model, terms)
         (xp, yp), sd, _ = self.principal_point
@@ -336,13 +339,13 @@ class Certificate(Documented, Judged, Brief):
         )
 
     def printed_coefficients(self) -> float | None:
-        """Return by how much K0, K1 ... as printed differ from the table at most, mm; None without either."""
+        """Return the largest deviation of printed K0, K1 ... from the table, mm, or None."""
         if not self.radial_coefficients or self.radial is None or self.c is None:
             return None
         return self._printed_less(1.0)
 
     def _printed_less(self, sign: float) -> float:
-        """Return by how much printed coefficients differ at most from the table with a sign, mm."""
+        """Return the largest deviation of printed coefficients from the signed table, mm."""
         assert self.radial is not None
         assert self.c is not None
         radius = self.c * np.tan(self.radial.angle)
@@ -350,7 +353,7 @@ class Certificate(Documented, Judged, Brief):
         return float(np.abs(powers @ self.radial_coefficients - sign * self.radial.distortion).max())
 
     def document(self) -> Document:
-        """Return the document of the certificate: distances, marks, lens, camera."""
+        """Return the document with distances, marks, lens and camera."""
         from photogram.film.certificate_document import certificate_document
 
         return certificate_document(self)
@@ -361,7 +364,7 @@ class Certificate(Documented, Judged, Brief):
         return certificate_findings(self)
 
     def told(self) -> list[str | Phrase]:
-        """Return remarks beside the verdict."""
+        """Return warnings in addition to the verdict."""
         remarks: list[str | Phrase] = [*self.remarks]
         difference = self.printed_coefficients()
         if difference is not None and difference > PRINTED:

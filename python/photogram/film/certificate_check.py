@@ -1,8 +1,8 @@
-"""Calibrated distances and calibrated coordinates: differences, and single changes that explain them.
+"""Calibrated distances compared with coordinates, and single corrections that explain differences.
 
-Certificates were typed by hand, often twice. All variants of a distance and its four coordinates by one
-typing error are tested: neighbouring digits exchanged, the sign, one digit, one digit lost or added.
-No figure is changed.
+Certificates were transcribed by hand, often twice. One transcription error is tested in a distance and its
+four coordinates: neighbouring digits exchanged, the sign, one digit, one digit lost or added. No value is
+changed.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ How = Literal["exchange", "sign", "digit", "lost or extra"]
 
 LIMIT = 0.010  # Largest difference of a distance from its coordinates, millimetres
 EXPLAINED = 0.0035  # Largest remaining difference if a change explains it, millimetres
-SAME = 1e-9  # Differences that are equal except for rounding, millimetres
+SAME = 1e-9  # Tolerance for equal differences, millimetres
 _LEADING_ZERO = re.compile(r"[-+]?0\d")
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """One change of one typed figure that explains a difference.
+    """Single correction of a transcribed value that explains a difference.
 
     Attributes
     ----------
     field
-        `ml.x`, or the distance, `ml-mr`.
+        Coordinate `ml.x`, or distance `ml-mr`.
     typed, perhaps
-        The figure as it stands there, and as it was perhaps meant.
+        The transcribed value, and the probable original value.
     how
         `exchange` of neighbouring digits, `sign`, `digit`, `lost or extra`.
     remaining
-        What the difference then is, mm.
+        Remaining difference, mm.
     from_usual
-        The changed coordinate less that of the usual place of the mark, mm; None where that is not known.
+        The corrected coordinate minus the usual one of the mark, mm; None if that is unknown.
     """
 
     field: str
@@ -54,16 +54,16 @@ class Explanation:
 
 @dataclass(frozen=True)
 class DistanceDifference:
-    """A distance beside the coordinates of its marks.
+    """Calibrated distance and the distance computed from the coordinates of its marks.
 
     Attributes
     ----------
     name
-        `ml-mr`.
+        Name of the distance, such as `ml-mr`.
     distance, from_coordinates
-        Millimetres.
+        Both distances, mm.
     explanations
-        Single changes of a figure that explain a difference beyond 0.010 mm, the likeliest first.
+        Single corrections that explain a difference beyond 0.010 mm, most probable first.
     """
 
     name: str
@@ -73,12 +73,12 @@ class DistanceDifference:
 
     @property
     def difference(self) -> float:
-        """Distance less that from coordinates, mm."""
+        """Calibrated minus computed distance, mm."""
         return self.distance - self.from_coordinates
 
     @property
     def beyond(self) -> bool:
-        """Whether it is larger than 0.010 mm."""
+        """Whether the difference is larger than 0.010 mm."""
         return abs(self.difference) > LIMIT
 
     def __str__(self) -> str:
@@ -86,7 +86,7 @@ class DistanceDifference:
 
 
 def difference_message(difference: DistanceDifference) -> Phrase:
-    """Return the message of a distance: the likeliest change, and the second one or the number of others."""
+    """Return the message of a distance with its most probable explanations."""
     changes = [phrase("films.change", **vars(each)) for each in difference.explanations[:2]]
     others = len(difference.explanations) - 1
     fields = {"distance": difference.distance, "coordinates": difference.from_coordinates}
@@ -102,10 +102,9 @@ def difference_message(difference: DistanceDifference) -> Phrase:
 def difference_of(
     first: str, second: str, typed: Mapping[str, str], usual: Mapping[str, tuple[float, float]]
 ) -> DistanceDifference:
-    """Compare a distance with the coordinates of its marks; explain differences of more than 0.010 mm.
+    """Compare a distance with the coordinates of its marks and explain the difference.
 
-    `typed` are all figures as typed in the certificate, by their fields; `usual` the usual places of marks
-    (mm), if they are known.
+    `typed` contains all transcribed values by field, `usual` the usual coordinates of marks (mm), if known.
     """
     name = f"{first}-{second}"
     fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
@@ -119,12 +118,11 @@ def difference_of(
 def explained(
     fields: Sequence[str], typed: Mapping[str, str], places: Mapping[str, float]
 ) -> tuple[Explanation, ...]:
-    """Return the single changes that bring a distance and four coordinates together.
+    """Return the single corrections that reconcile a distance with four coordinates.
 
-    In the order of the kinds of slips and, among changes of a kind, by how far from its usual place the
-    farthest of both marks then is; where these are not known, by what is left. Fields are x and y of the one
-    and of the other mark, then the distance; `typed` the figures by these, `places` usual coordinates as far
-    as they are known.
+    They are sorted by type of error, then by the largest distance of a mark from its usual coordinates. If
+    these are unknown, the remaining difference is the second criterion. `fields` are x and y of both marks,
+    then the distance; `typed` contains their values, `places` the known usual coordinates.
     """
     found: list[tuple[tuple[int, float, int, int], Explanation]] = []
     kinds = get_args(How)
@@ -146,7 +144,7 @@ def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:
 
 
 def _variants(text: str) -> Iterator[tuple[How, str]]:
-    """Yield the other numbers that one typing error makes of a number, each once for a kind of error."""
+    """Yield the numbers that one transcription error produces, once per error type."""
     seen: set[tuple[How, str]] = set()
     for how, variant in _slips(text):
         try:

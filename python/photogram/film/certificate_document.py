@@ -1,4 +1,4 @@
-"""The document of a certificate and its findings; `docs/certificates.md` lists the members of its JSON."""
+"""Document of a certificate and its findings (JSON members: `docs/certificates.md`)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,6 @@ def certificate_document(certificate: Certificate) -> Document:
 
 
 def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
-    """Return the parts on marks, and their members in JSON."""
     if not (certificate.places or certificate.distances):
         return [], None
     found = certificate.fiducials()
@@ -98,7 +97,6 @@ def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]
 
 
 def _lens(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
-    """Return the parts on the lens, and their members in JSON."""
     if certificate.radial is None:
         return [], None
     own = certificate.curve()
@@ -122,7 +120,7 @@ def _camera_members(camera: Camera) -> dict[str, Any]:
 
 
 def _cameras(certificate: Certificate) -> list[Camera]:
-    """Return the camera forward and, where decentring allows, backward; none without a focal length."""
+    """Return the forward camera and, without decentring, the backward one."""
     if certificate.c is None:
         return []
     if certificate.radial is None or certificate.tangential is not None:
@@ -131,7 +129,6 @@ def _cameras(certificate: Certificate) -> list[Camera]:
 
 
 def _facts(certificate: Certificate) -> list[Fact]:
-    """Return what it is of, and how it was taken."""
     (xp, yp), sd, what = certificate.principal_point
     facts = [
         Fact("Camera", certificate.name, note=certificate.camera_type),
@@ -166,7 +163,7 @@ def _sketch(certificate: Certificate) -> Plot:
 
 
 def certificate_findings(certificate: Certificate) -> Findings:
-    """Return the tests of a certificate: distances with coordinates, distances alone, the lens."""
+    """Return the tests of a certificate: distances and coordinates, distances, lens."""
     compared = certificate.check()
     beyond = [difference_message(each) for each in compared if each.beyond]
     tests: list[Tested] = []
@@ -207,7 +204,6 @@ def _distances(adjusted: AdjustedMarks) -> Tested:
 
 
 def _compared(certificate: Certificate) -> Tested:
-    """Return differences of distances from coordinates over the standard deviations of both."""
     marks, compared = certificate.fiducials(), certificate.check()
     of = {name: row for row, name in enumerate(marks.names)}
     cofactors = marks.covariance.reshape(len(of), 2, len(of), 2)
@@ -223,7 +219,7 @@ def _compared(certificate: Certificate) -> Tested:
 
 
 def _agreement(certificate: Certificate) -> list[Phrase]:
-    """Return whether distances agree with coordinates, or what determines a figure of distances."""
+    """Return the agreement of distances and coordinates, or the datum of distances."""
     compared = certificate.check()
     if compared and not any(each.beyond for each in compared):
         largest = max(abs(each.difference) for each in compared)

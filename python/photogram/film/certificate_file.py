@@ -1,6 +1,6 @@
-"""Certificates in files (docs/certificates.md): TOML, or the table `fiducials` of plain projects.
+"""Certificate files (docs/certificates.md): TOML, or the table `fiducials` of plain projects.
 
-What stands in TOML is turned, the data strip at the left.
+TOML coordinates are rotated so that the data strip is at the left.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ _KEYS = (
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the fields of a :class:`~photogram.film.certificate.Certificate` from a file.
+    """Return the fields of a certificate from a TOML file.
 
-    InputError: the file cannot be read, is no TOML, or has what is not known or cannot be used.
+    InputError: if the file cannot be read or contains unknown or invalid entries.
     """
     table = read_document(path, {"certificate": _KEYS}).table("certificate")
     table.choice("unit", ("mm",), "mm")
@@ -82,12 +82,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     return found
 
 
-REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")  # What coordinates of marks may refer to
+REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")  # Possible origins of coordinates
 
 
 class _Frame:
-    """Marks and places of a file, turned; and the figures as typed."""
-
     def __init__(self, data_strip: DataStrip, path: Path) -> None:
         self.data_strip, self.typed = data_strip, dict[str, str]()
         text = "\n".join(TomlFile(path).lines)
@@ -116,7 +114,7 @@ class _Frame:
         return found
 
     def _keep(self, name: str, texts: list[str]) -> None:
-        """Store coordinates as typed; if they are turned, with exchanged places and signs."""
+        """Store transcribed coordinates, rotated if the strip is at the top."""
         x, y = texts
         if self.data_strip == "top":
             x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
@@ -161,7 +159,6 @@ class _Frame:
 
 
 def _text(value: Any) -> str:
-    """Return a number as it was typed."""
     return str(value).replace("_", "")
 
 
@@ -180,7 +177,6 @@ def _day(table: Table) -> date | None:
 
 
 def _numbers(table: Table, key: str, count: int | None = None) -> Floats:
-    """Return a list of finite numbers, of any length if the count is None."""
     found = np.array(table.numbers(key, len(table.items(key)) if count is None else count))
     if not np.isfinite(found).all():
         raise table.error(key, phrase("error.finite", value=math.inf))
@@ -195,7 +191,7 @@ def _sign(table: Table, key: str) -> int:
 
 
 def _angles(own: Table, c: float | None) -> Floats:
-    """Return angles from the axis, rad, of a table with angles in degrees or radii in mm."""
+    """Return angles from the axis (rad) given in degrees or as radii in mm."""
     if ("angle" in own) == ("radius" in own):
         raise own.error("angle", phrase("error.exclusive", first="angle", second="radius"))
     key = "angle" if "angle" in own else "radius"
@@ -271,11 +267,11 @@ _COLUMNS = ("camera", "fiducial", *_NUMBERS, "use")
 
 
 def read_table(path: Path, camera: str | None) -> dict[str, Any]:
-    """Return the fields of a certificate from a table `camera, fiducial, x, y, sd_x, sd_y, use`.
+    """Return the fields of a certificate from a table of fiducial marks.
 
     Marks with `use` off are not used. A table `covariances` in the same folder (`kind, name, first, second,
-    covariance`; kind `fiducials`) replaces standard deviations. InputError: the file cannot be read, lacks a
-    column, has other ones, or several cameras of which none is chosen.
+    covariance`; kind `fiducials`) replaces standard deviations. InputError: if the file cannot be read, has
+    missing or unknown columns, or contains several cameras and none is chosen.
     """
     table = read_columns(path, known=_COLUMNS, numbers=_NUMBERS)
     table.require("camera", "fiducial", "x", "y")
@@ -326,7 +322,7 @@ def _used(table: ColumnTable, row: int) -> bool:
 
 
 def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Floats:
-    """Return the matrix of coordinates in mm^2: of the table of covariances, or of standard deviations."""
+    """Return the covariance matrix (mm^2) of the file, or of standard deviations."""
     found = np.diag(sd**2)
     if not path.exists():
         return found

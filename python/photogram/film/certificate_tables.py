@@ -1,4 +1,4 @@
-"""The tables of a certificate, each declared once."""
+"""Tables of a certificate."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 MM = (Axis("", "mm", small="um", factor=1e3),)
 XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))
-RADII = 8  # along the curve of a table
+RADII = 8  # points of the printed distortion curve
 
 
 def marks(found: CalibratedMarks) -> Table:
-    """Return the marks with their places and standard deviations."""
+    """Return the marks with their coordinates and standard deviations."""
     sd = np.sqrt(np.diag(found.covariance)).reshape(-1, 2)
     columns = [
         Quantity([*found.names], kind="name", member="mark", head="Mark"),
@@ -36,7 +36,7 @@ def marks(found: CalibratedMarks) -> Table:
 
 
 def compared(differences: Sequence[DistanceDifference]) -> Table:
-    """Return distances, those from coordinates, and single changes that explain the difference."""
+    """Return given and computed distances, and corrections that explain differences."""
     given, computed, apart = (
         np.array([getattr(each, name) for each in differences])
         for name in ("distance", "from_coordinates", "difference")
@@ -58,7 +58,7 @@ def compared(differences: Sequence[DistanceDifference]) -> Table:
 
 
 def explanations(differences: Sequence[DistanceDifference]) -> Table:
-    """Return the single changes of a figure that explain differences, with the remaining difference."""
+    """Return the single corrections that explain differences, and the remaining ones."""
     pairs: list[tuple[str, Explanation | None]] = [
         (each.name, one)
         for each in differences
@@ -78,12 +78,11 @@ def explanations(differences: Sequence[DistanceDifference]) -> Table:
 def _mm(
     values: Floats, kind: Kind, member: str, head: str, decimals: int, marked: Bools | None = None
 ) -> Quantity:
-    """Return lengths in mm, small ones in um."""
     return Quantity(values, MM, kind, member=f"{member}_mm", head=head, decimals=decimals, marked=marked)
 
 
 def observed(found: AdjustedMarks, marked: Bools) -> Table:
-    """Return the adjusted observations with residuals, redundancy, w, and the error if one is wrong."""
+    """Return the adjusted observations with residuals, redundancy, w and error size."""
     of = np.array([int(name.startswith("angle ")) for name in found.rows])
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.where(np.isnan(found.standardized), math.nan, found.residuals / found.redundancy)
@@ -100,7 +99,7 @@ def observed(found: AdjustedMarks, marked: Bools) -> Table:
 
 
 def distortion(table: RadialTable, found: Curve) -> Table:
-    """Return the table of distortion with the residuals of the chosen curve."""
+    """Return the distortion table with the residuals of the chosen curve."""
     angle = (Axis.turned("", "deg"),)
     columns = [
         Quantity(table.angle, angle, "value", member="angle_rad", head="Angle", decimals=2),
@@ -126,7 +125,7 @@ def curve(found: Curve) -> Table:
 
 
 def terms(curves: tuple[Curve, ...], taken: int) -> Table:
-    """Return how well one odd term, two, three fit; `taken` is the number that was chosen."""
+    """Return the fits with one to three odd terms; `taken` is the chosen number."""
     omega = [each.omega for each in curves]
     p = [each.test.probability_above if each.test else None for each in curves]
     freedom = [len(each.radius) - each.terms - 1 for each in curves]
@@ -146,7 +145,7 @@ def terms(curves: tuple[Curve, ...], taken: int) -> Table:
 
 
 def parameters(camera: Camera) -> Table:
-    """Return the parameters of a camera with their standard deviations, each in a row."""
+    """Return the parameters of a camera with their standard deviations, one per row."""
     assert camera.covariance is not None
     names, matrix = camera.covariance
     sd = np.sqrt(np.diag(np.asarray(matrix)))

@@ -1,11 +1,11 @@
-"""Places of fiducial marks from distances between them, by least squares in the plane, and their frame.
+"""Coordinates of fiducial marks from distances, by plane least squares, and their datum.
 
-Observations are distances s = |q_j - q_i|, and, if a report has them, the angle between lines through
-opposite marks and their intersection. If these determine the figure it is free: of all solutions the nearest
-to the design (inner constraints), with the pseudo-inverse as cofactors. Else design places are observations.
+Observations are distances s = |q_j - q_i| and optional angles and intersections of lines through opposite
+marks. If these determine the shape, the network is free: inner constraints choose the solution nearest to the
+design, and cofactors are the pseudo-inverse. Otherwise, design coordinates are additional observations.
 
-Blocks adjust points of photos, and have no angles between lines: this is a dense fit of some tens of unknowns
-(`photogram.statistics.fits`), linearised until nothing moves.
+Blocks adjust image points and do not support angles between lines. This is a dense fit of some tens of
+unknowns (`photogram.statistics.fits`), iterated to convergence.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
 
 MAX_STEPS = 50
-CONVERGED = 1e-13  # of the format
-DETERMINED = 1e-6  # least singular value of a determined movement, in parts of the largest
+CONVERGED = 1e-13  # relative to the format
+DETERMINED = 1e-6  # least singular value of a determined movement, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class MarkDistance:
     Attributes
     ----------
     first, second
-        Marks.
+        Names of the marks.
     length, sd
-        Millimetres.
+        Distance and its standard deviation, mm.
     """
 
     first: str
@@ -46,13 +46,13 @@ class MarkDistance:
 
     @property
     def name(self) -> str:
-        """What certificates call it: `ml-mr`."""
+        """Name in certificates: `ml-mr`."""
         return f"{self.first}-{self.second}"
 
 
 @dataclass(frozen=True)
 class RightAngle:
-    """The angle from the line first -> second to the line third -> fourth (radians, counter-clockwise)."""
+    """Angle from line first-second to line third-fourth (rad, counter-clockwise)."""
 
     marks: tuple[str, str, str, str]
     sd: float
@@ -61,7 +61,7 @@ class RightAngle:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where the line of two marks crosses that of two others (mm), with the sd of each coordinate."""
+    """Intersection of two lines through two marks each (mm), with one coordinate sd."""
 
     marks: tuple[str, str, str, str]
     sd: float
@@ -70,23 +70,23 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedMarks:
-    """Adjusted places of n marks, with their covariance and the tests of all r observed numbers.
+    """Adjusted coordinates of n marks, their covariance and tests of r observations.
 
     Attributes
     ----------
     names
-        The marks.
+        Names of the observations: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` for design coordinates.
     xy
         (n, 2) mm.
     covariance
-        (2n, 2n) mm^2 for a priori unit weight, x and y of a mark behind each other; of a free figure of rank
-        2n less its defects.
+        (2n, 2n) mm^2 for a priori unit weight, ordered x, y per mark. A free network has rank 2n minus its
+        datum defect.
     free
-        How many movements the observations leave open, taken from the design by inner constraints.
+        Datum defect, removed by inner constraints on the design.
     rows
         Names of the observed numbers: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` of design places.
     observed, sd, residuals
-        (r,) mm, angles in radians; residuals are observed minus computed.
+        (r,) mm, angles in radians. Residuals are observed minus computed.
     redundancy, standardized
         (r,) redundancy numbers and Baarda's w.
     test
@@ -107,13 +107,13 @@ class AdjustedMarks:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Rows less unknowns, movements that are left open counted as known."""
+        """Rows minus unknowns plus datum defect."""
         return len(self.rows) - self.xy.size + self.free
 
 
 @dataclass(frozen=True)
 class _Row:
-    """An observed number: computed value and partials (2n,) at places (n, 2)."""
+    """Observation with its computed value and partials (2n,) at coordinates (n, 2)."""
 
     name: str
     observed: float
@@ -129,24 +129,24 @@ def adjust_distances(
     design_sd: Floats,
     conditions: Sequence[RightAngle | Crossing] = (),
 ) -> AdjustedMarks:
-    """Adjust distances between marks.
+    """Adjust distances between fiducial marks.
 
     Parameters
     ----------
     names
-        The marks.
+        Names of the marks.
     design
-        (n, 2) places where they are meant to be, mm.
+        (n, 2) nominal coordinates, mm.
     distances, conditions
-        What was calibrated.
+        Calibrated distances, and optional angles and intersections.
     design_sd
-        (n,) standard deviations of single coordinates of design places, mm: they are observed where the
-        distances alone do not determine the figure.
+        (n,) standard deviations of nominal coordinates, mm. They are observations if the distances do not
+        determine the shape.
 
     Raises
     ------
     AdjustmentError
-        The iteration does not come to rest: design and distances are of other marks.
+        If the iteration does not converge because design and distances belong to different marks.
     """
     of = {name: row for row, name in enumerate(names)}
     rows = [_distance(each, of, len(names)) for each in distances]
@@ -175,7 +175,7 @@ def adjust_distances(
 
 
 def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floats, Fit, Floats]:
-    """Return places, the last fit, and the directions (2n, u) in which its parameters are."""
+    """Return coordinates, the last fit, and the directions (2n, u) of its parameters."""
     xy = design.astype(float)
     variances = np.diag([each.sd**2 for each in rows])
     for _ in range(MAX_STEPS):
@@ -186,7 +186,7 @@ def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floa
             break
         within = np.linalg.qr(left, mode="complete")[0][:, left.shape[1] :]
         fit = Fit.of(misfit, variances, a @ within)
-        # Unobserved movements bring the figure as near to the design as possible.
+        # Unobserved movements bring the network as near to the design as possible.
         step = within @ fit.parameters + left @ (left.T @ (design - xy).ravel())
         xy = xy + step.reshape(-1, 2)
         if np.abs(step).max() < CONVERGED * np.abs(design).max():
@@ -201,7 +201,7 @@ def _partials(rows: Sequence[_Row], xy: Floats) -> Floats:
 
 
 def _open(partials: Floats, xy: Floats) -> Floats | None:
-    """Return (2n, d) an orthonormal basis of the datum defect; None if rows do not determine the figure."""
+    """Return an orthonormal basis (2n, d) of the datum defect; None if rank-deficient."""
     n, whole = len(xy), _movements(xy)
     seen, size = np.linalg.svd(partials @ whole, full_matrices=True)[2], _sizes(partials @ whole, 3)
     largest = np.linalg.norm(partials, ord=2)
@@ -211,7 +211,7 @@ def _open(partials: Floats, xy: Floats) -> Floats | None:
 
 
 def _sizes(matrix: Floats, count: int) -> Floats:
-    """Return singular values of all `count` columns, zero of those beyond the rows."""
+    """Return `count` singular values, padded with zeros."""
     found = np.linalg.svd(matrix, compute_uv=False)
     return np.concatenate([found, np.zeros(count - len(found))])
 
@@ -254,7 +254,7 @@ def _crossing(each: Crossing, of: dict[str, int]) -> list[_Row]:
         a, b, apart = xy[j] - xy[i], xy[m] - xy[k], xy[k] - xy[i]
         normal_a, normal_b = np.array([-a[1], a[0]]), np.array([-b[1], b[0]])
         along_a, along_b = float(apart @ normal_b / (a @ normal_b)), float(-apart @ normal_a / (b @ normal_a))
-        # Both lines pass through the place: their normals' rows say how it moves.
+        # Both lines pass through the intersection: the rows of their normals give its movement.
         back = np.linalg.inv(np.array([normal_a, normal_b]))[axis]
         of_a, of_b = back[0] * normal_a, back[1] * normal_b
         parts = _spread(len(xy), {i: (1 - along_a) * of_a, j: along_a * of_a})
@@ -281,19 +281,19 @@ def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
     ]
 
 
-SINGULAR = 1e-9  # Least eigenvalue of a covariance that is not zero, in parts of the largest
-HELD = 1e-2  # Standard deviation of the frame in parts of the least one of the figure
+SINGULAR = 1e-9  # Least non-zero eigenvalue of a covariance, relative to the largest
+HELD = 1e-2  # Standard deviation of the datum relative to the least one of the shape
 
 
 def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
-    """Return a positive definite covariance of marks, and the number of movements that it fixes.
+    """Return a regular covariance of marks, and the number of constrained movements.
 
-    A figure from distances has no covariance of shifts and rotation, G: C G = 0. Its marks define the frame:
-    C + s^2 G G' with a small s. The placement of films, the principal point and kappa absorb shift and
-    rotation: only the variance of the principal point depends on s, by s^2/n.
+    A network of distances has zero covariance of shifts and rotation, G: C G = 0. Its marks define the datum:
+    C + s^2 G G' with a small s. The film placement, the principal point and kappa absorb shift and rotation:
+    only the variance of the principal point depends on s, by s^2/n.
 
-    Places are (n, 2) mm, their covariance (2n, 2n) mm^2, x and y of a mark behind each other. InputError: a
-    covariance that is singular otherwise.
+    Coordinates are (n, 2) mm, their covariance (2n, 2n) mm^2, ordered x, y per mark. InputError: if the
+    covariance is singular for another reason.
     """
     values, vectors = np.linalg.eigh(covariance)
     free = values < SINGULAR * values[-1]
@@ -309,7 +309,7 @@ def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
 
 
 def _movements(xy: Floats) -> Floats:
-    """Return (2n, 3) an orthonormal basis of shifts and the rotation of n marks."""
+    """Return an orthonormal basis (2n, 3) of shifts and the rotation of n marks."""
     shift = np.tile(np.eye(2), (len(xy), 1))
     about = xy - xy.mean(axis=0)
     turn = np.column_stack([-about[:, 1], about[:, 0]]).reshape(-1, 1)

@@ -1,4 +1,4 @@
-"""The film of a photo from its fiducial marks alone: its affine form, and whether it is mirrored."""
+"""Interior orientation of one photo from its fiducial marks: affine form and mirroring."""
 
 from __future__ import annotations
 
@@ -36,27 +36,27 @@ UNKNOWNS: dict[str, tuple[str, ...]] = {
     "projective": ("t1", "t2", "theta", "m", "b1", "b2", "g1", "g2"),
 }
 """Unknowns of each model."""
-FAR = 5.0  # Residuals on both sides beyond which marks are named wrongly, millimetres
+FAR = 5.0  # Residuals of both orientations above which mark names are wrong, millimetres
 _MAX_STEPS = 20
-_CONVERGED = 1e-12  # Largest step at convergence, in parts of the format
+_CONVERGED = 1e-12  # Largest step at convergence, relative to the format
 
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """An interior orientation: the film of a photo from its marks.
+    """Interior orientation of a photo: film parameters from its fiducial marks.
 
     Attributes
     ----------
     model
-        What is unknown of the film.
+        Film model, which defines the unknowns.
     film
         (6,) t1, t2 (mm), theta (radians), m, b1, b2.
     bend
-        (2,) h1, h2 or g1, g2 (1/mm); zero where the model has none.
+        (2,) h1, h2 or g1, g2 (1/mm); zero if the model does not contain them.
     unknowns
-        (k,) names of what is unknown.
+        (k,) names of the unknowns.
     cofactors
-        (k, k) of these, a priori unit weight.
+        (k, k) cofactors of the unknowns, a priori unit weight.
     residuals
         (n, 2) observed minus computed readings.
     redundancy
@@ -64,13 +64,13 @@ class Interior:
     omega
         Weighted sum of squares of the residuals.
     degrees_of_freedom
-        2 n less the number of unknowns.
+        2 n minus the number of unknowns.
     mirrored
-        Whether the film was seen from the other side.
+        Whether the film was scanned mirrored (emulsion side).
     affine
-        The same as a form of six numbers, where the model is affine or conformal.
+        The same as six affine coefficients, if the model is affine or conformal.
     shifts
-        (nodes, 2) mm, of the reseau; none without.
+        (nodes, 2) mm, shifts of the reseau nodes; empty without a reseau.
     """
 
     model: FilmModel
@@ -93,16 +93,16 @@ class Interior:
 
     @property
     def p(self) -> float:
-        """The probability of a larger weighted sum of squares; NaN without degrees of freedom."""
+        """Probability of a larger weighted sum of squares; NaN without redundancy."""
         if not self.degrees_of_freedom:
             return float("nan")
         return _photocore.chi_square(self.omega, self.degrees_of_freedom)
 
 
 def is_mirrored(places: ArrayLike, true: ArrayLike) -> bool | None:
-    """Return whether an affine map of places (n, 2) to true places (n, 2), y up, changes the side.
+    """Return whether an affine map of design to true coordinates (n, 2) mirrors.
 
-    None with fewer than three marks, or marks on a line.
+    None for fewer than three marks, or for collinear marks.
     """
     q, p = (np.asarray(each, dtype=float) for each in (places, true))
     if len(q) < 3:
@@ -115,10 +115,10 @@ def is_mirrored(places: ArrayLike, true: ArrayLike) -> bool | None:
 
 
 def conformal(places: ArrayLike, true: ArrayLike, *, mirrored: bool) -> tuple[float, float, float, float]:
-    """Return t1, t2, theta, m of a conformal fit in closed form, of complex numbers: p = t + b q.
+    """Return t1, t2, theta, m of a conformal fit p = t + b q in complex numbers.
 
-    Of mirrored films q is -conj(q); b = (1 + m) exp(i theta). Places in the camera's frame and true places on
-    the scanner are (n, 2) mm, two at least.
+    For mirrored films q is -conj(q); b = (1 + m) exp(i theta). Coordinates in the camera frame and true
+    coordinates on the scanner are (n, 2) mm, at least two.
     """
     q, p = (np.asarray(each, dtype=float) @ [1, 1j] for each in (places, true))
     if mirrored:
@@ -141,38 +141,39 @@ def interior_orientation(
     mirrored: bool | None = None,
     reseau: Reseau | None = None,
 ) -> Interior:
-    """Fit the film of a photo to its fiducial marks, whose places are taken as they are.
+    """Fit the film of a photo to its fiducial marks with fixed mark coordinates.
 
-    Errors of places are those of all photos of a camera, and no residual of one photo shows them: this fit
-    is no test of a certificate.
+    Errors of certificate coordinates are common to all photos of a camera and do not affect the residuals of
+    one photo. This fit does not test a certificate.
 
     Parameters
     ----------
     places
-        (n, 2) places of the marks in the camera's frame, mm, x right and y up.
+        (n, 2) coordinates of the marks in the camera frame, mm, x right and y up.
     readings
-        (n, 2) what was read, mark by mark.
+        (n, 2) readings of the marks.
     model
-        `conformal`: t1, t2, theta, m; `affine`: with b1, b2; `bilinear`: with h1, h2; `projective`: with
-        g1, g2.
+        `conformal`: t1, t2, theta, m; `affine`: with b1, b2; `bilinear`: with h1, h2; `projective`: with g1,
+        g2.
     sd
         (n, 2) standard deviations of readings, or one for all.
     counted
-        What readings count; None: mm, y up.
+        Unit and axes of the readings; None: mm, y up.
     scanner
-        Scales and obliqueness of the scanner; None: it is true.
+        Scales and obliqueness of the scanner; None: an ideal scanner.
     curves
-        The coefficients of its polynomials, six of three, x first; or none.
+        Polynomial coefficients of the scanner, six of three, x first; or empty.
     mirrored
-        Whether the film was seen from the other side; None: three marks at least tell.
+        Whether the film was scanned mirrored; None: determined from at least three marks.
     reseau
-        A grid whose shifts are found with the film, observed as 0 with their covariance; None: without.
+        Grid whose node shifts are estimated with the film, observed as 0 with their covariance; None: no
+        reseau.
 
     Raises
     ------
     InputError
-        Fewer marks than the model has unknowns for, marks that do not tell the side, or tell another than
-        what is given.
+        If there are fewer marks than the model requires, or if the marks do not determine the side or
+        contradict the given one.
     """
     one_of("model", model, get_args(FilmModel))
     q = pairs("places", places)
@@ -216,7 +217,7 @@ def pairs(name: str, value: ArrayLike) -> Floats:
 def true_places(
     readings: Floats, counted: Readings, scanner: Scanner, curves: Sequence[ScannerCurve] = ()
 ) -> Floats:
-    """Return (n, 2) the true places of readings on a scanner, mm, y up."""
+    """Return the true coordinates (n, 2) of readings on a scanner, mm, y up."""
     flat = Film(FilmPlacement("p", 0.0), FilmSize("p", 0.0), scanner, counted, curves=curves)
     return _photocore.film_places(flat.numbers(), _vectors(flat), readings)
 
@@ -237,7 +238,7 @@ def _side(q: Floats, true: Floats, given: bool | None) -> bool:
 def mirror_message(given: bool, apart: tuple[float, float]) -> Phrase:
     """Return the message if marks contradict the given side of the film.
 
-    `apart` are root mean squares (mm) of their residuals as they are, and mirrored.
+    `apart` contains the root mean squares (mm) of their residuals, as scanned and mirrored.
     """
     fields = {"given": apart[given], "other": apart[not given]}
     code = "films.wrong-marks" if fields["other"] > FAR else "films.mirrored"
@@ -247,7 +248,7 @@ def mirror_message(given: bool, apart: tuple[float, float]) -> Phrase:
 
 
 def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
-    """Return root mean squares (mm) of a conformal fit to marks as they are, and mirrored."""
+    """Return the RMS (mm) of conformal fits to the marks, as scanned and mirrored."""
     found = []
     for mirrored in (False, True):
         t1, t2, theta, m = conformal(places, true, mirrored=mirrored)
@@ -259,8 +260,6 @@ def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """The observation equations of readings of marks that are known."""
-
     places: Floats
     readings: Floats
     weights: Floats
@@ -287,7 +286,7 @@ class _Fit:
         )
 
     def equations(self, values: Floats) -> tuple[Floats, Floats]:
-        """Return weighted residuals (2 n,) and partials (2 n, k); behind them those of a reseau."""
+        """Return weighted residuals (2 n,) and partials (2 n, k), with the reseau rows."""
         film = self.film(values)
         computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), self.places)
         columns = [2 + _place(name) for name in self.names]
@@ -339,7 +338,7 @@ class _Fit:
         )
 
     def _affine(self, values: Floats, cofactors: Floats) -> Affine:
-        """Return the form of six numbers; the scanner's own differences from an affine map are not in it."""
+        """Return the affine form without non-affine terms of the scanner."""
         film = self.film(values)
         places = [_place(name) for name in self.names]
         of_film = np.zeros((6, 6))
@@ -348,7 +347,7 @@ class _Fit:
 
 
 def _parts(reseau: Reseau, places: Floats) -> Floats:
-    """Return (n, nodes) what part of the shift of each node places (n, 2) have."""
+    """Return (n, nodes) weights of the node shifts at coordinates (n, 2)."""
     still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=reseau)
     vectors = np.array([each.position for each in still.unknowns])
     first = len(vectors) - len(reseau.weights)
@@ -363,10 +362,10 @@ def _parts(reseau: Reseau, places: Floats) -> Floats:
 
 
 def _place(name: str) -> int:
-    """Return the place of an unknown among t1, t2, theta, m, b1, b2 and h or g."""
+    """Return the index of an unknown among t1, t2, theta, m, b1, b2 and h or g."""
     return UNKNOWNS["projective" if name in ("g1", "g2") else "bilinear"].index(name)
 
 
 def _moves(size: float) -> Floats:
-    """Return (8,) by how much a unit of each unknown moves a mark at the edge."""
+    """Return (8,) movements of a mark at the edge per unit of each unknown."""
     return np.array([1.0, 1.0, size, size, size, size, size**2, size**2])

@@ -1,12 +1,12 @@
-"""A lens with its covariance from tables of radial distortion and decentring of certificates.
+"""Lens parameters and covariance from the distortion tables of certificates.
 
-The laboratory measures the images of rays of known angles alpha: dr = measured minus ideal radius, with
-r = c0 tan alpha and c0 its calibrated focal length. The curve is
+The laboratory measures image points of rays at known angles alpha. The table lists dr, measured minus ideal
+radius, with r = c0 tan alpha and the calibrated focal length c0. The curve is
 
     dr(r) = k0 r + k1 r^3 + k2 r^5 + k3 r^7.
 
-k0 belongs to c: c0 balances the curve by the laboratory's choice. With |c| = c0 (1 + k0) and
-A_j = k_j / (1 + k0)^(2j + 1) the forward camera `brown_forward` is the same mapping.
+k0 belongs to c: the laboratory chose c0 to balance the curve. With |c| = c0 (1 + k0) and A_j = k_j / (1 +
+k0)^(2j + 1), the forward camera `brown_forward` is the same mapping.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
 
 MAX_TERMS = 3  # odd terms of cameras
-LEVEL = 0.01  # of the test of a term
-STEP = 0.01  # of differences, in standard deviations
+LEVEL = 0.01  # significance level of a term
+STEP = 0.01  # of numerical differences, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
 class RadialTable:
-    """A table of radial distortion.
+    """Radial distortion table of a certificate.
 
     Attributes
     ----------
     angle
-        (n,) rad from the axis.
+        (n,) angles from the axis, rad.
     distortion
         (n,) mm, positive outwards, measured minus ideal.
     sd
-        Of a value, mm.
+        Standard deviation of a value, mm.
     correlation
-        Between any two values.
+        Correlation of any two values.
     """
 
     angle: Floats
@@ -60,12 +60,12 @@ class RadialTable:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A fitted curve of distortion with t odd terms.
+    """Fitted distortion curve with t odd terms.
 
     Attributes
     ----------
     focal_length, sd_focal_length
-        c0, mm, that the angles refer to.
+        c0 to which the angles refer, mm.
     radius
         (n,) c0 tan alpha of the table, mm.
     coefficients, covariance
@@ -89,7 +89,7 @@ class Curve:
 
     @property
     def terms(self) -> int:
-        """How many odd terms it has beside k0."""
+        """Number of odd terms in addition to k0."""
         return len(self.coefficients) - 1
 
     def at(self, radius: Floats) -> Floats:
@@ -97,14 +97,14 @@ class Curve:
         return np.asarray(_columns(np.asarray(radius, float), self.terms) @ self.coefficients)
 
     def sd_at(self, radius: Floats) -> Floats:
-        """Return its standard deviation there: sqrt(j Q j')."""
+        """Return the standard deviation of the distortion at radii: sqrt(j Q j')."""
         j = _columns(np.asarray(radius, float), self.terms)
         return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", j, self.covariance, j)))
 
 
 @dataclass(frozen=True, eq=False)
 class LensParameters:
-    """What of a camera is of its lens.
+    """Lens parameters of a camera with their covariance.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class LensParameters:
     names, values, covariance
         c (negative) and the radial terms, mm in powers of mm.
     apart
-        What the camera and the curve differ by at most within the table, mm; 0 of the same mapping.
+        Largest difference of camera and curve within the table, mm; 0 for the same mapping.
     """
 
     model: str
@@ -124,9 +124,9 @@ class LensParameters:
 
 
 def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, terms: int) -> Curve:
-    """Fit a table by k0 and some odd terms.
+    """Fit a distortion table by k0 and some odd terms.
 
-    InputError: there are fewer values than unknowns, or two of one angle that leave these undetermined.
+    InputError: if there are fewer values than unknowns, or if equal angles make the fit singular.
     """
     radius = focal_length * np.tan(table.angle)
     if len(np.unique(radius)) < terms + 1:
@@ -148,9 +148,9 @@ def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, t
 
 
 def curves_of(table: RadialTable, focal_length: float, sd_focal_length: float) -> tuple[Curve, ...]:
-    """Return the curves with one odd term, two ...: at most n - 3 of n angles, and three.
+    """Return the curves with one to three odd terms, at most n - 3 for n angles.
 
-    InputError: fewer than four angles.
+    InputError: if there are fewer than four angles.
     """
     most = min(MAX_TERMS, len(np.unique(table.angle)) - 3)
     if most < 1:
@@ -159,7 +159,7 @@ def curves_of(table: RadialTable, focal_length: float, sd_focal_length: float) -
 
 
 def chosen(curves: Sequence[Curve]) -> Curve:
-    """Return the curve with so many terms that another gains no more than chi-square(0.99; 1) in Omega."""
+    """Return the first curve that another term improves by <= chi-square(0.99; 1)."""
     limit = critical_chi_square(LEVEL, 1)
     for curve, more in pairwise(curves):
         if curve.omega - more.omega <= limit:
@@ -187,7 +187,7 @@ def forward(curve: Curve) -> LensParameters:
 
 
 def backward(curve: Curve) -> LensParameters:
-    """Return c and K1 ... of `brown`: corrections -dr fitted at the distorted radius, on the same radii."""
+    """Return c and K1 ... of `brown`, fitted to -dr at the distorted radii."""
 
     def fitted(given: Floats) -> Floats:
         c0, coefficients = given[0], given[1:]
@@ -210,7 +210,6 @@ def backward(curve: Curve) -> LensParameters:
 
 
 def _with_focal_length(curve: Curve) -> Floats:
-    """Return the covariance of c0, k0, k1 ...: the table is independent of c0."""
     whole = np.zeros((2 + curve.terms,) * 2)
     whole[0, 0] = curve.sd_focal_length**2
     whole[1:, 1:] = curve.covariance
@@ -218,7 +217,6 @@ def _with_focal_length(curve: Curve) -> Floats:
 
 
 def _differences(function: Callable[[Floats], Floats], at: Floats, sd: Floats) -> Floats:
-    """Return partials by central differences."""
     columns = []
     for k, step in enumerate(STEP * np.where(sd > 0, sd, np.abs(at))):
         moved = np.zeros(len(at))
@@ -232,21 +230,21 @@ def _columns(radius: Floats, terms: int) -> Floats:
 
 
 SEMI_DIAGONALS = ("ll", "ul", "ur", "lr")
-ELSEWHERE = 4.0  # Notable distance of the point of symmetry (standard deviations)
+ELSEWHERE = 4.0  # Significant distance of the point of symmetry (standard deviations)
 
 
 @dataclass(frozen=True)
 class Tangential:
-    """Decentring as a certificate has it: the profile P(r) = J1 r^2, largest along the axis phi0.
+    """Decentring distortion: the profile P(r) = J1 r^2, largest along the axis phi0.
 
     Attributes
     ----------
     j1, sd_j1
-        1/mm; the standard deviation is that of both components.
+        J1 and the standard deviation of both components, 1/mm.
     phi0
         rad from +x, counter-clockwise.
     sign
-        1 or -1: how the laboratory counts the profile.
+        1 or -1: sign convention of the laboratory.
     """
 
     j1: float
@@ -262,7 +260,7 @@ class Tangential:
 
 
 def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, float]:
-    """Return J1 and its standard deviation by a fit of P(r) = J1 r^2 to (n,) displacements of an sd, mm."""
+    """Fit P(r) = J1 r^2 to (n,) displacements of one sd (mm); return J1 and its sd."""
     fit = Fit.of(displacement, sd**2 * np.eye(len(radius)), radius[:, np.newaxis] ** 2)
     return float(fit.parameters[0]), math.sqrt(float(fit.cofactors[0, 0]))
 
@@ -271,33 +269,33 @@ def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, 
 class SemiDiagonals:
     """Distortion along four semi-diagonals.
 
-    Opposite ones differ by h = u o + d r^2 with the direction u: decentring d, and the point of symmetry o
-    against the origin of the radii.
+    Opposite ones differ by h = u o + d r^2 in the direction u. d is the decentring, o the point of symmetry
+    relative to the origin of the radii.
     """
 
-    mean: Floats  # (n,) of the four, mm
+    mean: Floats  # (n,) mean of the four, mm
     sd: float  # of the mean
     centre: Floats  # (2,) o, the data strip at the left, mm
     sd_centre: float
-    decentring: float  # The largest half difference of opposite ones without o, mm
+    decentring: float  # Largest half difference of opposite ones without o, mm
 
     @property
     def sd_half_difference(self) -> float:
-        """Of a half difference, mm: it has twice the variance of a mean of four."""
+        """Standard deviation of a half difference, mm; its variance is twice the mean's."""
         return self.sd * math.sqrt(2)
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether the point of symmetry differs significantly from the origin of the radii."""
+        """Whether the point of symmetry differs significantly from the origin."""
         return float(np.abs(self.centre).max()) > ELSEWHERE * self.sd_centre
 
 
 def of_semi_diagonals(angle: Floats, distortion: Mapping[str, Floats], sd: float | None) -> SemiDiagonals:
     """Return the mean of four semi-diagonals, and the differences of opposite ones.
 
-    The rest, half of ll + ur - ul - lr, has the variance of a single reading. It gives the standard deviation
-    of the mean if `sd` (mm) is None. Angles are (n,) rad, distortion (n,) mm along each of `SEMI_DIAGONALS`.
-    InputError: equal readings without a standard deviation.
+    Half of ll + ur - ul - lr has the variance of a single reading. It gives the standard deviation of the
+    mean without a given `sd` (mm). Angles are (n,) rad, distortion (n,) mm along each of `SEMI_DIAGONALS`.
+    InputError: if readings are equal and `sd` is not given.
     """
     ll, ul, ur, lr = (np.asarray(distortion[name], float) for name in SEMI_DIAGONALS)
     single = math.sqrt(float(np.mean(((ll + ur - ul - lr) / 2) ** 2)))

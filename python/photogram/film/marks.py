@@ -1,8 +1,8 @@
-"""Fiducial marks: what they are called, where they usually are, and which one a reading is of.
+"""Fiducial marks: names, usual coordinates, and assignment of readings.
 
-Sides are those of the positive with the data strip (clock, level, number) at the left: `ll, ul, ur, lr` in
-the corners, `ml, mt, mr, mb` in the middle of the sides. If readings do not name their marks, quarter turns
-of the film and its sides are tested.
+Sides refer to the positive with the data strip (clock, level, number) at the left. They are `ll, ul, ur, lr`
+in the corners, and `ml, mt, mr, mb` in the middle of the sides. If readings are unnamed, quarter rotations
+and both sides of the film are tested.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")
 """The marks in the order of their numbers in USGS certificates, 1 to 8."""
 _LETTERS = {"a": "ml", "b": "mr", "c": "mb", "d": "mt"}
 _TURNED = {"ul": "ll", "ll": "lr", "lr": "ur", "ur": "ul", "mt": "ml", "ml": "mb", "mb": "mr", "mr": "mt"}
-"""Sides of a frame with the strip at the top by their names with the strip at the left."""
+"""Sides of a frame with the strip at the top, by their names with it at the left."""
 
 
 def by_side(name: str) -> str:
-    """Return the side of a mark that a certificate calls by its number or letter; other names as they are."""
+    """Return the side for the number or letter of a mark; other names are unchanged."""
     plain = name.strip()
     if plain in {str(number) for number in range(1, len(SIDES) + 1)}:
         return SIDES[int(plain) - 1]
@@ -39,12 +39,12 @@ def by_side(name: str) -> str:
 
 
 def turned_name(name: str, data_strip: DataStrip) -> str:
-    """Return what a side is called once the data strip lies at the left; own names as they are."""
+    """Return the side after rotation of the data strip to the left."""
     return _TURNED.get(name, name) if data_strip == "top" else name
 
 
 def turned(xy: Floats, data_strip: DataStrip) -> Floats:
-    """Return places (..., 2) once the data strip lies at the left: from the top (x, y) -> (-y, x)."""
+    """Rotate coordinates (..., 2) so that the data strip is at the left."""
     return np.stack([-xy[..., 1], xy[..., 0]], axis=-1) if data_strip == "top" else xy
 
 
@@ -63,7 +63,7 @@ _SIGNS = {
 
 @dataclass(frozen=True)
 class UsualPlaces:
-    """Where the marks of a type of camera are."""
+    """Usual coordinates of the marks of a camera type."""
 
     # Distance of the marks from the axes (mm): corners at (corner, corner), middles at (middle, 0)
     corner: float
@@ -72,7 +72,7 @@ class UsualPlaces:
     sd_middle: float
 
     def places(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-        """Return the places of marks by their sides; own names have none."""
+        """Return the coordinates of marks by side, without custom names."""
         found = {}
         for name in names:
             if name in _SIGNS:
@@ -95,20 +95,20 @@ _TYPES: Mapping[str, UsualPlaces] = {
 
 
 def usual_places(camera_type: str) -> UsualPlaces | None:
-    """Return the usual places of a type of camera, whatever is written before it; None of one not known."""
+    """Return the usual coordinates of a camera type, ignoring a prefix, or None."""
     plain = "".join(camera_type.lower().split())
     return next((found for name, found in _TYPES.items() if plain.endswith(name)), None)
 
 
 CHANCE = 1e-4  # Probability of a wrong choice among the eight
 DECIDED = 2.0 * float(np.log(8.0 / CHANCE))
-"""Difference of the weighted sums of squares of the second and the best choice that decides."""
-NEAR = 0.1  # Largest distance of a reading from its mark, in parts of the format
+"""Difference of the weighted sums of squares that separates the two best choices."""
+NEAR = 0.1  # Largest distance of a reading from its mark, relative to the format
 
 
 @dataclass(frozen=True, eq=False)
 class FilmWay:
-    """A way in which a film may lie.
+    """Possible film orientation on the scanner.
 
     Attributes
     ----------
@@ -129,25 +129,25 @@ class FilmWay:
 
 @dataclass(frozen=True, eq=False)
 class WhichMark:
-    """What was found of readings without names.
+    """Assignment of unnamed readings to marks, over the eight film orientations.
 
     Attributes
     ----------
     marks
-        (n,) the number of the mark of each reading, for the best of the eight ways to lie.
+        (n,) the number of the mark of each reading, for the best orientation.
     quarter_turns
-        How many quarters the film lies turned counter-clockwise against the camera's frame, for the best.
+        Quarter rotations of the film, counter-clockwise in the camera frame, for the best.
     mirrored
-        Whether it was seen from the other side, for the best.
+        Whether the film was scanned mirrored, for the best.
     omega
-        (8,) weighted sums of squares after an affine fit: four quarter turns, then four mirrored; infinite
-        where readings are of no marks.
+        (8,) weighted sums of squares after an affine fit: four quarter rotations, then four mirrored.
+        Infinite if readings fit no marks.
     decided
-        Whether the runner-up is so much worse that the best is sure.
+        Whether the second best is significantly worse.
     ways
-        (8,) all, in the same order; None where readings are of no marks.
+        (8,) all orientations in the same order; None if readings fit no marks.
     alike
-        The best, and those that cannot be told from it.
+        The best orientation and those not separable from it.
     """
 
     marks: Indices
@@ -163,24 +163,24 @@ class WhichMark:
 
 
 def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> WhichMark:
-    """Find of which marks readings are: the film lies in one of four quarter turns, on one of two sides.
+    """Assign unnamed readings to marks, over four quarter rotations and two sides.
 
-    Marks of modern cameras are symmetric to some 0.01 mm: then it cannot be told from them, and the flight
-    or tie points must.
+    Marks of modern cameras are symmetric to some 0.01 mm. They cannot separate the orientations then, and the
+    flight or tie points must.
 
     Parameters
     ----------
     places
-        (m, 2) places of the marks in the camera's frame, mm.
+        (m, 2) coordinates of the marks in the camera frame, mm.
     true
-        (n, 2) true places on the scanner of readings without names, mm, y up; three at least.
+        (n, 2) true coordinates of unnamed readings on the scanner, mm, y up; at least three.
     sd
-        Standard deviation of these against the certificate, mm.
+        Standard deviation of readings relative to the certificate, mm.
 
     Raises
     ------
     InputError
-        Fewer than three readings, or readings that are of no marks in all eight ways.
+        If there are fewer than three readings, or if readings fit no marks in all eight orientations.
     """
     q, p = pairs("places", places), pairs("true", true)
     if len(p) < 3 or len(q) < len(p):
@@ -206,7 +206,7 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
 
 
 def _tried(q: Floats, p: Floats, turns: int, *, mirrored: bool) -> tuple[Indices, float]:
-    """Return the mark of each reading for a way to lie, and the sum of squares after an affine fit."""
+    """Return the mark of each reading for an orientation, and the sum of squares."""
     lain = q * [-1.0, 1.0] if mirrored else q
     turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), turns)
     lain = lain @ turn.T
@@ -219,9 +219,9 @@ def _tried(q: Floats, p: Floats, turns: int, *, mirrored: bool) -> tuple[Indices
 
 
 def _nearest(lain: Floats, p: Floats) -> Indices | None:
-    """Return the mark of each reading, each once, by the shift that brings readings nearest; else None.
+    """Return the mark of each reading, each used once, for the best shift; else None.
 
-    Every mark is tested for the first reading, since marks may have been lost.
+    Every mark is tested for the first reading, since marks may be missing.
     """
     limit = NEAR * np.ptp(lain, axis=0).max()
     best, found = np.inf, None

@@ -1,4 +1,4 @@
-"""One step and two: films inside the adjustment, and films that were fitted to their marks before."""
+"""Comparison of simultaneous and sequential interior orientation."""
 
 from __future__ import annotations
 
@@ -22,18 +22,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StepsCompared(Documented, Brief):
-    """Points of one block from one step and from two. Standard deviations are a priori: unit weight is 1.
+    """Points of one block from simultaneous and sequential interior orientation.
+
+    Standard deviations are a priori: unit weight is 1.
 
     Attributes
     ----------
     inside, before
-        The results, films inside the adjustment and fitted before it.
+        Results with films estimated inside the adjustment, and fitted before it.
     rows
-        (n,) the points of both that have a covariance in both.
+        (n,) the points with a covariance in both results.
     sd
-        (2, n, 3) standard deviations of X, Y, Z: one step, two steps.
+        (2, n, 3) standard deviations of X, Y, Z: simultaneous, sequential.
     difference
-        (n, 3) two steps less one step.
+        (n, 3) sequential minus simultaneous coordinates.
     """
 
     inside: Result
@@ -49,12 +51,12 @@ class StepsCompared(Documented, Brief):
 
     @property
     def percent(self) -> Floats:
-        """(3,) by how much those of two steps are larger than those of one: the median of single points."""
+        """(3,) median increase of standard deviations in the sequential result, percent."""
         return np.asarray(100.0 * (np.median(self.sd[1] / self.sd[0], axis=0) - 1.0))
 
     @property
     def sentence(self) -> str:
-        """The comparison as a sentence."""
+        """Comparison as a sentence."""
         axes = [phrase("films.percent", axis=a, percent=p) for a, p in zip("XYZ", self.percent, strict=True)]
         return str(phrase("films.steps", axes=axes))
 
@@ -63,7 +65,7 @@ class StepsCompared(Documented, Brief):
         return "Films inside the adjustment, and fitted before", [("points", self.sentence)]
 
     def document(self) -> Document:
-        """Return the document of the comparison; docs/film.md lists the members of its JSON form."""
+        """Return the document of the comparison (JSON members: docs/film.md)."""
         results = {"inside": self.inside, "before": self.before}
         of_axes = replace(_axes(self), note=f"{self.sentence[:1].upper()}{self.sentence[1:]}.")
         return Document(
@@ -93,7 +95,7 @@ class StepsCompared(Documented, Brief):
 
 
 def compare_steps(inside: Result, before: Result) -> StepsCompared:
-    """Compare films inside the adjustment with films that are fitted before, and then errorless.
+    """Compare simultaneous interior orientation with fixed films fitted before.
 
     Parameters
     ----------
@@ -103,7 +105,7 @@ def compare_steps(inside: Result, before: Result) -> StepsCompared:
     Raises
     ------
     InputError
-        Results of another kind, of different points, or without covariances.
+        If results are of another type, of different points, or without covariances.
     """
     for name, result, held in (("inside", inside, False), ("before", before, True)):
         if not result.films or any(film.placement.is_held != held for _, film in result.films):
@@ -126,7 +128,6 @@ _WHY = (
 
 
 def _axes(found: StepsCompared) -> Table:
-    """Return medians of standard deviations and differences of each coordinate."""
     unit = (Axis.of("", found.inside.block.linear_unit),)
     own = found.sd[0]
     size = found.difference / own

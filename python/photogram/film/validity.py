@@ -1,4 +1,4 @@
-"""The certificate of a camera that is valid for a flight, by their dates."""
+"""Choice of the certificate that is valid for a flight."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.film.certificate import Certificate
 
-MAX_AGE_YEARS = 3.0  # Cameras are calibrated again after as many years at most
+MAX_AGE_YEARS = 3.0  # Cameras are recalibrated after this time at the latest
 _DAYS_OF_YEAR = 365.25
 
 
 def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> Certificate:
-    """Return the certificate of a camera that is valid on a day: the last before, else the first after.
+    """Return the certificate valid on a day: the last before, else the first after.
 
-    InputError: several certificates, and no day of the flight; one of them without a date.
-    ContradictionError: two certificates of one date.
+    InputError: if there are several certificates and no day of the flight, or one without a date.
+    ContradictionError: if two certificates have the same date.
     """
     if len(certificates) == 1:
         return certificates[0]
@@ -39,7 +39,7 @@ def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> 
 
 
 def age_remark(certificate: Certificate, day: date) -> str | Phrase:
-    """Return a remark if a certificate is much older than a flight, or later; else an empty text."""
+    """Return a warning if a certificate is far older than a flight or later, else ""."""
     if certificate.day is None:
         return phrase("films.undated-flight", day=str(day))
     years = (day - certificate.day).days / _DAYS_OF_YEAR
@@ -50,7 +50,7 @@ def age_remark(certificate: Certificate, day: date) -> str | Phrase:
 
 
 def changed_remark(chosen: Certificate, several: Sequence[Certificate], day: date) -> str | Phrase:
-    """Return a remark if a camera has changed between its certificates before and after a flight."""
+    """Return a warning if a camera changed between its certificates around a flight."""
     from photogram.film.years import compare_cameras
 
     later = [each for each in several if each.day is not None and each.day > day and each is not chosen]

@@ -14,7 +14,7 @@ from photogram.planning.pattern import Pattern
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Drawing, Fact, Judgement, Section, layered_tables, significant
-from photogram.show.quantity import Axis, Quantity, Table, chosen, component, of_each, records
+from photogram.show.quantity import Axis, Quantity, Table, chosen, component, members, of_each, records
 from photogram.show.sketch.letters import NOWHERE
 from photogram.show.sketch.marks import Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot
@@ -93,24 +93,17 @@ def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
 
 
 def _pattern_members(pattern: Pattern) -> dict[str, object]:
-    members: dict[str, object] = {
-        "name": pattern.name,
-        "title": pattern.block.title,
-        "messages": [str(message) for message in pattern.result.messages],
-        "axes": pattern.axes,
+    optional = {"motion": [*map(vars, pattern.motion)], "rms_sd_known_readout": pattern.known_rms_sd}
+    return {
+        **members(pattern, "name", "axes", "scale", "unit", title="block.title"),
+        "messages": [*map(str, pattern.result.messages)],
         "photo_count": len(pattern.block.photo_ids),
         "image_count": int(pattern.result.used_images.sum()),
-        "scale": pattern.scale,
-        "unit": pattern.unit,
         "points": records(_points(pattern).columns),
-        "photos": [vars(quality) for quality in pattern.photos],
+        "photos": [*map(vars, pattern.photos)],
         "control": records(_control(pattern).columns),
+        **{name: value for name, value in optional.items() if value},
     }
-    if pattern.motion:
-        members["motion"] = [vars(quality) for quality in pattern.motion]
-    if (known := pattern.known_rms_sd) is not None:
-        members["rms_sd_known_readout"] = known
-    return members
 
 
 def points_table(pattern: Pattern) -> Table:

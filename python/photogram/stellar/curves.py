@@ -1,4 +1,4 @@
-"""Curves of distortion and refraction, residuals, axes of the comparator (NOAA TR NOS 55, eq. 35 to 87)."""
+"""Curves of distortion and refraction, residuals, comparator axes (NOAA TR NOS 55, eq. 35 to 87)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DistortionCurves:
-    """Distortion over the distance from its centre; metres."""
+    """Distortion against the distance from its centre; metres."""
 
     distance: Floats  # (n,) from the centre of distortion
-    # (n,) radial distortion, the same with the calibrated principal distance (it vanishes at the
-    # crossover), and the profile of the decentering distortion
+    # (n,) radial distortion, the transformed one for the calibrated principal distance (zero at the
+    # crossover), and the profile of the decentring distortion
     radial: Floats
     transformed: Floats
     decentering: Floats
-    radial_error: Floats  # (n,) their mean errors
+    radial_error: Floats  # (n,) mean errors
     transformed_error: Floats
     decentering_error: Floats
     scale: float  # K0, the linear term of the transformation
@@ -36,10 +36,10 @@ class DistortionCurves:
 
 
 def distortion_curves(result: Result) -> DistortionCurves:
-    """Compute the curves at the step, to the end and with the crossover of the options.
+    """Compute the distortion curves at the distances selected by the options.
 
-    The mean error of the calibrated principal distance has +c d^n for the radial coefficients: equation 86
-    prints minus, although K0 itself has it.
+    The mean error of the calibrated principal distance contains +c d^n for the radial coefficients. Equation
+    86 prints minus, although K0 itself has plus.
     """
     options, values, covariance = result.problem.options, result.parameters, result.covariance
     count = int(np.floor(options.extent / options.interval + 1e-9)) + 1
@@ -104,13 +104,13 @@ def refraction_curves(result: Result, group: int) -> RefractionCurves:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """A histogram with the normal curve."""
+    """Histogram with the normal curve."""
 
-    # (k + 1,) of the classes: equal, from 3.25 standard deviations below the mean to as much above
+    # (k + 1,) limits of equal classes from 3.25 standard deviations below the mean to 3.25 above
     edges: Floats
-    counts: Indices  # (k,) residuals in each class, and as many as the normal distribution puts there
+    counts: Indices  # (k,) residuals in each class, and expected numbers of the normal distribution
     expected: Floats
-    mean: float  # Of all residuals
+    mean: float  # Mean of all residuals
     sd: float
 
 
@@ -121,9 +121,10 @@ def residual_classes(result: Result) -> dict[str, Floats]:
 
 
 def histogram(values: Floats) -> Histogram:
-    """Sort residuals into the report's classes: as many as leave one expected residual in the last.
+    """Sort residuals into the classes of the report.
 
-    The count starts at 31 and falls by two.
+    The number of classes is reduced from 31 in steps of two, until more than one residual is expected in the
+    last class.
     """
     number, classes = len(values), 31
 
@@ -141,7 +142,7 @@ def histogram(values: Floats) -> Histogram:
 
 
 def star_means(result: Result) -> Iterator[tuple[str, Floats, Floats, tuple[float, float]]]:
-    """Yield star, mean plate coordinates, mean residual, and its radial and tangential parts; metres."""
+    """Yield star, mean coordinates, mean residual, its radial and tangential parts, m."""
     for i, star in enumerate(result.problem.star_ids):
         chosen = result.problem.image_stars == i
         if chosen.sum() > 1:
@@ -155,13 +156,13 @@ def star_means(result: Result) -> Iterator[tuple[str, Floats, Floats, tuple[floa
 
 @dataclass(frozen=True, eq=False)
 class ComparatorFrame:
-    """The affinity of the plate coordinates along other axes."""
+    """Affinity of the plate coordinates along other axes."""
 
     angle: float  # From the axes of the plate coordinates to these, from x towards y; radians
     scale_x: float  # Principal distances along the axes over their mean
     scale_y: float
-    epsilon: float  # Nonperpendicularity of the axes, radians; of the calibration itself at the angle zero
-    covariance: Floats  # (3, 3) of these three
+    epsilon: float  # Nonperpendicularity of the axes, radians; the value of the calibration at the angle zero
+    covariance: Floats  # (3, 3) covariance of these three
 
     @property
     def mean_errors(self) -> tuple[float, float, float]:
@@ -171,13 +172,12 @@ class ComparatorFrame:
 
 
 def comparator_frame(result: Result, angle: float) -> ComparatorFrame:
-    """Turn the affinity of a calibration into the axes of the comparator (equations 35 to 42).
+    """Transform the affinity of a calibration to comparator axes (equations 35 to 42).
 
-    With A = [[cx / c, -epsilon], [0, cy / c]], c the mean of cx and cy, and R the rotation to the new axes,
-    the scales are the diagonal of R A R^T and epsilon is minus the sum of its other two elements; their
-    difference is a rotation, which kappa takes.
-
-    The angle is from the axes of the plate coordinates to the new ones, from x towards y, radians.
+    Let A = [[cx / c, -epsilon], [0, cy / c]], c the mean of cx and cy, and R the rotation to the new axes.
+    The scales are the diagonal of R A R^T, and epsilon is minus the sum of its other two elements. Their
+    difference is a rotation, which kappa absorbs. The angle is from the axes of the plate coordinates to the
+    new ones, from x towards y, radians.
     """
     values = result.parameters
     epsilon, cx, cy = values["epsilon"], values["cx"], values["cy"]
@@ -187,7 +187,7 @@ def comparator_frame(result: Result, angle: float) -> ComparatorFrame:
     cos2, sin2, both = math.cos(angle) ** 2, math.sin(angle) ** 2, math.sin(angle) * math.cos(angle)
     # Rows: scale x, scale y, epsilon; columns: cx / c, cy / c, epsilon.
     turned = np.array([[cos2, sin2, -both], [sin2, cos2, both], [2 * both, -2 * both, cos2 - sin2]])
-    # c is the mean: cx / c = 2 cx / (cx + cy), whose change is that of -cy / c.
+    # c is the mean: cx / c = 2 cx / (cx + cy), which changes by the negative of cy / c.
     change = 2.0 / total**2 * np.array([[0, cy, -cx], [0, -cy, cx], [0, 0, 0]])
     change[2, 0] = 1.0
     chosen = [INDEX[name] for name in ("epsilon", "cx", "cy")]

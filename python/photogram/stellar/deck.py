@@ -1,4 +1,4 @@
-"""Cards of 80 columns: fields as numbers, and the cards of a deck one after the other."""
+"""Decks of 80-column cards: numeric fields and sequential reading."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from photogram.words import Phrase, phrase
 
 
 class Card(Record):
-    """A card: fields are read by their first and last column, counted from 1."""
+    """Card with fields given by first and last column, counted from 1."""
 
     def name(self, first: int, last: int) -> str:
         """Return a field as text."""
@@ -63,15 +63,15 @@ class Card(Record):
 
 
 class Cards:
-    """The cards of a file, a card a line, read one after the other."""
+    """Cards of a file in sequence, one per line."""
 
     def __init__(self, file: Path) -> None:
         self._source, self._taken = Source.read(file), 0
 
     def take(self, name: str) -> Card:
-        """Return the next card, which is called by a name in errors.
+        """Return the next card, named in errors.
 
-        Raises InputError: the deck is at its end.
+        InputError: if the deck ends.
         """
         self._taken += 1
         if self._taken > len(self._source.lines):
@@ -81,7 +81,7 @@ class Cards:
 
     @property
     def at_end(self) -> bool:
-        """Whether only blank cards are left."""
+        """Return whether only blank cards remain."""
         return not any(number > self._taken for number in self._source.filled())
 
 
@@ -106,13 +106,13 @@ def read_deck(path: Path) -> list[Problem]:
     Parameters
     ----------
     path
-        The deck, a card a line.
+        Deck with one card per line.
 
     Raises
     ------
     InputError
-        The file cannot be read; or a card cannot be used, with its number and text: error 1 of the report and
-        all others.
+        If the file cannot be read, or if a card is invalid. The message has its number and text (error 1 of
+        the report and all others).
     """
     cards = Cards(path)
     problems = []
@@ -217,7 +217,7 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
 
 
 def _descriptors(card: Card) -> tuple[dict[int, int], float]:
-    """Return options 1 to 13, separated by blanks or without any, and the mean error (option 14)."""
+    """Return options 1 to 13, with or without separating blanks, and the mean error."""
     words = card.columns(1, 76).split()
     if len(words) >= 13:
         try:
@@ -268,7 +268,7 @@ def _degrees(degrees: float, minutes: float, seconds: float) -> float:
 
 
 def _initial(cards: Cards) -> Floats:
-    """Cards 13 to 18: alpha, omega, kappa of the event in grads, epsilon (grads), and the camera."""
+    """Read cards 13 to 18: attitude of the event and epsilon in grads, and the camera."""
     values: list[float] = []
     for number in range(13, 19):
         card = cards.take(f"card {number} (initial parameters)")
@@ -317,7 +317,6 @@ def _common_weight(cards: Cards, name: str) -> Floats:
 
 
 def _rejections(cards: Cards) -> tuple[dict[str, Card], dict[str, Card]]:
-    """Read the numbers of stars and plate points, each with its card."""
     stars: dict[str, Card] = {}
     points: dict[str, Card] = {}
     while True:
@@ -331,7 +330,6 @@ def _rejections(cards: Cards) -> tuple[dict[str, Card], dict[str, Card]]:
 
 
 def _minimum(cards: Cards, count: int) -> dict[str, Card]:
-    """Read the numbers of the stars, twenty a card, each with its card."""
     numbers: dict[str, Card] = {}
     for first in range(0, count, 20):
         card = cards.take("the stars of the minimum solution")
@@ -361,9 +359,10 @@ def _data(
     common_star: Floats | None,
     common_plate: Floats | None,
 ) -> tuple[list[tuple[Any, ...]], list[tuple[Any, ...]]]:
-    """Return columns of the stars (numbers, names, places, weights), and those of the images.
+    """Return columns of the stars and of the images.
 
-    These have points, rows of stars, groups, coordinates, weights and times.
+    Stars have numbers, names, positions and weights. Images have points, star rows, groups, coordinates,
+    weights and times.
     """
     stars: dict[str, tuple[Any, ...]] = {}
     images: list[tuple[Any, ...]] = []
@@ -382,7 +381,7 @@ def _data(
         weight = np.zeros((2, 2)) if number < 0 else common_star
         if weight is None:
             values = card.reals(29, 10, 3, 4)
-            # The program treated a star whose weight is not positive as an unknown direction.
+            # As in the program, a star without positive weight is an unknown direction.
             weight = card.symmetric(values) if values[0] > 0 else np.zeros((2, 2))
         stars[star] = star, card.name(72, 77) or star, place, weight
         for image in range(count):

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """A mean error ellipse on the sphere, radians."""
+    """Mean error ellipse on the sphere, radians."""
 
     major: float
     minor: float
-    direction: float  # Of the major axis, from increasing right ascension towards increasing declination
+    direction: float  # of the major axis, from increasing right ascension towards increasing declination
 
 
 def ellipse(covariance: Floats, declination: float) -> Ellipse:
-    """Return the mean error ellipse of a covariance of right ascension and declination."""
+    """Return the mean error ellipse from a covariance of right ascension, declination."""
     turned = np.diag([math.cos(declination), 1.0])
     values, vectors = np.linalg.eigh(turned @ covariance @ turned)
     minor, major = (math.sqrt(max(float(value), 0.0)) for value in values)
@@ -33,18 +33,18 @@ def ellipse(covariance: Floats, declination: float) -> Ellipse:
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """An unknown direction; all angles are in radians."""
+    """Estimated unknown direction; all angles are in radians."""
 
     star: str
     place: tuple[float, float]  # Right ascension and declination
-    correction: tuple[float, float]  # Of the direction of its first image
+    correction: tuple[float, float]  # Correction of the direction of its first image
     azimuth: float  # Observed (refracted) at its first image, from south, positive west
     elevation: float
-    mean_errors: tuple[float, float]  # Of right ascension times cos(declination), and declination
-    # m_i: mean error of unit weight from its own images, whose directions should be equal; that of the
-    # adjustment for a single image
+    mean_errors: tuple[float, float]  # Mean errors of right ascension times cos(declination), and declination
+    # m_i: mean error of unit weight from the agreement of its own images; for a single image, the one of the
+    # adjustment
     image_mean_error: float
-    orientation: Ellipse  # By the orientation alone, as if its images had no error
+    orientation: Ellipse  # From the orientation only, with error-free images
     total: Ellipse  # With its images at the mean error of unit weight of the adjustment
     published: Ellipse  # With its images at m_i, as in the report
 

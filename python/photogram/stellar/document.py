@@ -1,4 +1,4 @@
-"""The document of a camera that was calibrated by a plate with stars."""
+"""Document of a plate calibration with stars."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def plate_document(result: Result) -> Document:
 
 
 def _solution_sections(result: Result) -> dict[str, Section]:
-    """Return what a solution with separate attitudes and the combined one have alike, by keys."""
+    """Return sections common to separate and combined attitudes, by key."""
     rows = [INDEX[name] for name in result.estimated]
     cofactors = result.solved.cofactors[np.ix_(rows, rows)]
     title = "Inverse of the reduced normal equations"
@@ -120,7 +120,6 @@ def _combined(result: Result) -> list[Section]:
 
 
 def _members(result: Result) -> dict[str, Any]:
-    """Return the JSON document without its tables."""
     options, pre_run = result.problem.options, result.pre_run
     classes = residual_classes(result) if options.histogram else {}
     return {
@@ -142,7 +141,6 @@ def _members(result: Result) -> dict[str, Any]:
 
 
 def _solution_members(result: Result) -> dict[str, Any]:
-    """Return members of a solution, with separate attitudes or combined."""
     estimated = [INDEX[name] for name in result.estimated]
     options, residual = result.problem.options, result.solved.axis_residual
     groups, angle = tables.solved_groups(result) if options.refraction else {}, options.comparator_angle
@@ -215,7 +213,6 @@ def _good(result: Result) -> list[Fact]:
 
 
 def _residuals(result: Result) -> list[Fact]:
-    """Return the common mean errors before the adjustment, and the sums of residuals."""
     problem, residuals = result.problem, 1e6 * result.solved.residuals.T
     weights = problem.star_weights[problem.known & ~problem.held]
     return [
@@ -233,7 +230,7 @@ def _residuals(result: Result) -> list[Fact]:
 
 
 def _before(result: Result, weights: Floats, unit: float, name: str) -> tuple[str, str]:
-    """Write the mean errors before the adjustment that a common weight implies."""
+    """Return the text of the prior mean errors from a common weight."""
     if not len(weights) or not have_common_weight(weights):
         return "individual weights" if len(weights) else "-", ""
     x, y = result.mean_error / np.sqrt(np.diag(weights[0])) / unit
@@ -241,7 +238,6 @@ def _before(result: Result, weights: Floats, unit: float, name: str) -> tuple[st
 
 
 def _scale_test(result: Result) -> str:
-    """Return the test whether the two principal distances differ."""
     pair, freedom = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom
     if not (result.solved.free[pair].all() and freedom):
         return "not made: they are not estimated both"
@@ -252,7 +248,6 @@ def _scale_test(result: Result) -> str:
 
 
 def _derived(result: Result) -> list[Fact]:
-    """Return centres, principal distance, scales of the comparator, and the axis, with mean errors."""
     options, given, residual = result.problem.options, result.problem.axis, result.solved.axis_residual
     facts = []
     for name, *terms in (("XS", "xp", "dx"), ("YS", "yp", "dy")):
@@ -324,7 +319,6 @@ def _station(name: str, site: Site) -> list[Fact]:
 
 
 def _forms(result: Result) -> list[str]:
-    """Return the states of the options that the report does not have."""
     o = result.problem.options
     return [
         "SCALE AFTER DISTORTION" if o.distortion_first else "SCALE BEFORE DISTORTION",

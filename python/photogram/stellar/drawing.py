@@ -1,4 +1,4 @@
-"""What the pictures of plates and of digital exposures have alike."""
+"""Common plots of plates and digital exposures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
 
-_MEAN_RESIDUAL = 0.05  # Length in the plot, as a part of its extent
+_MEAN_RESIDUAL = 0.05  # Length in the plot, relative to its extent
 
 
 def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[Mark]:
@@ -23,7 +23,7 @@ def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[M
 
 
 def curves(marks: Sequence[Mark], across: str, up: str, title: str = "", legend: str = "best") -> Panel:
-    """Return a panel with room for all lines and bands on it."""
+    """Return a panel that contains all given lines and bands."""
     lines = [mark.places for mark in marks if isinstance(mark, Line)]
     x, y = np.concatenate(lines).T
     bands = [mark.places[..., 1] for mark in marks if isinstance(mark, Polygons)]
@@ -36,7 +36,7 @@ def vectors(
 ) -> tuple[list[Arrows], ScaleBar]:
     """Return residual vectors (m, 2) in a unit, and their scale.
 
-    Places have the unit of the axes; groups are names and the residuals of each, which have one colour.
+    Positions have the unit of the axes; groups are names and the residuals of each, with one colour.
     """
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     size = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) or 1.0
@@ -50,7 +50,7 @@ def vectors(
 
 
 def bells(every: dict[str, Floats], unit: str) -> Plot:
-    """Return histograms of residuals with their normal curves, by names of the residuals."""
+    """Return named histograms of residuals with normal curves."""
     panels = [_bell(values, f"residuals in {name}", unit) for name, values in every.items()]
     return Plot(11.0, 3.8, panels, len(panels))
 

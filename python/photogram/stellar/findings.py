@@ -1,4 +1,4 @@
-"""Tests of plates with stars and of exposures of the sky, and the findings of their verdicts."""
+"""Tests of star plates and sky exposures, and findings for their verdicts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _testable(values: Floats, redundancy: Floats, unit: float) -> Floats:
 
 
 def plate_tests(result: Result) -> list[Tested]:
-    """Return the tests of a plate: w if the mean error of unit weight is given (option 14), else t."""
+    """Return the tests of a plate: w for a given unit weight (option 14), else t."""
     problem, solved, given = result.problem, result.solved, result.problem.options.mean_error
 
     def image(index: tuple[int, ...]) -> Phrase:
@@ -65,7 +65,7 @@ def plate_findings(result: Result) -> Findings:
 
 
 def night_tests(result: CalibratedNight) -> list[Tested]:
-    """Return the tests of exposures: t, since the standard deviation of a pixel is an assumption."""
+    """Return the tests of exposures: t, since the pixel standard deviation is assumed."""
     found, freedom = result.calibration, result.calibration.degrees_of_freedom
 
     def image(index: tuple[int, ...]) -> Phrase:

@@ -1,4 +1,4 @@
-"""Mistakes that explain why an exposure shows no stars at its attitude, tested one by one."""
+"""Probable causes of exposures without identified stars, tested one by one."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 _MAX_EXPOSURES = 3
 _SCALES = tuple(1.1**k for k in range(-6, 7) if k)
-"""Principal distances over the given one; each covers half of the distance to the next."""
+"""Ratios of principal distances; each covers half of the distance to the next."""
 _WIDE = 0.05
-_HOUR = math.tau / 24 * 1.00273790935  # Rotation of the Earth against the stars, radians
+_HOUR = math.tau / 24 * 1.00273790935  # Hourly rotation of the Earth relative to the stars, radians
 
 Mend = Callable[[Exposure, "Night"], tuple[Exposure, "Night"]]
 
@@ -37,9 +37,9 @@ class _Mistake:
 
 
 def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[str, ...]] | None:
-    """Return the mistake that explains most exposures, by the odds against chance, and their names.
+    """Return the mistake that explains most exposures against chance, and their names.
 
-    The exposures that were not identified with the most images are tested; None if no mistake explains them.
+    Unidentified exposures with the most images are tested. None if all tested mistakes fail.
     """
     order = sorted(unidentified, key=lambda index: -len(night.exposures[index].xy))[:_MAX_EXPOSURES]
     mistakes = [*_mistakes(night.site), *(_roll_mistakes() if night.roll_known else ())]
@@ -66,10 +66,10 @@ def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[
 
 
 def _mistakes(site: Site) -> Iterator[_Mistake]:
-    """Return mistakes of images, angles and station, fields of view, and times of a clock.
+    """Yield mistakes of images, angles, station, fields of view and clocks.
 
-    Clocks show the time of the zone of the longitude, in summer, or an hour more or less. The sky some hours
-    later is the sky of a station so many hours of the rotation farther east.
+    Clocks may show the zone time of the longitude, summer time, or an hour more or less. The sky some hours
+    later is the sky of a station farther east by the same rotation.
     """
     west, half = site.longitude_west, math.pi / 2
     pointings: dict[str, Callable[[float, float, float], tuple[float, float, float]]] = {

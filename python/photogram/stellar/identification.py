@@ -1,4 +1,4 @@
-"""The catalogue stars of an exposure, accepted by the odds against a chance match, and attitudes by them."""
+"""Identification of the catalogue stars of an exposure by odds against chance, and attitudes from stars."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ if TYPE_CHECKING:
     from photogram.stellar import Night
 
 
-_GRID = (24, 16)  # points of the frame at which the sky is looked for
+_GRID = (24, 16)  # frame points for the search of the sky
 _LEAST = 0.02
 STARS_OF_AN_ATTITUDE = 2
 _STARS_OF_FIRST_ATTITUDE = 3
 
 
 def local_directions(standard: Floats) -> Floats:
-    """Return unit directions (n, 3) north, east, zenith of standard coordinates (n, 2)."""
+    """Return unit directions (n, 3) north, east, zenith of standard coordinates."""
     every = np.column_stack([standard, np.ones(len(standard))])
     return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True), float)
 
 
 def turned_to(rays: Floats, directions: Floats) -> Floats:
-    """Return alpha, omega, kappa of the camera that sees directions (n, 3) along rays (n, 3).
+    """Return alpha, omega, kappa that fit camera rays (n, 3) to directions (n, 3).
 
-    Rays have x right, y down and z along the axis, directions are north, east, zenith; finite rows count.
-    The matrix that maximizes the sum of ray' M direction is U diag(1, 1, d) V' of the singular value
-    decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991), with d = -1 or 1 so that
-    det M = -1: the local triad is left-handed.
+    Rays have x right, y down and z along the axis, directions are north, east, zenith; only finite rows are
+    used. The matrix that maximises the sum of ray' M direction is U diag(1, 1, d) V'. U and V are from the
+    singular value decomposition of the sum of ray direction' (S. Umeyama, IEEE PAMI 13, 1991). d is -1 or 1
+    so that det M = -1, since the local triad is left-handed.
     """
     finite = np.isfinite(rays).all(axis=1) & np.isfinite(directions).all(axis=1)
     left, _, right = np.linalg.svd(rays[finite].T @ directions[finite])
@@ -52,14 +52,14 @@ def turned_to(rays: Floats, directions: Floats) -> Floats:
 
 
 def has_named_stars(exposure: Exposure) -> bool:
-    """Whether the images of an exposure name enough stars for its attitude."""
+    """Return whether an exposure names enough stars for its attitude."""
     return exposure.stars is not None and int((exposure.stars >= 0).sum()) >= STARS_OF_AN_ATTITUDE
 
 
 def attitude_of_stars(
     exposure: Exposure, camera: SkyCamera, site: Site, catalogue: Catalogue, earth: Earth
 ) -> tuple[Floats, float]:
-    """Return alpha, omega, kappa of an exposure with named stars, and the sum of squared misfits.
+    """Return the attitude from named stars, and the sum of squared misfits.
 
     Misfits are between unit directions of images under the camera and of their stars.
     """
@@ -75,7 +75,7 @@ def attitude_of_stars(
 
 
 def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -> float:
-    """Return the part of a frame (width, height) that shows the sky, not the ground."""
+    """Return the fraction of a frame (width, height) above the horizon."""
     x, y = ((np.arange(count) + 0.5) / count * size for count, size in zip(_GRID, frame, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     zenith = camera.rays(grid) @ _photocore.pointing_matrix(np.asarray(attitude, float))[:, 2]
@@ -84,25 +84,25 @@ def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -
 
 
 def attitude_radius(night: Night) -> float:
-    """Return the largest displacement of an image by the error of the approximate attitude, pixels."""
+    """Return the largest image displacement by attitude errors, pixels."""
     return float(night.camera.values[0]) * math.tan(night.attitude_error)
 
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """Stars of the images of an exposure, and what speaks for them."""
+    """Candidate stars of an exposure, and their odds."""
 
     match: Match
     stars: Indices  # (k,) index in the catalogue by the best hypothesis, accepted or not; -1 for none
-    attitude: Floats  # (3,) alpha, omega, kappa that go with them; the given one where there are not enough
+    attitude: Floats  # (3,) alpha, omega, kappa from these stars; the given ones if there are too few
 
     @property
     def doubtful(self) -> bool:
-        """Whether it is not accepted, but may be right."""
+        """Return whether a rejected identification may be correct."""
         return not self.match.accepted and self.match.expected <= DOUBTFUL
 
     def reason(self) -> Phrase:
-        """Return why an exposure is not accepted."""
+        """Return why an exposure is rejected."""
         if self.match.crowded:
             return phrase("stars.crowded")
         if len(self.stars) < FEWEST:
@@ -124,15 +124,15 @@ def identify(
     stretch: float,
     tried: float = 0.0,
 ) -> Sighting:
-    """Find the catalogue star of each image of an exposure with an approximate attitude.
+    """Identify the catalogue stars of an exposure with an approximate attitude.
 
-    The camera is known but for a share `stretch` of its principal distance; the tolerance is the largest
-    distance of image and star after the best polynomials, pixels; `tried` is the number of hypotheses about
-    this exposure that were counted before.
+    The principal distance of the camera may have the relative error `stretch`. The tolerance is the largest
+    distance of image and star after the best polynomials, pixels. `tried` is the number of earlier hypotheses
+    about this exposure.
     """
     frame, catalogue, dut1, radius = night.frame, night.catalogue, night.earth.dut1, attitude_radius(night)
     if stretch > STRETCH:
-        # The corners are as far away from where they should be.
+        # The corners may have an equal additional displacement.
         radius += stretch * max(frame)
     site = night.earth.site_of_date(night.site)
     time = sidereal_time(site, exposure.utc, dut1)
@@ -169,19 +169,19 @@ class StarImages:
     stars: Indices  # (k,) catalogue star of each image, -1 for none
     off: Floats  # (k,) largest coordinate difference of image and star, pixels; NaN for none
     inside: int  # Catalogue stars in the frame
-    predicted: Floats  # (n, 2) where they and those within reach are, pixels
-    nearest: Indices  # (k,) which of these each image has; -1 for none
-    area: float  # Of the frame that shows the sky, square pixels
+    predicted: Floats  # (n, 2) predicted pixels of these and of stars within reach
+    nearest: Indices  # (k,) index of the star of each image among these; -1 for none
+    area: float  # Sky area of the frame, square pixels
     xy: Floats  # (k, 2) the images
     named: bool = False  # Whether the images name their stars
 
     @property
     def density(self) -> float:
-        """Catalogue stars a square pixel of the sky."""
+        """Catalogue stars per square pixel of the sky."""
         return self.inside / self.area
 
     def probabilities(self, sd: float) -> Floats:
-        """Return the probability (k,) of each star, NaN for none, and where images name theirs.
+        """Return the probability (k,) of each star; NaN for missing or named stars.
 
         `sd` is the standard deviation of an image coordinate.
         """
@@ -190,16 +190,16 @@ class StarImages:
         return star_probabilities(self.xy, self.predicted, self.nearest, sd, self.density)
 
     def log_odds(self, sd: float) -> float:
-        """Return the logarithm of the odds of the exposure against chance, as Lang et al. have them."""
+        """Return the logarithmic odds of the exposure against chance (Lang et al.)."""
         has = self.nearest >= 0
         off = np.linalg.norm(self.xy[has] - self.predicted[self.nearest[has]], axis=1)
         return log_odds(off, len(self.stars), sd, self.density)
 
     def expected(self, limit: float, radius: float, roll: float) -> float:
-        """Return the expected number of wrong attitudes under which as many images have a star so near.
+        """Return the expected number of wrong attitudes with an equally good match.
 
-        Attitudes are counted that differ by the limit (pixels), as far as the approximate one may be wrong
-        (`radius`, pixels), and the corners by its turn about the axis (`roll`, pixels).
+        Attitudes are counted in steps of the limit (pixels). They cover the errors of the approximate
+        attitude (`radius`, pixels) and of its roll at the corners (`roll`, pixels).
         """
         mu = self.density * (2 * limit) ** 2
         attitudes = (1 + 2 * radius / limit) ** 2 * (1 + 2 * roll / limit)
@@ -208,9 +208,9 @@ class StarImages:
 
 
 def identify_again(exposure: Exposure, night: Night, camera: SkyCamera, reach: float) -> StarImages:
-    """Find the nearest star within a reach (pixels) of each image under a calibrated camera and attitude.
+    """Find the nearest star within a reach (pixels) of each image, after calibration.
 
-    Images that name their star keep it.
+    Named stars of images are unchanged.
     """
     frame, site, catalogue, dut1 = night.frame, night.site, night.catalogue, night.earth.dut1
     near = stars_near(exposure, camera, site, catalogue, frame, 0.0, dut1)

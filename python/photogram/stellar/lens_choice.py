@@ -1,15 +1,15 @@
-"""Tests of lenses: which lens fits the stars best, and which of its terms are significant.
+"""Choice of a lens model from stars, and significance tests of its terms.
 
-Every candidate is adjusted to the same images of stars (`photogram.stellar.night_calibration`). Lenses that
-are not special cases of each other are compared by G. Schwarz's criterion (Ann. Stat. 6, 1978),
-BIC = n ln(Omega / n) + k ln n, with the weighted sum of squares Omega of the images that all of them keep,
-k parameters of the camera and n = degrees of freedom + k: parameters of attitudes reduce n and are not in k.
-A difference above 10 is decisive, above 2 positive; below, the lens with fewer parameters is chosen.
+Every candidate is adjusted to the same star images (`photogram.stellar.night_calibration`). Lenses that are
+not special cases of each other are compared by G. Schwarz's criterion (Ann. Stat. 6, 1978), BIC = n ln(Omega
+/ n) + k ln n. Omega is the weighted sum of squares of the images used by all lenses. k is the number of
+camera parameters, and n = degrees of freedom + k. Attitude parameters reduce n and are not in k. A difference
+above 10 is decisive, above 2 positive; below, the lens with fewer parameters is chosen.
 
-Whether fx is fy, and which terms are significant: a group of k parameters x with the cofactors Q is tested by
-F = x' Q^-1 x / (k m^2) against Fisher's distribution of k and f degrees of freedom (A. Wald's test; for one
-parameter Student's t squared). Terms are removed backwards, the least significant group first, under the
-condition that those removed before are zero; the level is that of all groups together (Bonferroni).
+A group of k parameters x, such as fx - fy or lens terms, with the cofactors Q is tested by F = x' Q^-1 x / (k
+m^2). F has Fisher's distribution of k and f degrees of freedom (A. Wald's test; for one parameter Student's t
+squared). Terms are removed backwards, least significant group first, with the condition that removed terms
+are zero. The level refers to all groups together (Bonferroni).
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase
 
-LEVEL = 0.01  # Probability that terms that are zero are kept
-NOTABLE = 0.2  # Displacement by a term (sd of an image coordinate)
+LEVEL = 0.01  # Probability that zero terms are retained
+NOTABLE = 0.2  # Notable displacement by a term (sd of an image coordinate)
 _GRID = 9
 DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC
 
 
 @dataclass(frozen=True)
 class LensTest:
-    """A test of parameters of the lens."""
+    """Significance test of lens parameters."""
 
-    name: str  # What is tested to be zero: `fx - fy`, `k3`, `p1, p2`
+    name: str  # Hypothesis of zero: `fx - fy`, `k3`, `p1, p2`
     statistic: float  # F with `dimension` and `freedom` degrees of freedom
-    dimension: int  # Of the statistic
+    dimension: int  # Degrees of freedom of the statistic
     freedom: int
-    probability: float  # Of a statistic as large if it is zero
-    level: float  # Probability below which it is not zero
-    effect: float  # Largest displacement that it makes in the frame, pixels
-    notable: bool  # Whether that is more than a fifth of the standard deviation of an image coordinate
+    probability: float  # Probability of an equal or larger statistic if the parameters are zero
+    level: float  # Probability below which the parameters are not zero
+    effect: float  # Largest displacement in the frame by the parameters, pixels
+    notable: bool  # Whether it is more than a fifth of the standard deviation of an image coordinate
 
     @property
     def significant(self) -> bool:
-        """Whether it differs significantly from zero."""
+        """Whether the parameters differ significantly from zero."""
         return self.probability < self.level
 
     @property
     def needed(self) -> bool:
-        """Whether it is significant and large enough to matter."""
+        """Whether the parameters are significant and have a notable effect."""
         return self.significant and self.notable
 
     @property
@@ -61,18 +61,18 @@ class LensTest:
 
 @dataclass(frozen=True)
 class LensFit:
-    """A lens that was adjusted, or the reason why it could not be."""
+    """Adjusted lens, or the reason of its failure."""
 
     lens: str
     parameters: int  # Estimated parameters of the camera
-    images: int  # Images that all lenses are compared by
+    images: int  # Images used to compare all lenses
     mean_error: float  # Mean error of unit weight; NaN without an adjustment
     bic: float  # Schwarz's criterion; infinite without an adjustment
     reason: str | Phrase = ""
 
 
 def _fisher(change: Floats, covariance: Floats, freedom: int) -> tuple[float, float]:
-    """Return F of parameters with their covariance (scaled by m^2), and its probability."""
+    """Return F of parameters with covariance (scaled by m^2), and its probability."""
     scale = np.sqrt(np.diag(covariance))
     scaled = change / scale
     found = float(scaled @ np.linalg.solve(covariance / np.outer(scale, scale), scaled)) / len(change)
@@ -80,9 +80,9 @@ def _fisher(change: Floats, covariance: Floats, freedom: int) -> tuple[float, fl
 
 
 def equal(values: Floats, covariance: Floats, freedom: int) -> tuple[float, float]:
-    """Return F of the difference of two values with their covariance (2, 2), and its probability.
+    """Return F of a difference of two values with covariance (2, 2), and probability.
 
-    F has 1 and `freedom` degrees of freedom, those of the unit weight that scales the covariance.
+    F has 1 and `freedom` degrees of freedom. The latter belong to the unit weight that scales the covariance.
     """
     (xx, xy), (_, yy) = covariance
     return _fisher(np.array([values[0] - values[1]]), np.array([[xx + yy - 2 * xy]]), freedom)
@@ -91,15 +91,15 @@ def equal(values: Floats, covariance: Floats, freedom: int) -> tuple[float, floa
 def test_scale(
     camera: SkyCamera, freedom: int, frame: tuple[float, float], pixel_sd: float
 ) -> LensTest | None:
-    """Test whether fx is fy; None if they were not both estimated.
+    """Test whether fx equals fy; None if they were not both estimated.
 
-    `freedom` are the degrees of freedom of the mean error of unit weight; frame and deviation are in pixels.
+    `freedom` is the redundancy of the mean error of unit weight; frame and deviation are in pixels.
     """
     if not (camera.known[:2].all() and freedom > 0):
         return None
     statistic, probability = equal(camera.values[:2], camera.covariance[:2, :2], freedom)
     difference = camera.values[0] - camera.values[1]
-    # Half of it goes into each axis.
+    # Half of it affects each axis.
     reach = 0.5 * max(frame) / float(np.mean(camera.values[:2]))
     effect = 0.5 * abs(float(difference)) * reach
     return LensTest("fx - fy", statistic, 1, freedom, probability, LEVEL, effect, effect > NOTABLE * pixel_sd)
@@ -108,7 +108,10 @@ def test_scale(
 def test_terms(
     camera: SkyCamera, freedom: int, frame: tuple[float, float], pixel_sd: float
 ) -> list[LensTest]:
-    """Test the groups of lens terms backwards as `test_scale`; removed terms come first, in their order."""
+    """Test the groups of lens terms backwards as in `test_scale`.
+
+    Removed terms are listed first, in order of removal.
+    """
     names = list(camera.names)
     groups = [
         [names.index(name) for name in group if camera.known[names.index(name)]]

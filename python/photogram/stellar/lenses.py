@@ -1,4 +1,4 @@
-"""The lenses of digital cameras that stars calibrate: models of `docs/cameras.md`."""
+"""Lenses of digital cameras for stellar calibration: models of `docs/cameras.md`."""
 
 from __future__ import annotations
 
@@ -12,28 +12,25 @@ from photogram.messages import unknown_name
 
 @dataclass(frozen=True)
 class Lens:
-    """A lens."""
+    """Lens model of a digital camera."""
 
-    model: str  # The camera of `docs/cameras.md` that it is
-    # Parameters in the order of reports and files, fx, fy, cx, cy first; those of the model that are
-    # missing are zero
+    model: str  # Camera model of `docs/cameras.md`
+    # Parameters in the order of reports and files, fx, fy, cx, cy first; missing model parameters are zero
     names: tuple[str, ...]
     order: tuple[str, ...]  # All parameters of the model, in its order
-    # Distance from the principal point in principal distances, without lens terms, of an angle from the
-    # axis (radians)
+    # Distance from the principal point in principal distances, without lens terms, for an axis angle
+    # (radians)
     radius: Callable[[float], float]
-    formula: str  # The same for reports
-    widest: float  # The field of view (radians) from which on it has no image
-    # Terms that are zero unless a camera file says otherwise: without them the lens is the projection
-    # of its name
+    formula: str  # The radius formula for reports
+    widest: float  # The field of view (radians) at and above which images are undefined
+    # Terms that are zero unless given in a camera file: without them the lens is the named projection
     held: tuple[str, ...] = ()
-    # Terms that are tested together, in the order in which they are left out where the data do not show
-    # them
+    # Groups of terms for tests, in the order of removal if insignificant
     groups: tuple[tuple[str, ...], ...] = ()
 
     @property
     def places(self) -> tuple[int, ...]:
-        """Where the parameters stand in the model."""
+        """Indices of the parameters in the model."""
         return tuple(self.order.index(name) for name in self.names)
 
 
@@ -80,11 +77,14 @@ LENSES: dict[str, Lens] = {
         groups=(("k4",), ("k3",), ("k2",), ("k1",)),
     ),
 }
-"""Lenses by the names that files and reports have for them."""
+"""Lenses by name in files and reports."""
 
 
 def lens_named(name: str) -> Lens:
-    """Return a lens; InputError: an unknown name."""
+    """Return a lens.
+
+    InputError: if the name is unknown.
+    """
     if name not in LENSES:
         raise InputError(unknown_name("lens", name, LENSES))
     return LENSES[name]

@@ -1,4 +1,4 @@
-"""Which catalogue star a measured image shows, from an approximate attitude and camera, and by what odds."""
+"""Matching of star images to catalogue stars from an approximate attitude and camera, with odds."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-_SEEDS = 25  # Brightest images that make hypotheses; three times as many support them
-_EXACT = 20  # Hypotheses with the most support, which are counted exactly
+_SEEDS = 25  # Brightest images for hypotheses; three times this number support them
+_EXACT = 20  # Hypotheses with the most support, which are evaluated exactly
 _CANDIDATES, _TURNED = 1500, 800
-"""Largest numbers of pairs of an image and a star that make hypotheses, with known and unknown roll."""
-_DEEPER = 2  # Stars in the frame for each image; fainter ones of the catalogue would match by chance only
-FEWEST = 3  # Images, and stars, that a match requires
-STRETCH = 0.01  # Largest error of the scale of the approximate camera, as a share
+"""Largest numbers of image-star pairs for hypotheses, with known and unknown roll."""
+_DEEPER = 2  # Stars in the frame per image; fainter ones of the catalogue would match only by chance
+FEWEST = 3  # Minimum number of images, and of stars, for a match
+STRETCH = 0.01  # Largest relative scale error of the approximate camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,33 +26,33 @@ class Match:
     """Matched images, and the probability of an equally good match by chance."""
 
     found: Indices  # (m,) index of the predicted image of each image; -1 for none
-    expected: float  # Number of equally good matches among all hypotheses if all are wrong
-    matched: int  # Images of the count, and those of them that matched
+    expected: float  # Expected number of equally good matches among all wrong hypotheses
+    matched: int  # Counted images, and the matched ones of them
     images: int
-    crowded: bool = False  # Whether so many stars are in a tolerance area that counting is impossible
-    scale: float = 1.0  # Of the predicted images over the measured ones
+    crowded: bool = False  # Whether too many stars in a tolerance area prevent counting
+    scale: float = 1.0  # Scale of predicted relative to measured images
     hypotheses: float = 0.0
     stars: int = 0  # Predicted images
 
     @property
     def accepted(self) -> bool:
-        """Whether chance does not explain the match."""
+        """Return whether the match is significant against chance."""
         return self.expected < ACCEPTED
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Where the images of stars may be."""
+    """Search region of star images."""
 
     frame: tuple[float, float]  # Width and height
-    radius: float  # Largest distance of an image from its prediction; of distances from an unknown roll axis
-    stretch: float = STRETCH  # Largest error of the scale, as a share
+    radius: float  # of an image from its prediction; for unknown roll, of distances from the axis
+    stretch: float = STRETCH  # Largest relative scale error
     axis: Floats | None = None  # (2,) the image of the axis if the roll is unknown
-    share: float = 1.0  # Part of the frame that shows the sky
-    tried: float = 0.0  # Hypotheses that were counted before in the same exposure
+    share: float = 1.0  # Fraction of the frame above the horizon
+    tried: float = 0.0  # Earlier hypotheses for the same exposure
 
     def regions(self, predicted: Floats) -> tuple[Bools, float, float]:
-        """Return which predicted images are in the middle, the area of that, and the area of all."""
+        """Return which predicted images are central, the central area, and the total area."""
         width, height = self.frame
         if self.axis is None:
             around = (width + 2 * self.radius) * (height + 2 * self.radius)
@@ -63,7 +63,7 @@ class Search:
         return middle, math.pi * inner**2, math.pi * outer**2 * self.share
 
     def candidates(self, measured: Floats, predicted: Floats) -> Bools:
-        """Return (m, n) whether a star may be where an image is."""
+        """Return (m, n) whether image and star are possible pairs."""
         if self.axis is None:
             return np.asarray(
                 np.linalg.norm(measured[:, None] - predicted[None], axis=2) <= self.radius, bool
@@ -74,14 +74,14 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class _Sky:
-    """Predicted images as deep as the measured ones, and their density."""
+    """Predicted images with the depth of the measured ones, and their density."""
 
-    predicted: Floats  # (n, 2), the brightest first
-    density: float  # Stars a square pixel: in the frame or around it, whichever is larger
+    predicted: Floats  # (n, 2), brightest first
+    density: float  # Stars per square pixel: in the frame or around it, whichever is larger
 
     @classmethod
     def as_deep(cls, predicted: Floats, images: int, search: Search) -> _Sky:
-        """Take the brightest predicted images, for so many measured ones in the frame."""
+        """Return the brightest predicted images for a number of measured ones."""
         width, height = search.frame
         _, _, around = search.regions(predicted)
         seen = width * height * search.share
@@ -95,13 +95,13 @@ class _Sky:
 
 
 def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: float) -> Match:
-    """Match measured star images (m, 2) to predicted ones (n, 2), both sorted by brightness.
+    """Match measured star images (m, 2) to predicted ones (n, 2), brightest first.
 
-    Pairs of bright images support a similarity between the two sets; the best one is refined by cubic
-    polynomials. The tolerance is the largest distance after these. Two counts show whether that is more than
-    chance (`photogram.stellar.odds`): of the bright images near a star under the best similarity; and of
-    every second image under polynomials that were fitted to the others. Either holds for all hypotheses
-    together, so both take part in their number.
+    Pairs of bright images define similarity transformations between the two sets. The best one is refined by
+    cubic polynomials, and the tolerance is the largest distance after these. Two counts are tested against
+    chance (`photogram.stellar.odds`). The first counts bright images near a star under the best similarity,
+    the second every second image under polynomials fitted to the others. Both account for the total number of
+    hypotheses.
     """
     none = Match(np.full(len(measured), -1, np.int64), math.inf, 0, len(measured), stars=len(predicted))
     if min(len(measured), len(predicted)) < FEWEST:
@@ -109,7 +109,7 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
     seeds = measured[: 3 * _SEEDS]
     bright = _Sky.as_deep(predicted, len(seeds), search)
     made, promising = _similarities(seeds, bright.predicted, search, tolerance)
-    # Both counts take part, and what was tried before.
+    # Includes both counts and earlier hypotheses.
     hypotheses = 2.0 * made + search.tried
     best, most = None, 2
     for transform in promising:
@@ -128,7 +128,7 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
         _refined(measured, sky.predicted, best, tolerance, halves), sky.predicted, tolerance
     )
     held_out = int((again[~halves] >= 0).sum())
-    # Both images of a pair may be among those held out.
+    # Both images of a pair may be among the excluded ones.
     second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, hypotheses)
     crowded = sky.mu(tolerance) > CROWDED
     counted = (most, len(seeds))
@@ -147,9 +147,9 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
 
 
 def _certain(moved: Floats, sky: _Sky, tolerance: float) -> Indices:
-    """Match images to stars, but for those that show another one nearly as well.
+    """Match images to stars if no other star is nearly as probable.
 
-    These wait for the calibrated camera.
+    Ambiguous images are matched with the calibrated camera.
     """
     found = mutually_nearest(moved, sky.predicted, tolerance)
     has = found >= 0
@@ -162,14 +162,14 @@ def _certain(moved: Floats, sky: _Sky, tolerance: float) -> Indices:
 
 
 def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: float, fitted: Bools) -> Floats:
-    """Move all images by polynomials that fit some of them to the predicted ones."""
+    """Move all images by polynomials fitted to some of them."""
     moved = _apply(start, measured)
     for degree in (1, 1, 2, 3, 3, 3):
         found = mutually_nearest(moved, predicted, 2 * tolerance)
         chosen = (found >= 0) & fitted
         if chosen.sum() < 3:
             return moved
-        # Three matches and more for each coefficient.
+        # At least three matches per coefficient.
         degree = min(degree, 3 if chosen.sum() > 30 else 2 if chosen.sum() > 18 else 1)
         moved = _fitted(measured, chosen, predicted[found[chosen]], degree)
     return moved
@@ -178,7 +178,7 @@ def _refined(measured: Floats, predicted: Floats, start: Floats, tolerance: floa
 def _similarities(
     seeds: Floats, predicted: Floats, search: Search, tolerance: float
 ) -> tuple[int, list[Floats]]:
-    """Return how many similarities pairs of candidates make, and (3, 2) those with the most votes."""
+    """Return the number of similarities of candidate pairs, and the best ones (3, 2)."""
     makers = seeds[:_SEEDS]
     images, stars = np.nonzero(search.candidates(makers, predicted))
     most = _CANDIDATES if search.axis is None else _TURNED
@@ -206,7 +206,7 @@ def _apply(transform: Floats, points: Floats) -> Floats:
 
 
 def _fitted(measured: Floats, chosen: Bools, predicted: Floats, degree: int) -> Floats:
-    """Move all images by the polynomials that fit the matched ones; tilt is quadratic, distortion cubic."""
+    """Move all images by polynomials: quadratic for tilt, cubic for distortion."""
     x, y = (measured / np.abs(measured).max(initial=1.0)).T
     powers = [(i, k - i) for k in range(degree + 1) for i in range(k + 1)]
     design = np.column_stack([x**i * y**j for i, j in powers])

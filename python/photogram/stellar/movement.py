@@ -1,4 +1,4 @@
-"""Whether the camera has moved (NOAA TR NOS 55, equations 99 to 103), and attitudes with common values."""
+"""Movement test of the camera (NOAA TR NOS 55, equations 99 to 103), and combination of attitudes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Movement:
-    """A fictitious point under two attitudes."""
+    """Comparison of a fictitious point under two attitudes."""
 
     first: str  # The groups
     second: str
@@ -35,14 +35,14 @@ class Movement:
 
 @dataclass(frozen=True, eq=False)
 class FictitiousPoint:
-    """A plate point as a direction under one attitude."""
+    """Direction of a plate point under one attitude."""
 
-    group: str  # Of the attitude
+    group: str  # Group of the attitude
     xy: float  # x = y of the point, metres
     place: tuple[float, float]  # Apparent right ascension and declination, radians
     azimuth: float  # Observed (refracted), from south, positive west; radians
     elevation: float
-    covariance: Floats  # (2, 2) of the place by the orientation, radians squared
+    covariance: Floats  # (2, 2) direction covariance from the orientation, radians squared
 
 
 _DIAGONAL = np.arange(9) * 0.01  # x = y of the fictitious points, metres
@@ -50,7 +50,7 @@ PAIRS = ((0, 1), (1, 2), (0, 2))  # Post minus pre, event minus post, event minu
 
 
 def movement(result: Result) -> tuple[Movement, ...]:
-    """Compare the directions of nine points on the diagonal under every two attitudes.
+    """Compare the directions of nine diagonal points for all pairs of attitudes.
 
     The mean error follows from the covariance of all parameters, since both attitudes share the camera.
     """
@@ -71,7 +71,7 @@ def movement(result: Result) -> tuple[Movement, ...]:
 
 
 def fictitious_points(result: Result) -> tuple[FictitiousPoint, ...]:
-    """Compute the directions of the nine points under every attitude, with their covariances."""
+    """Compute the directions of the nine points for every attitude, with covariances."""
     points = []
     for group in _solved(result):
         places, local, by = _directions(result, group)
@@ -89,12 +89,12 @@ def _solved(result: Result) -> list[int]:
 
 
 def pairs_to_combine(test: tuple[Movement, ...], factor: float) -> tuple[tuple[str, str], ...]:
-    """Name the pairs whose directions of the plate's centre differ by less than `factor` mean errors."""
+    """Return pairs whose centre directions differ by less than `factor` mean errors."""
     return tuple((m.first, m.second) for m in test if m.xy == 0 and m.angle < factor * m.mean_error)
 
 
 def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
-    """Return places, azimuths and elevations of the points, and partials of the places by the parameters."""
+    """Return directions, azimuths and elevations of points, and direction partials."""
     problem, parameters = result.problem, result.solved.parameters
     count, index, kind = len(_DIAGONAL), np.arange(len(_DIAGONAL)), problem.options.camera_kind
     xy = np.column_stack([_DIAGONAL, _DIAGONAL])
@@ -122,15 +122,15 @@ def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
     rows = np.zeros((count, 2, len(parameters)))
     rows[:, :, 3 * group : 3 * group + 3] = equations["pointing"]
     rows[:, :, 9:] = equations["common"]
-    # The image does not move: B_x d(place) = -B_o d(parameters).
+    # The image is fixed: B_x d(direction) = -B_o d(parameters).
     local = np.column_stack([azimuth, elevation])
     return places, local, np.asarray(-np.linalg.solve(equations["star"], rows), float)
 
 
 def _angle(a: Floats, b: Floats) -> tuple[float, Floats]:
-    """Return the angle between two directions, and its partials by both (equations 100 and 102).
+    """Return the angle of two directions, and its partials (equations 100 and 102).
 
-    Equal directions have no partials; those of a movement along the meridian replace them.
+    Partials for equal directions are undefined and replaced by those for a movement along the meridian.
     """
     (sa, ca), (sb, cb) = (np.sin(a[1]), np.cos(a[1])), (np.sin(b[1]), np.cos(b[1]))
     sd, cd = np.sin(b[0] - a[0]), np.cos(b[0] - a[0])
@@ -168,7 +168,7 @@ def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:
 
 
 def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> tuple[Floats, Floats]:
-    """Return corrections and cofactors under constraints C x = misclosure (equations 104 and 105).
+    """Return corrections and cofactors under C x = misclosure (equations 104 and 105).
 
     The cofactors (n, n) are the inverse of the normal matrix without constraints, `right` (n,) is its
     right-hand side, c (k, n) the constraints.
@@ -180,10 +180,10 @@ def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> t
 
 
 def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int | None = None) -> Result:
-    """Constrain the attitudes of pairs to common values; two pairs imply all three groups.
+    """Constrain the attitudes of pairs to be equal; two pairs imply all three groups.
 
-    As published by one linear step; else iterated, with one attitude for the groups. The degrees of freedom
-    of the result count the constraints.
+    As published, this is one linear step; otherwise it is iterated with one attitude for the groups. The
+    degrees of freedom of the result include the constraints.
     """
     counts = replace(result.counts, constraints=len(constraints(pairs, len(NAMES))))
     published = result.problem.options.as_published
@@ -195,7 +195,7 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
     """Correct once (equations 104 and 105), and compute residuals."""
     solved, problem = result.solved, result.problem
     c = constraints(pairs, len(solved.parameters))
-    # Whole turns between two kappas are no movement.
+    # Whole rotations between two kappas are not movements.
     off = c @ solved.parameters
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
@@ -213,12 +213,12 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
 
 
 def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int | None) -> Solved:
-    """Adjust again with one attitude for the groups of the pairs, and give it to all of them."""
+    """Adjust again with one attitude for all groups of the pairs."""
     solved, problem = result.solved, result.problem
     together = sorted({GROUPS.index(name) for pair in pairs for name in pair})
     last = together[-1]
     groups = np.array([last if group in together else group for group in range(3)])
-    # All parameters from those that are left.
+    # All parameters from the remaining ones.
     spread = np.eye(len(NAMES))
     for group in together[:-1]:
         spread[3 * group : 3 * group + 3] = spread[3 * last : 3 * last + 3]
@@ -239,7 +239,7 @@ def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int |
         limit=problem.options.max_iterations,
         threads=threads,
     )
-    # The sum of squares has the differences of the common values from the weighted values of each group.
+    # The sum of squares contains the differences of the common values from the weighted values of each group.
     off, axis = spread @ again.parameters - problem.initial, again.axis_residual
     weighted = float(off @ problem.parameter_weights @ off)
     if problem.axis is not None and axis is not None:
@@ -254,12 +254,12 @@ def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int |
 
 
 def _common_weights(problem: Problem, spread: Floats, near: Floats) -> tuple[Floats, Floats]:
-    """Return weights and weighted values of the parameters that are left: those of groups together add up."""
+    """Return weights and weighted values of the remaining parameters, summed."""
     weights = spread.T @ problem.parameter_weights @ spread
     if not problem.weighted[:9].any():
         return weights, problem.initial
     initial = problem.initial.copy()
-    # Whole turns between two angles are no difference.
+    # Remove whole rotations between two angles.
     initial[:9] += 2 * np.pi * np.round(((spread @ near)[:9] - initial[:9]) / (2 * np.pi))
     weighted = np.flatnonzero(np.diag(weights) > 0)
     right = spread.T @ problem.parameter_weights @ initial

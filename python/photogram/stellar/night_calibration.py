@@ -1,7 +1,7 @@
-"""A night of exposures: from measured star images and rough attitudes to the calibrated camera.
+"""Calibration of a camera from a night of exposures with approximate attitudes.
 
-Stars are identified with an ideal camera first, then again with the calibrated one; images that contradict it
-are rejected, round by round.
+Stars are identified with an ideal camera first, then with the calibrated one. Inconsistent images are
+rejected in rounds.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ from photogram.words import Phrase, phrase
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
 
-_MAX_FIELDS = 200  # Fields of view that are tried if images name their stars
+_MAX_FIELDS = 200  # Fields of view that are tested if images name their stars
 _MAX_ROUNDS = 10
 
 
 def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight:
     """Identify the stars of a night and calibrate the camera.
 
-    An exposure takes part if its stars are not explained by chance (`photogram.stellar.odds`) and it fits the
-    camera of the others (`photogram.stellar.comparison`). Messages name the other exposures and the mistake
-    that explains them, if there is one (`photogram.stellar.hints`).
+    An exposure is used if its stars are significant against chance (`photogram.stellar.odds`) and if it fits
+    the camera of the others (`photogram.stellar.comparison`). Messages name the other exposures and the
+    probable cause, if found (`photogram.stellar.hints`).
 
     Raises
     ------
     InputError
-        No exposure shows enough stars of the catalogue; fewer than one thread.
+        If all exposures show too few stars of the catalogue, or if `threads` is less than 1.
     AdjustmentError
-        The stars do not determine the camera.
+        If the stars do not determine the camera.
     """
-    # The pole turns all attitudes by the same angle, and is used in the last adjustment only.
+    # The pole rotates all attitudes by the same angle, and is used only in the last adjustment.
     still = replace(night, earth=Earth(night.earth.dut1))
     lenses: list[LensFit] = []
     if night.blind is not None:
@@ -85,7 +85,7 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
 
 
 def _located(night: Night, fields: tuple[float, float]) -> Night:
-    """Return the night with the attitudes and the field of view that fit anywhere in the sky."""
+    """Return the night with attitudes and field of view located on the whole sky."""
     unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
     found = (
         locate([night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth)
@@ -113,7 +113,7 @@ def _located(night: Night, fields: tuple[float, float]) -> Night:
 
 
 def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
-    """Return the field of view that fits the named stars of exposures best; empty without named stars."""
+    """Return the best field of view for named stars of exposures; empty without them."""
     named = [exposure for exposure in night.exposures if has_named_stars(exposure)]
 
     def misfit(field: float) -> float:
@@ -127,7 +127,6 @@ def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
 
 
 def _directed(night: Night) -> Night:
-    """Return the night with attitudes by named stars of exposures without an attitude."""
     exposures = [
         replace(
             exposure,
@@ -141,7 +140,6 @@ def _directed(night: Night) -> Night:
 
 
 def _run(night: Night, threads: int | None) -> Run:
-    """Identify and adjust until all exposures fit each other."""
     run = Run(night, threads)
     run.compare()
     if run.identify_rejected():
@@ -150,7 +148,7 @@ def _run(night: Night, threads: int | None) -> Run:
 
 
 def _with_best_lens(night: Night, threads: int | None) -> tuple[list[LensFit], Night]:
-    """Choose a lens by the images that the best of them identifies; return all, and the night with it."""
+    """Choose the best lens for common images; return all lenses, and the new night."""
     runs, failed = [], []
     for lens in night.lenses:
         try:
@@ -167,14 +165,14 @@ def _with_best_lens(night: Night, threads: int | None) -> tuple[list[LensFit], N
 
 
 def _with_camera(night: Night, camera: SkyCamera) -> Night:
-    """Return the night with another camera, and those fixed parameters that the camera has."""
+    """Return the night with another camera and its applicable fixed parameters."""
     return replace(night, camera=camera, fixed=tuple(name for name in night.fixed if name in camera.names))
 
 
 def as_lens(camera: SkyCamera, lens: str, frame: tuple[float, float]) -> SkyCamera:
     """Return an ideal camera of another lens with the same horizontal field of view.
 
-    Raises InputError: the field of view of the lens is smaller.
+    InputError: if the field of view exceeds the lens.
     """
     if lens == camera.lens:
         return camera
@@ -186,11 +184,11 @@ def as_lens(camera: SkyCamera, lens: str, frame: tuple[float, float]) -> SkyCame
 def _compared_lenses(
     night: Night, exposures: Sequence[Exposure], camera: SkyCamera, threads: int | None
 ) -> tuple[list[LensFit], SkyCamera]:
-    """Adjust lenses to the same images; return them, the best first, and the camera of the best.
+    """Adjust lenses to the same images; return them, best first, and the best camera.
 
-    Images that one lens rejects are not used for any lens, unless the lens rejects most of them.
+    Images rejected by one lens are not used for any lens, unless the lens rejects most of them.
 
-    Raises AdjustmentError: no lens can be adjusted.
+    AdjustmentError: if the adjustment fails for all lenses.
     """
     night = replace(night, weigh_stars=False)
 
@@ -257,7 +255,7 @@ def _reasons(failed: Sequence[LensFit]) -> list[Phrase]:
 
 
 def _scale_test(night: Night, run: Run, threads: int | None) -> LensTest | None:
-    """Test fx = fy; with this condition by an adjustment without it."""
+    """Test fx = fy; if this is a condition, by an adjustment without it."""
     found = run.found
     if night.common_scale:
         if night.prior is not None:
@@ -268,7 +266,6 @@ def _scale_test(night: Night, run: Run, threads: int | None) -> LensTest | None:
 
 
 def _failed(result: CalibratedNight) -> Iterator[Phrase]:
-    """Return the reasons why the camera cannot be used."""
     lens = result.camera.lens
     if not result.converged:
         yield phrase("stars.not-converged", status=result.calibration.status)
@@ -288,7 +285,6 @@ def _failed(result: CalibratedNight) -> Iterator[Phrase]:
 
 
 def _remarks(result: CalibratedNight) -> Iterator[Phrase]:
-    """Return remarks on parameters that the stars hardly determine, and on the tests of lens and tripod."""
     yield from correlation_remarks(result.correlated())
     tests, scale, standstill = result.term_tests, result.scale_test, result.standstill
     if weak := [test for test in tests if not test.significant]:

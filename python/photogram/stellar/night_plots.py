@@ -1,4 +1,4 @@
-"""Pictures of a calibrated night: stars, residuals, histogram, distortion."""
+"""Plots of a calibrated night: stars, residuals, histogram, distortion."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from photogram.stellar.drawing import band, bells, curves, vectors
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight
 
-_MAX_COLOURS = len(COLOURS)  # More exposures are drawn alike
+_MAX_COLOURS = len(COLOURS)  # Further exposures have the same colour
 
 
 def sketches(result: CalibratedNight) -> dict[str, Plot]:
-    """Return all pictures by name."""
+    """Return all plots by name."""
     x, y = result.calibration.residuals.T
     return {
         "stars": _stars(result),
@@ -31,7 +31,7 @@ def sketches(result: CalibratedNight) -> dict[str, Plot]:
 
 
 def _frame(result: CalibratedNight, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Plot:
-    """Return marks on the frame as the picture is seen: y downward."""
+    """Return a plot of marks on the frame with y downward."""
     width, height = result.night.frame
     outline = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]], float)
     ends = [each.places + each.vectors for each in marks if isinstance(each, Arrows)]
@@ -71,7 +71,7 @@ def _residuals(result: CalibratedNight) -> Plot:
 
 
 def _of_angle(result: CalibratedNight) -> Plot:
-    """Draw the distance from the principal point over the angle, and what the terms change in it."""
+    """Draw the principal point distance against the angle, and the effect of terms."""
     camera, frame = result.camera, result.night.frame
     theta = np.linspace(0, min(camera.largest_angle(frame), np.radians(110)), 200)
     along = np.column_stack([np.sin(theta), np.zeros(len(theta)), np.cos(theta)])
@@ -90,7 +90,7 @@ def _of_angle(result: CalibratedNight) -> Plot:
 
 
 def _of_brown(result: CalibratedNight) -> Plot:
-    """Draw radial distortion and the profile of the decentering one, to the corners of the frame."""
+    """Draw radial distortion and decentring profile, to the corners of the frame."""
     camera = result.camera
     f = float(np.mean(camera.values[:2]))
     corners = np.array([[x, y] for x in (0, result.night.frame[0]) for y in (0, result.night.frame[1])])

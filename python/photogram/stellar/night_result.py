@@ -1,4 +1,4 @@
-"""A night of exposures of one camera, and what becomes of it."""
+"""Night of exposures of one camera, and its calibration."""
 
 from __future__ import annotations
 
@@ -33,51 +33,52 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Night(Brief):
-    """Exposures of one camera, and what is known of it beforehand.
+    """Exposures of one camera with prior information.
 
     Attributes
     ----------
     site, earth
-        Where the camera stood; UT1 - UTC and the pole.
+        Station; UT1 - UTC and the pole.
     catalogue
-        The brightest stars first (`Catalogue.brighter`); at least as deep as the images.
+        Stars, brightest first (`Catalogue.brighter`), at least as deep as the images.
     frame
         Width and height, pixels.
     camera
-        Approximate, such as `SkyCamera.of_field`; or the calibrated one that is `prior`.
+        Approximate camera, such as `SkyCamera.of_field`, or the calibrated one in `prior`.
     exposures
-        With approximate attitudes; images in the order of their brightness. Stars that are known already
-        stand in `Exposure.stars`.
+        Exposures with approximate attitudes and images sorted by brightness. Known stars are stored in
+        `Exposure.stars`.
     names
-        (E,) of the exposures.
+        (E,) names of the exposures.
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     attitude_error
         Largest error of the approximate attitudes, radians.
     tolerance
-        Largest distance between an image and its star under the ideal camera, when the best polynomials are
-        taken off; pixels.
+        Largest distance between an image and its star for the ideal camera, after the best polynomials;
+        pixels.
     rejection
-        Images with larger standardized residuals are left out; 0 for none.
+        Critical value of standardized residuals for the rejection of images; 0 disables it.
     fixed, common_scale, prior, weigh_stars
-        As for `calibrate_exposures`.
+        As in `calibrate_exposures`.
     lenses
-        Names of lenses that are tried; the data choose. None for that of `camera` alone.
+        Names of lenses to compare; None: only the lens of `camera`.
     roll_known
-        Whether the roll of the approximate attitudes is known as well as their direction; else it may be any.
+        Whether the roll of the approximate attitudes is known as well as their direction; otherwise it is
+        arbitrary.
     field_error
-        Share by which the principal distance of `camera` may be wrong.
+        Largest relative error of the principal distance of `camera`.
     blind
-        Smallest and largest horizontal field of view, radians, when neither attitudes nor the field of view
-        are known (`photogram.stellar.blind`); None where they are.
+        Smallest and largest horizontal field of view, radians, if neither attitudes nor the field of view are
+        known (`photogram.stellar.blind`); otherwise None.
     tripod
-        Whether the camera stood still on a tripod: its attitudes are tested to be one.
+        Whether the camera was fixed on a tripod: equality of its attitudes is tested.
     confirmed
-        Names of exposures that take part though their identification is doubtful.
+        Names of exposures that are used in spite of a doubtful identification.
     nowhere
-        Exposures without an attitude, by their index, and why they have none: they are left out.
+        Exposures without an attitude, by index, with reasons. They are not used.
     title
-        For the report.
+        Title of the report.
     """
 
     site: Site
@@ -137,41 +138,41 @@ def _at(name: str, message: Phrase) -> Phrase:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CalibratedNight(Judged, Documented, Brief):
-    """A calibrated camera, and what happened to the images.
+    """Calibrated camera of a night, with the use of its images.
 
     Attributes
     ----------
     night
-        What was calibrated.
+        Input of the calibration.
     exposures
-        Those that took part, with the stars of their images.
+        Used exposures, with the stars of their images.
     names
-        Their names.
+        Names of the used exposures.
     calibration
-        Camera and attitudes.
+        Adjusted camera and attitudes.
     identified, rejected
-        (E,) images with a star, and those of them that were left out because they contradict the rest.
+        (E,) numbers of images with a star, and of those rejected as inconsistent.
     odds
-        (E,) expected number of wrong hypotheses under which as many images have a star: the larger one of
-        the first identification and of that under the final camera. NaN where the images name their stars.
+        (E,) expected number of wrong hypotheses with an equal number of matches: the maximum of the first
+        identification and the final camera. NaN if the images name their stars.
     log_odds
         (E,) logarithm of the odds against chance by the distances of images and stars (D. Lang et al. 2010).
     star_probabilities
-        (m,) probability of the star of each image used, in the order of `calibration`; NaN where the image
-        names it.
+        (m,) probability of the star of each used image, in the order of `calibration`; NaN if the image names
+        it.
     doubtful
-        Names of the exposures that are left out although chance may not have found their stars, with the
-        expected number of chance matches.
+        Names of unused exposures whose identification may be correct, with the expected number of chance
+        matches.
     messages
-        Remarks.
+        Warnings.
     lenses
-        Lenses that were tried, the chosen one first; empty where there was no choice.
+        Compared lenses, the chosen one first; empty without a choice.
     scale_test
-        The data's test of fx = fy; None where it cannot be made.
+        Test of fx = fy; None if impossible.
     term_tests
-        Of the terms of the lens, those first that may be left out.
+        Tests of the lens terms, removable ones first.
     standstill
-        The test of one attitude for all exposures; None where it was not asked for.
+        Test of one attitude for all exposures; None if not requested.
     """
 
     night: Night
@@ -192,7 +193,7 @@ class CalibratedNight(Judged, Documented, Brief):
 
     @property
     def converged(self) -> bool:
-        """Whether the last adjustment ended by its criterion."""
+        """Whether the last adjustment met its convergence criterion."""
         return self.calibration.status == "converged"
 
     @cached_property
@@ -203,21 +204,24 @@ class CalibratedNight(Judged, Documented, Brief):
 
     @property
     def usable(self) -> bool:
-        """Whether the camera may be used: `verdict` says why not.
+        """Whether the camera is usable; `verdict` gives the reasons.
 
-        Not so when the adjustment has not converged, residuals are much larger than assumed, more exposures
-        are left out than take part, or the identification of an exposure is doubtful.
+        It is unusable if the adjustment has not converged, or if residuals are much larger than assumed. It
+        is also unusable if more exposures are unused than used, or if an identification is doubtful.
         """
         return self.verdict.usable
 
     @property
     def probabilities(self) -> Floats:
-        """(E,) that each exposure shows its stars, 1 / (1 + odds) at least; NaN where images name them."""
+        """(E,) probabilities that exposures show their stars, at least 1 / (1 + odds).
+
+        NaN if images name their stars.
+        """
         return np.asarray(1.0 / (1.0 + self.odds), float)
 
     @property
     def falsely_identified(self) -> float:
-        """Bound of the probability that any exposure is falsely identified: the sum of `odds`."""
+        """Upper bound of the probability of any false identification: the sum of `odds`."""
         return float(np.nansum(self.odds))
 
     @cached_property
@@ -232,7 +236,7 @@ class CalibratedNight(Judged, Documented, Brief):
 
     @property
     def mostly_left_out(self) -> bool:
-        """Whether more exposures are left out than take part."""
+        """Whether more exposures are unused than used."""
         return len(self.night.exposures) > 2 * len(self.exposures)
 
     @property
@@ -241,7 +245,7 @@ class CalibratedNight(Judged, Documented, Brief):
         return self.calibration.camera
 
     def document(self) -> Document:
-        """Return the document: verdict, camera, exposures, images."""
+        """Return the document with verdict, camera, exposures and images."""
         from photogram.stellar.night_document import night_document
 
         return night_document(self)
@@ -252,10 +256,10 @@ class CalibratedNight(Judged, Documented, Brief):
         return night_findings(self)
 
     def correlated(self) -> list[tuple[str, str, float]]:
-        """Name pairs of camera parameters whose correlation exceeds 0.95."""
+        """Return pairs of camera parameters with correlations above 0.95."""
         return correlated(self.camera.names, self.camera.covariance)
 
     def significance(self) -> dict[str, float]:
-        """Return each estimated distortion term over its mean error."""
+        """Return the ratio of each estimated distortion term to its mean error."""
         camera = self.camera
         return significance(camera.names[4:], camera.values[4:], camera.covariance[4:, 4:])

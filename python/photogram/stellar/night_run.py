@@ -1,4 +1,4 @@
-"""The exposures of a night that take part, the camera they give, and those that are rejected."""
+"""Selection of the exposures of a night during identification and adjustment."""
 
 from __future__ import annotations
 
@@ -27,44 +27,44 @@ from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase, phrase
 
 MAX_REJECTION_ROUNDS = 20
-_REACH = 3.0  # Distance in pixels within which the star of an image is searched for at least
+_REACH = 3.0  # Least search distance of the star of an image, pixels
 _NOTABLE_ERROR = 2.0
-"""Multiple of the error of approximate attitudes that is remarked on: they were compared by another lens."""
+"""Notable multiple of the error of approximate attitudes, for a warning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """An exposure that takes part."""
+    """Used exposure."""
 
-    index: int  # Among those of the night
+    index: int  # Index among the exposures of the night
     stars: Indices  # (k,) catalogue star of each image, -1 for none
-    kept: Bools  # (k,) which images take part
-    attitude: Floats  # (3,) by the stars of the first identification
+    kept: Bools  # (k,) whether images are used
+    attitude: Floats  # (3,) from the stars of the first identification
     # Expected number of chance matches as good as the first identification; NaN if images name their stars
     first: float = math.nan
-    odds: float = 0.0  # Expected number of wrong attitudes that match as well under the camera
-    log_odds: float = math.nan  # Of the exposure against chance (Lang et al.)
+    odds: float = 0.0  # Expected number of wrong attitudes with an equally good match under the camera
+    log_odds: float = math.nan  # Logarithmic odds of the exposure against chance (Lang et al.)
     probabilities: Floats = field(default_factory=lambda: np.zeros(0))  # (k,) of the stars; NaN for none
-    scale: float = 1.0  # Of predicted images over measured ones
+    scale: float = 1.0  # Scale of predicted relative to measured images
 
     @property
     def expected(self) -> float:
-        """The larger of the two expected numbers; NaN if the images name their stars."""
+        """Larger of the two expected numbers; NaN if the images name their stars."""
         return max(self.first, self.odds) if math.isfinite(self.first) else math.nan
 
     @property
     def count(self) -> int:
-        """Images that take part."""
+        """Number of used images."""
         return int(self.kept.sum())
 
     def exposure(self, night: Night, attitude: Floats) -> Exposure:
-        """Return the exposure with the stars of the images that take part."""
+        """Return the exposure with the stars of its used images."""
         stars = np.where(self.kept, self.stars, -1)
         return replace(night.exposures[self.index], attitude=attitude, stars=stars)
 
 
 class Run:
-    """The exposures that take part, the camera they give, and those that are rejected."""
+    """Used exposures with their camera, and rejected ones."""
 
     def __init__(self, night: Night, threads: int | None) -> None:
         self.night, self.threads = night, threads
@@ -93,7 +93,7 @@ class Run:
         return Phrase(code, {"name": self.night.names[index], **fields})
 
     def _sight(self, index: int, camera: SkyCamera, tolerance: float, stretch: float) -> None:
-        """Identify an exposure: it takes part if chance explains less, or if the user confirms it."""
+        """Identify an exposure; use it if it is significant or confirmed by the user."""
         night, tried = self.night, self.tried.get(index, 0.0)
         sighting = identify(
             night.exposures[index], night, camera, tolerance=tolerance, stretch=stretch, tried=tried
@@ -112,12 +112,11 @@ class Run:
             self.doubtful[index] = match.expected
 
     def _unidentified(self) -> list[int]:
-        """Return the rejected exposures that another attitude or camera may identify."""
+        """Return rejected exposures that another attitude or camera may identify."""
         night = self.night
         return [i for i in self.rejected if night.exposures[i].stars is None and i not in night.nowhere]
 
     def _take(self, seen: Seen) -> None:
-        """Let an exposure with enough stars take part."""
         if seen.count < STARS_OF_AN_ATTITUDE:
             counts = {"matched": seen.count, "images": len(seen.stars), "least": STARS_OF_AN_ATTITUDE}
             self.rejected[seen.index] = Phrase("stars.few-named", counts)
@@ -126,16 +125,16 @@ class Run:
             self.first.append(seen)
 
     def exposures(self) -> list[Exposure]:
-        """Return the exposures that take part, with their stars and adjusted attitudes."""
+        """Return the used exposures with their stars and adjusted attitudes."""
         pairs = zip(self.seen, self.found.attitudes, strict=True)
         return [seen.exposure(self.night, attitude) for seen, attitude in pairs]
 
     def adjust(self, night: Night) -> None:
-        """Adjust once more from the adjusted values."""
+        """Adjust again from the adjusted values."""
         self.found = adjusted(night, self.exposures(), self.found.camera, self.threads)
 
     def settle(self) -> None:
-        """Adjust from the first identification until the images that take part do not change."""
+        """Adjust from the first identification until the used images do not change."""
         night, self.seen = self.night, self.first
         exposures = [seen.exposure(night, seen.attitude) for seen in self.seen]
         self.found = adjusted(night, exposures, self._start(), self.threads)
@@ -150,7 +149,6 @@ class Run:
             self.adjust(night)
 
     def _start(self) -> SkyCamera:
-        """Return the camera to begin with, scaled as its exposures require."""
         camera, scales = self.night.camera, [seen.scale for seen in self.first]
         if self.night.prior is not None or camera.known.any():
             return camera
@@ -159,7 +157,7 @@ class Run:
         return replace(camera, values=values)
 
     def compare(self) -> None:
-        """Reject exposures that do not fit the others, the worst first, until all fit."""
+        """Reject exposures inconsistent with the others, worst first."""
         while worst := self._worst():
             index, reason = worst
             self.rejected[index] = reason
@@ -169,7 +167,6 @@ class Run:
             self.settle()
 
     def _worst(self) -> tuple[int, Phrase] | None:
-        """Return the exposure that fits the others least, and the reason; None if all fit."""
         night, confirmed = self.night, set(self.night.confirmed)
         worst = max(self.seen, key=lambda seen: np.nan_to_num(seen.odds))
         if worst.odds >= (DOUBTFUL if night.names[worst.index] in confirmed else ACCEPTED):
@@ -199,7 +196,7 @@ class Run:
         return self.seen[k].index, phrase("stars.unlike", factor=factor)
 
     def identify_rejected(self) -> bool:
-        """Identify rejected exposures with the calibrated camera; return whether any now takes part."""
+        """Identify rejected exposures with the calibrated camera; return success."""
         night, before = self.night, len(self.first)
         tolerance = min(night.tolerance, max(2 * night.rejection * _noise(night, self.found), _REACH))
         for index in self._unidentified():
@@ -211,7 +208,7 @@ class Run:
         return True
 
     def messages(self) -> Iterator[Phrase]:
-        """Return remarks on rejected exposures and their reasons, attitudes and odds."""
+        """Yield messages on rejected exposures, attitudes and odds."""
         # An exposure that was identified later needs no explanation.
         if self.hint and {self.night.names[i] for i in self.rejected} & set(self.hint[1]):
             yield self._cause()
@@ -231,7 +228,7 @@ class Run:
         return phrase("stars.cause", mistake=mistake, n=len(names), names=names)
 
     def _far(self) -> Iterator[Phrase]:
-        """Remark on exposures that differ from their approximate attitude by more than its error."""
+        """Yield warnings on exposures far from their approximate attitude."""
         night, error = self.night, self.night.attitude_error
         width, height = night.frame
         corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
@@ -273,7 +270,6 @@ def _noise(night: Night, found: SkyCalibration) -> float:
 
 
 def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Floats) -> Seen:
-    """Identify stars with the calibrated camera, and reject images that are far from theirs."""
     exposure, noise = night.exposures[seen.index], _noise(night, found)
     limit = night.rejection * noise if night.rejection else math.inf
     reach = max(2 * night.rejection * noise, _REACH)
@@ -288,7 +284,7 @@ def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Float
     odds = log_odds = math.nan
     if exposure.stars is None:
         radius, log_odds = attitude_radius(night), again.log_odds(noise)
-        # A whole turn moves the corners along their circle.
+        # A whole rotation moves the corners along their circle.
         roll = radius if night.roll_known else 0.5 * math.pi * math.hypot(*night.frame)
         odds = again.expected(limit if night.rejection else _REACH, radius, roll)
     return replace(

@@ -1,4 +1,4 @@
-"""Tables of a calibrated night: exposures with attitudes and odds, images with their stars, lenses."""
+"""Tables of a calibrated night: exposures with attitudes and odds, images with stars, lenses."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _DEGREES = ("deg", "deg", 1.0)
 
 
 def parameters(result: CalibratedNight) -> Table:
-    """Return the parameters of the camera, with those of the prior."""
+    """Return the camera parameters with their priors."""
     camera, prior = result.camera, result.night.prior
     before = None
     if prior is not None:
@@ -46,7 +46,7 @@ def parameters(result: CalibratedNight) -> Table:
 
 
 def exposures(result: CalibratedNight, most: int) -> list[Table]:
-    """Return how exposures fit and how certain their stars are, and their attitudes."""
+    """Return tables of exposure fit, star identification and attitudes."""
     count = len(result.names)
     some = f"The first {most} of {count}; exposures.csv has all. " if count > most else ""
     odds = (
@@ -74,11 +74,11 @@ def attitudes(result: CalibratedNight) -> list[Table]:
 
 
 def exposure_table(result: CalibratedNight) -> Table:
-    """Return the exposures that take part, with all columns of `exposures`, for files.
+    """Return the used exposures with all columns of `exposures`, for files.
 
-    Angles in degrees, azimuths from south, positive west; the quaternion (w, x, y, z) leads from ICRS to the
-    camera (x right, y down, z along the axis), the covariance (radians squared) is that of the small turn
-    about these axes, its upper triangle row by row; `by_chance` is the expected number of chance matches,
+    Angles are in degrees, azimuths from south, positive west. The quaternion (w, x, y, z) rotates ICRS to the
+    camera (x right, y down, z along the axis). The covariance (radians squared) refers to small rotations
+    about these axes, its upper triangle by row. `by_chance` is the expected number of chance matches,
     `log_odds` a natural logarithm.
     """
     columns = [*_fit(result), *_attitudes(result)[1:], *_inertial(result)[1:]]
@@ -108,7 +108,6 @@ def _fit(result: CalibratedNight) -> list[Quantity]:
 
 
 def _attitudes(result: CalibratedNight) -> list[Quantity]:
-    """Return the attitudes in the system of the station: axis, angles, mean errors, covariances."""
     found = result.calibration
     azimuth, elevation = np.degrees([axis_of(each) for each in found.attitudes]).T
     errors = np.sqrt(np.diagonal(found.attitude_covariances, axis1=1, axis2=2))
@@ -125,7 +124,6 @@ def _attitudes(result: CalibratedNight) -> list[Quantity]:
 
 
 def _inertial(result: CalibratedNight) -> list[Quantity]:
-    """Return the attitudes in ICRS: axis, quaternion, mean errors and covariances of turns of the camera."""
     found = result.inertial
     ra, dec = np.degrees([each.axis for each in found]).T
     covariances = np.array([each.covariance for each in found])
@@ -159,7 +157,7 @@ def _exposure(result: CalibratedNight) -> Quantity:
 
 
 def images(result: CalibratedNight) -> Table:
-    """Return the images used: exposures and stars, pixels, residuals, tests, how likely the stars are."""
+    """Return the used images with stars, residuals, tests and star probabilities."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     names, likely = np.array(result.names, dtype=object)[found.exposures], result.star_probabilities
     columns = [
@@ -181,7 +179,7 @@ def images(result: CalibratedNight) -> Table:
 
 
 def worst(result: CalibratedNight, most: int) -> Table:
-    """Return the images with the largest standardized residuals; the outliers of the verdict are marked."""
+    """Return the images with the largest standardized residuals, with outliers marked."""
     size = np.nan_to_num(np.abs(result.calibration.standardized)).max(axis=1, initial=0.0)
     rows: Indices = np.argsort(-size, kind="stable")[:most]
     tests = night_tests(result)[0]
@@ -195,12 +193,12 @@ def worst(result: CalibratedNight, most: int) -> Table:
 
 
 def _for_people(key: str, title: str, columns: Quantities, note: str = "") -> Table:
-    """Return a table that JSON documents and files do not have."""
+    """Return a table that JSON documents and files omit."""
     return Table(key, title, [replace(column, member="", name=None) for column in columns], note)
 
 
 def stars(result: CalibratedNight) -> Table:
-    """Return the stars that were estimated: adjusted minus catalogue, tests."""
+    """Return the estimated stars: adjusted minus catalogue, tests."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     columns = [
         Quantity(ids[found.catalogue], kind="name", member="id", head="Star"),
@@ -213,7 +211,7 @@ def stars(result: CalibratedNight) -> Table:
 
 
 def lens_tests(result: CalibratedNight) -> Table:
-    """Return the tests of the lens, the test of its scale first."""
+    """Return the lens tests, starting with its scale."""
     found = [*([result.scale_test] if result.scale_test else []), *result.term_tests]
     degrees = [f"{each.dimension}, {each.freedom}" for each in found]
     columns = [
@@ -230,7 +228,7 @@ def lens_tests(result: CalibratedNight) -> Table:
 
 
 def lenses(result: CalibratedNight) -> Table:
-    """Return the lenses that were tried, the best first, with the reason if one was not adjusted."""
+    """Return the compared lenses, best first, with reasons of failed adjustments."""
     found = result.lenses
     best = min((each.bic for each in found), default=0.0)
     numbers = [(each.parameters, each.images, each.mean_error, each.bic - best) for each in found]
@@ -249,7 +247,7 @@ def lenses(result: CalibratedNight) -> Table:
 
 
 def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
-    """Return how much there is, and how good it is."""
+    """Return facts on the numbers of observations, and on their quality."""
     found, night = result.calibration, result.night
     estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
     measured = sum(len(exposure.xy) for exposure in result.exposures)
@@ -280,7 +278,6 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
 
 
 def _first_attitudes(night: Night) -> str:
-    """Say what was known of the attitudes before."""
     if night.blind is not None:
         low, high = (math.degrees(field) for field in night.blind)
         return f"found in the whole sky, with a field of view between {low:g} and {high:g} degrees"

@@ -1,9 +1,9 @@
-"""Whether images match catalogue stars by chance (D. Lang et al., Astron. J. 139, 2010, count likewise).
+"""Probability of chance matches of images and catalogue stars (cf. D. Lang et al., Astron. J. 139, 2010).
 
-After a wrong hypothesis of the attitude the number of catalogue stars in the tolerance area of an image is
-Poisson with mean mu = density x area, so an image matches with p = 1 - exp(-mu). Of n images, h of which
-fixed the hypothesis and match by construction, at least k match one to one with the probability
-P(Bin(n - h, p) >= k - h); among T hypotheses T times as often.
+For a wrong hypothesis of the attitude, the number of stars in the tolerance area of an image is Poisson. Its
+mean is mu = density x area, so an image matches with p = 1 - exp(-mu). h of n images define the hypothesis
+and match by construction. The probability that at least k images match one to one is P(Bin(n - h, p) >= k -
+h). Among T hypotheses, this is T times as frequent.
 """
 
 from __future__ import annotations
@@ -16,26 +16,27 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 
 ACCEPTED = 1e-6  # Expected number of equally good chance matches below which an exposure is accepted
-DOUBTFUL = 1e-2  # Expected number up to which an exposure that is not accepted may show the stars
+DOUBTFUL = 1e-2  # Expected number up to which a rejected exposure may show the stars
 LOG_ODDS = math.log(1e9)  # Odds of acceptance by D. Lang et al.
-CERTAIN = 0.95  # Probability of a star that an image requires before the camera is calibrated
-FALSE = 0.1  # share of images without a star, for single images
-_WRONG = 0.25  # the same in the odds of an exposure
-_REACH = 6.0  # standard deviations within which a second star counts
-CROWDED = 0.3  # Largest number of catalogue stars in a tolerance area that counting permits
+CERTAIN = 0.95  # Star probability required for an image before the camera is calibrated
+FALSE = 0.1  # fraction of images without a star, for single images
+_WRONG = 0.25  # fraction of images without a star, in the odds of an exposure
+_REACH = 6.0  # reach of a second star, in standard deviations
+CROWDED = 0.3  # Largest number of catalogue stars in a tolerance area that permits counting
 
 
 def chance(images: int, fixing: int, mu: float, matched: int) -> float:
-    """Return the probability that one wrong hypothesis matches at least as many images, one to one.
+    """Return the probability that a wrong hypothesis matches `matched` images or more.
 
-    It was made from `fixing` images; mu is the mean number of catalogue stars in a tolerance area.
+    Matches are one to one, `fixing` images define the hypothesis, and mu is the mean number of catalogue
+    stars in a tolerance area.
     """
     trials, least = images - fixing, matched - fixing
     return binomial_tail(trials, -math.expm1(-mu), least)
 
 
 def binomial_tail(trials: int, probability: float, least: int) -> float:
-    """Return the probability of at least so many of some trials, summed in logarithms."""
+    """Return the binomial probability of at least `least` successes."""
     if least <= 0:
         return 1.0
     if least > trials or probability <= 0:
@@ -56,23 +57,24 @@ def binomial_tail(trials: int, probability: float, least: int) -> float:
 
 
 def expected_false(images: int, fixing: int, mu: float, matched: int, hypotheses: float) -> float:
-    """Return how many of so many wrong hypotheses match at least as many images: E = T P."""
+    """Return the expected number of wrong hypotheses with an equal match: E = T P."""
     return hypotheses * chance(images, fixing, mu, matched)
 
 
 def _normal(off: Floats, sd: float) -> Floats:
-    """Return the density of an image so far from its star, the same in x and y."""
+    """Return the density of an image at a distance from its star, equal in x and y."""
     return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (math.tau * sd**2), float)
 
 
 def star_probabilities(
     images: Floats, predicted: Floats, found: Indices, sd: float, density: float
 ) -> Floats:
-    """Return the probability (m,) that images (m, 2) show their stars `found` among predicted ones (n, 2).
+    """Return the probability (m,) that images (m, 2) show their matched stars.
 
-    With f, the density of the image about its star, f' about the next one, and the probability q = 0.1 of a
-    false image that has a star by chance: (1 - q) f / ((1 - q) (f + f') + q rho), rho being the density of
-    the stars, in stars a unit of area. It is NaN without a star (-1). `sd` is that of an image.
+    Let f be the density of the image about its star, and f' about the next one. The probability of a false
+    image with a star by chance is q = 0.1, and rho is the number of stars per unit of area. The result is (1
+    - q) f / ((1 - q) (f + f') + q rho). It is NaN without a star (-1). `found` contains star indices among
+    `predicted` (n, 2), `sd` refers to an image.
     """
     probability = np.full(len(images), np.nan)
     has = np.flatnonzero(found >= 0)
@@ -88,10 +90,10 @@ def star_probabilities(
 
 
 def log_odds(off: Floats, images: int, sd: float, density: float) -> float:
-    """Return the logarithm of the odds of an exposure against chance: each image is a star's or a false one.
+    """Return the logarithmic odds of an exposure with star images and false images.
 
-    The sum of ln(w f / rho + 1 - w), with w = 0.75, the density f of an image about its star and rho of the
-    stars. `off` are distances of images from their stars, without those of no star, `images` counts all
+    It is the sum of ln(w f / rho + 1 - w) with w = 0.75. f is the density of an image about its star, rho the
+    density of the stars. `off` contains the distances of matched images from their stars, `images` counts all
     images.
     """
     density = max(density, 1e-300)

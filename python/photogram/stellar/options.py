@@ -1,4 +1,4 @@
-"""Options of a calibration; the numbers are those of the report's option card."""
+"""Options of a plate calibration, numbered as on the option card of the report."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from photogram.words import phrase
 __all__ = ["Options"]
 
 _DAYS = 20 * math.pi  # A time of ten days, in radians
-_STEPS = 10_000  # Rows of the table of a curve at most
+_STEPS = 10_000  # Largest number of rows of a curve table
 
 
 def core_threads(threads: int | None) -> int:
-    """Return the number of threads for the core; 0 leaves it to the core."""
+    """Return the number of threads for the core; 0: default of the core."""
     if threads is not None and threads < 1:
         raise InputError(phrase("error.at", what="threads", message=phrase("error.positive", value=threads)))
     return threads or 0
@@ -25,49 +25,49 @@ def core_threads(threads: int | None) -> int:
 
 @dataclass(frozen=True)
 class Options:
-    """How to adjust, and what to compute.
+    """Options of a plate calibration and its computations.
 
     Attributes
     ----------
     common_scale
-        One principal distance for both axes (option 1).
+        Use one principal distance for both axes (option 1).
     refraction
         Estimate the coefficients of refraction after the camera (option 5).
     minimum_stars
-        Numbers of the stars of the minimum solution, which gives the initial values (option 6).
+        Numbers of the stars of the minimum solution, which computes the initial values (option 6).
     pre_run
-        Stop after the minimum solution with the residuals of all images (option 7).
+        Stop after the minimum solution, with the residuals of all images (option 7).
     curves
         Compute distortion curves (option 8).
     reference, pole
-        Station to which attitudes are transformed, and the pole's x (towards the prime meridian) and y
-        (towards 90 degrees west) in radians (option 9).
+        Station to which attitudes are transformed (option 9). `pole` contains x (towards the prime meridian)
+        and y (towards 90 degrees west) of the pole in radians.
     plate_list
-        Write plate coordinates and residuals as the program punched them (option 11).
+        Write plate coordinates and residuals in the punched format of the program (option 11).
     max_iterations_minimum, max_iterations
-        Limits (options 12 and 13); 0 for none.
+        Iteration limits (options 12 and 13); 0: unlimited.
     mean_error
-        Mean error of unit weight to use instead of the computed one (option 14); 0 for none.
+        Prior mean error of unit weight that replaces the computed one (option 14); 0: use the computed one.
     histogram
-        Histogram of residuals.
+        Compute a histogram of residuals.
     tolerance
-        Of the level of discrepancies, metres.
+        Tolerance of the level of discrepancies, metres.
     refraction_tolerance, distortion_tolerance
-        Of the inner iterations: radians, metres.
+        Tolerances of the inner iterations: radians, metres.
     movement_factor
-        Attitudes are combined when their directions differ by less than this multiple of its mean error.
+        Attitudes are combined if their directions differ by less than this multiple of the mean error.
     movement_time
         Sidereal time of the fictitious points, radians.
     crossover, interval, extent
-        Radius at which the transformed distortion vanishes; step and end of the curves; metres.
+        Radius of zero transformed distortion; step and end of the curves; metres.
     comparator_angle
-        From the axes of the plate coordinates to those of the comparator, from x towards y, radians: scales
-        and nonperpendicularity are given in the latter, too (equation 42). None where they are the same.
+        Angle from the axes of the plate coordinates to the comparator axes, from x towards y, radians. Scales
+        and nonperpendicularity are also given in comparator axes (equation 42). None for equal axes.
     distortion_first
-        Scale after distortion, at this principal distance (metres), as the report prefers for calibration
-        (equations 40 and 41); 0 for scale before distortion, as programmed.
+        Principal distance (metres) of the form with scale after distortion, which the report prefers for
+        calibration (equations 40 and 41). 0 is scale before distortion, as programmed.
     as_published
-        Iterate with the report's partials and stop rules.
+        Iterate with the partials and stop rules of the report.
     """
 
     common_scale: bool = False
@@ -123,5 +123,5 @@ class Options:
 
     @property
     def camera_kind(self) -> tuple[float | None, bool, bool]:
-        """What the core calls the kind of a camera: reference distance, Brown's decentering, common scale."""
+        """Camera type of the core: reference distance, Brown's decentring, common scale."""
         return (self.distortion_first or None, False, self.common_scale)

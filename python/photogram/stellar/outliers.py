@@ -1,4 +1,4 @@
-"""Stars and images of a plate that contradict the others, and their effect on the camera."""
+"""Outlying stars and images of a plate, and their effect on the camera."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
-_FALL = 10.0  # Least ratio by which the sum of squares falls without the star that spoils a solution
+_FALL = 10.0  # Least reduction ratio of the sum of squares by removal of a faulty star
 _MAX_ROUNDS = 10
 _MAX_SUSPECTS = 12
 
 
 def outliers(result: Result) -> list[Phrase]:
-    """Return a remark on the outliers of the verdict, the worst first; empty without outliers."""
+    """Return a warning on the outliers of the verdict, worst first, or an empty list."""
     found = [
         (float(abs(tested.values[place])), tested.name(place))
         for tested in plate_tests(result)
@@ -39,10 +39,10 @@ def outliers(result: Result) -> list[Phrase]:
 
 
 def harm(result: Result, iterate: Callable[[Problem], Result]) -> Phrase | None:
-    """Return the parameter that outliers change most, in standard deviations without them; None below one.
+    """Return the largest parameter change by outliers, in sd without them, or None.
 
-    Rounds reject outliers that are at least half as large as the worst, and adjust again. None, too, if the
-    remaining observations do not determine the camera.
+    Rounds reject outliers that are at least half as large as the worst, and adjust again. None for a change
+    below one, or if the remaining observations do not determine the camera.
     """
     clean = result
     for _ in range(_MAX_ROUNDS):
@@ -70,7 +70,7 @@ def harm(result: Result, iterate: Callable[[Problem], Result]) -> Phrase | None:
 
 
 def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Solved]) -> list[Phrase]:
-    """Return a remark on the star without which a solution that has not converged does."""
+    """Return a warning on the star whose removal makes the solution converge."""
     before = sum(solved.sums)
     best, culprit = math.inf, ""
     for star in _suspects(problem, solved):
@@ -86,7 +86,6 @@ def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Solv
 
 
 def _suspects(problem: Problem, solved: Solved) -> list[int]:
-    """Return the stars whose images have the largest residuals."""
     size = np.zeros(len(problem.star_ids))
     weighted = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
     np.maximum.at(size, problem.image_stars, np.nan_to_num(weighted))

@@ -1,4 +1,4 @@
-"""Apparent places, sidereal time and attitudes of cameras in today's skies, by `pyerfa` (extra `stars`)."""
+"""Apparent positions, sidereal time and camera attitudes at present, by `pyerfa` (extra `stars`)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
 
 @dataclass(frozen=True)
 class Earth:
-    """How the Earth is turned, as the IERS publishes it.
+    """Earth orientation parameters of the IERS.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Earth:
     def site_of_date(self, site: Site) -> Site:
         """Return a station with its latitude and longitude from the instantaneous pole.
 
-        The given ones are from the mean pole; its zenith is the same.
+        The given ones refer to the mean pole; the zenith is the same.
         """
         if self.pole == (0.0, 0.0):
             return site
@@ -57,8 +57,11 @@ class Earth:
 _UTC_BEGINS = 1960
 _YEARS = np.arange(1850, 1961, 10)
 _TT_MINUS_UT = np.array([7, 8, 2, -5, -6, -3, 10, 21, 24, 24, 29, 33])
-"""Terrestrial minus universal time in these years, seconds, before there was UTC (Stephenson and Morrison
-1984, Phil. Trans. R. Soc. A 313, 47). A second is 5e-5 arcsec of aberration, and less of all else."""
+"""Terrestrial minus universal time in these years, seconds, before UTC.
+
+Stephenson and Morrison 1984, Phil. Trans. R. Soc. A 313, 47. A second is 5e-5 arcsec of aberration, and less
+of other effects.
+"""
 
 _Days = tuple[float, float]
 
@@ -66,7 +69,7 @@ _Days = tuple[float, float]
 def _times(text: str, dut1: float = 0.0) -> tuple[_Days, _Days]:
     """Return terrestrial and universal time (TT, UT1) as Julian dates in two parts.
 
-    Before 1960 there was no UTC: the time is universal time itself, and `dut1` what it lacks of UT1.
+    Before 1960, the given time is universal time, and `dut1` is the difference of UT1 from it.
     """
     import erfa
 
@@ -97,18 +100,19 @@ def epoch(utc: str) -> float:
 
 
 def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> Floats:
-    """Return geocentric apparent places of a catalogue (true equator and equinox of date).
+    """Compute geocentric apparent positions of a catalogue.
 
-    Proper motion, parallax, light deflection, annual aberration, precession and nutation (IAU 2006/2000A).
+    They refer to the true equator and equinox of date, with proper motion, parallax, light deflection, annual
+    aberration, precession and nutation (IAU 2006/2000A).
 
     Parameters
     ----------
     catalogue
-        The stars.
+        Star catalogue.
     utc
-        Such as 2024-03-01T21:03:05.25.
+        UTC time, such as 2024-03-01T21:03:05.25.
     effects
-        Which of light deflection and annual aberration there are.
+        Whether to include light deflection and annual aberration.
 
     Returns
     -------
@@ -117,17 +121,17 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
     Raises
     ------
     InputError
-        Proper motions or parallaxes that cannot be.
+        If proper motions or parallaxes are impossible.
     """
     import erfa
 
     tt, _ = _times(utc)
     ra, dec = catalogue.places.T
     pm_ra = catalogue.proper_motions[:, 0] / np.cos(dec)
-    # erfa.atciq takes places of 2000.0 and parallaxes in seconds of arc.
+    # erfa.atciq requires positions at 2000.0 and parallaxes in seconds of arc.
     epoch = erfa.epj2jd(catalogue.epoch)
     with warnings.catch_warnings():
-        # Parallaxes of zero mean distant stars; erfa warns about each.
+        # Zero parallaxes mean distant stars; erfa warns about each.
         warnings.simplefilter("ignore", erfa.ErfaWarning)
         # Overflows become an error of erfa.
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -138,7 +142,7 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
             raise _no_motion(catalogue) from None
     if not all(np.isfinite(part).all() for part in moved):
         raise _no_motion(catalogue)
-    # Precession and nutation once for all stars.
+    # Compute precession and nutation once for all stars.
     astrometry, origins = erfa.apci13(*tt)
     if effects.annual_aberration and effects.light_deflection:
         right, declination = erfa.atciq(*moved, astrometry)
@@ -148,7 +152,7 @@ def apparent_places(catalogue: Catalogue, utc: str, effects: Effects = _ALL) -> 
 
 
 def _reduced(places: Sequence[Floats], astrometry: Any, effects: Effects) -> tuple[Floats, Floats]:
-    """Take the steps of erfa.atciq one by one: places of 2000.0 with their motions to those of date."""
+    """Apply the steps of erfa.atciq: positions and motions at 2000.0 to date."""
     import erfa
 
     seen = erfa.pmpx(*places, astrometry["pmt"], astrometry["eb"])
@@ -161,21 +165,21 @@ def _reduced(places: Sequence[Floats], astrometry: Any, effects: Effects) -> tup
 
 
 def to_date(utc: str) -> Floats:
-    """Return the matrix (3, 3) from ICRS to the true equator and equinox of date (IAU 2006/2000A)."""
+    """Return the matrix (3, 3) from ICRS to true equator and equinox of date."""
     import erfa
 
     return np.asarray(erfa.pnm06a(*_times(utc)[0]), float)
 
 
 def sidereal_time(site: Site, utc: str, dut1: float = 0.0) -> float:
-    """Return local apparent sidereal time in radians.
+    """Compute local apparent sidereal time in radians.
 
     Parameters
     ----------
     site
-        The station; its west longitude counts.
+        Station; only its west longitude is used.
     utc
-        Such as 2024-03-01T21:03:05.25; before 1960 universal time.
+        UTC time, such as 2024-03-01T21:03:05.25; before 1960 universal time.
     dut1
         UT1 - UTC in seconds; one second is 15 arcsec of attitude, the same for all exposures of a night.
     """
@@ -194,18 +198,18 @@ def _no_motion(catalogue: Catalogue) -> InputError:
 
 @dataclass(frozen=True, eq=False)
 class InertialAttitude:
-    """The attitude of an exposure in ICRS.
+    """Attitude of an exposure in ICRS.
 
-    Axes of the camera are x right, y down, z along the axis; that is the camera of computer vision.
+    Camera axes are x right, y down, z along the axis, as in computer vision.
     """
 
     # (3, 3) R with camera direction = R times ICRS direction, without aberration and refraction; det R = 1
     matrix: Floats
-    covariance: Floats  # (3, 3) of the small turn d about the camera axes with R_true = Exp(d) R, radians^2
+    covariance: Floats  # (3, 3) of the small rotation d about camera axes, R_true = Exp(d) R, radians^2
 
     @property
     def quaternion(self) -> Floats:
-        """(4,) w, x, y, z of the same rotation: Hamilton's, w first and not negative; camera = q icrs q*."""
+        """(4,) Hamilton quaternion w, x, y, z with w >= 0; camera = q icrs q*."""
         vector = _photocore.rotation_vectors(self.matrix[None])[0]
         angle = float(np.linalg.norm(vector))
         # sin(angle / 2) / angle
@@ -215,7 +219,7 @@ class InertialAttitude:
 
     @property
     def quaternion_covariance(self) -> Floats:
-        """(4, 4) of the quaternion, to first order: of rank 3, as its length is 1."""
+        """(4, 4) covariance of the quaternion, of rank 3 since its length is 1."""
         w, x, y, z = self.quaternion
         # (0, d / 2) times q.
         partials = 0.5 * np.array([[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]])
@@ -231,15 +235,15 @@ class InertialAttitude:
 def inertial_attitude(
     angles: Floats, covariance: Floats, site: Site, utc: str, earth: Earth | None = None
 ) -> InertialAttitude:
-    """Return the attitude of an exposure in ICRS from alpha, omega, kappa with their covariance (3, 3).
+    """Return an attitude in ICRS from alpha, omega, kappa with covariance (3, 3).
 
     Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero.
 
     Notes
     -----
-    From the axes of the camera to north, east, zenith by the transposed matrix of the report, to hour angle
-    and declination by the latitude, to the true equator and equinox by apparent sidereal time, to ICRS by the
-    transposed matrix of bias, precession and nutation (IAU 2006/2000A).
+    The transposed matrix of the report rotates camera axes to north, east, zenith. The latitude gives hour
+    angle and declination, apparent sidereal time the true equator and equinox. The transposed matrix of bias,
+    precession and nutation (IAU 2006/2000A) rotates to ICRS.
     """
     earth = earth or Earth()
     matrix = _photocore.pointing_matrix(np.asarray(angles, float))
@@ -250,15 +254,15 @@ def inertial_attitude(
         seen = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site) @ seen
     equatorial = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
     turned = to_date(utc).T @ equatorial @ seen
-    # The pole's small rotation is not quite orthogonal.
+    # The small rotation of the pole is not exactly orthogonal.
     left, _, right = np.linalg.svd(turned.T)
     return InertialAttitude(np.asarray(left @ right, float), np.asarray(local @ covariance @ local.T, float))
 
 
 def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth | None = None) -> Floats:
-    """Return alpha, omega, kappa of a camera at a station from its rotation matrix (ICRS to camera).
+    """Return alpha, omega, kappa at a station from a rotation matrix (ICRS to camera).
 
-    Camera axes are x right, y down, z along the axis; aberration and refraction are left out.
+    Camera axes are x right, y down, z along the axis. Aberration and refraction are ignored.
     """
     earth = earth or Earth()
     place = earth.site_of_date(site)
@@ -267,7 +271,7 @@ def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth | None =
 
 
 def pointing_matrix(ra: float, dec: float, position_angle: float = 0.0) -> Floats:
-    """Return the rotation matrix (ICRS to camera) of a camera that points at a place.
+    """Return the rotation matrix (ICRS to camera) that points to a star position.
 
     The position angle of the upper edge counts from north through east; all angles are in radians.
     """
@@ -279,20 +283,20 @@ def pointing_matrix(ra: float, dec: float, position_angle: float = 0.0) -> Float
 
 
 def _local_axes(m: Floats) -> Floats:
-    """Return the turns about the axes of the camera (columns) that alpha, omega, kappa make."""
+    """Return the rotations about the camera axes (columns) by alpha, omega, kappa."""
     alpha = [
         m[2, 2] * m[1, 0] - m[2, 0] * m[1, 2],
         m[0, 2] * m[2, 0] - m[0, 0] * m[2, 2],
         m[1, 2] * m[0, 0] - m[1, 0] * m[0, 2],
     ]
-    # -cos omega sin kappa and cos omega cos kappa stand in the second column.
+    # -cos omega sin kappa and cos omega cos kappa are in the second column.
     cosine = np.hypot(m[0, 1], m[1, 1])
     omega = [m[1, 1] / cosine, -m[0, 1] / cosine, 0.0] if cosine > 0 else [1.0, 0.0, 0.0]
     return np.column_stack([alpha, omega, [0.0, 0.0, 1.0]])
 
 
 def equatorial_axes(latitude: float, time: float) -> Floats:
-    """Return the matrix from north, east, zenith to the true equator and equinox of date."""
+    """Return the matrix from north, east, zenith to equator and equinox of date."""
     (sp, cp), (sl, cl) = (np.sin(latitude), np.cos(latitude)), (np.sin(time), np.cos(time))
     # cos(dec) cos H, cos(dec) sin H, sin(dec); then the hour angle becomes right ascension.
     hour = np.array([[-sp, 0.0, cp], [0.0, -1.0, 0.0], [cp, 0.0, sp]])

@@ -1,4 +1,4 @@
-"""The plain form of a calibration: options in TOML, stars and images in CSV (`docs/stellar-camera.md`)."""
+"""Plain form of a plate calibration: options in TOML, stars and images in CSV (`docs/stellar-camera.md`)."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ _TABLES = {
 def read_plain(path: Path) -> Problem:
     """Read a calibration in plain form.
 
-    Raises InputError: a file that cannot be read, and what cannot be used, with the file, and the record of a
-    CSV file.
+    InputError: if a file cannot be read, or if values are invalid. The message has the file, and the record
+    of a CSV file.
 
     Parameters
     ----------
     path
-        The TOML file; it names the CSV files of stars and images, relative to itself.
+        TOML file. It names the CSV files of stars and images, relative to its folder.
     """
     document = read_document(path, _TABLES)
     with at_place(Place(path)):
@@ -74,7 +74,7 @@ def read_plain(path: Path) -> Problem:
 
 
 def inputs(path: Path) -> list[Path]:
-    """Return the files that a calibration is read from."""
+    """Return the input files of a calibration."""
     return named_files(path, _TABLES, (("stars", "file"), ("images", "file"), ("camera", "prior")))
 
 
@@ -133,7 +133,7 @@ def _problem(document: Document) -> Problem:
 
 
 def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
-    """Read initial values: angles in grads, all else in the units of the parameters."""
+    """Read initial values: angles in grads, others in the units of the parameters."""
     fixed = np.zeros(len(NAMES), bool)
     for name in table.words("fixed", ()):
         fixed[_index(table, name)] = True
@@ -157,7 +157,7 @@ def _index(table: Table, name: str) -> int:
 
 
 def _parameter_weights(table: Table) -> Floats:
-    """Read weights, angles in radians: `name = w`, or `pairs = [[name, name, w], ...]`."""
+    """Read weights, angles in radians: `name = w`, or `pairs = [[name, name, w], ..]`."""
     weights = np.zeros((len(NAMES), len(NAMES)))
     for first, second, value in table.rows("pairs", (str, str, float)):
         row, column = _index(table, first), _index(table, second)
@@ -186,12 +186,11 @@ def _weight(row: Row, common: list[float] | None, names: tuple[str, str, str]) -
 
 
 def _is_landmark(row: Row) -> bool:
-    """Whether a row has a terrestrial direction in the place of right ascension and declination."""
+    """Return whether a row has a terrestrial direction instead of a star position."""
     return bool(row.cells.get("azimuth_north_deg"))
 
 
 def _stars(rows: list[Row], common: list[float] | None, station: Site) -> tuple[Floats, Floats]:
-    """Return (S, 2) places and (S, 2, 2) weights of stars and of landmarks among them."""
     places, weights = [], []
     for row in rows:
         weight = _star_weight(row, common)
@@ -219,7 +218,7 @@ def _groups_and_times(
 ) -> tuple[list[int], list[float]]:
     """Return groups and sidereal times of images.
 
-    A group is that of the column `orientation`, else follows from the number of the point as in the deck.
+    The group is in the column `orientation`, else it follows from the point number as in the deck.
     """
     post, event = table.count("first_post", 500), table.count("first_event", 900)
     corrections = table.numbers("time_corrections_rad", 3, [0.0, 0.0, 0.0])

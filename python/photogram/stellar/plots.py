@@ -1,4 +1,4 @@
-"""Pictures of a calibration: stars, residuals, histogram, distortion, refraction."""
+"""Plots of a plate calibration: stars, residuals, histogram, distortion, refraction."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def sketches(result: Result) -> dict[str, Plot]:
-    """Return all pictures that the options ask for by name; stars and residuals always."""
+    """Return the requested plots by name, always with stars and residuals."""
     made = {"stars": _stars(result), "residuals": _residuals(result)}
     if result.problem.options.histogram:
         every = {name: 1e6 * values for name, values in residual_classes(result).items()}
@@ -35,7 +35,6 @@ def sketches(result: Result) -> dict[str, Plot]:
 
 
 def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Plot:
-    """Return a plate with marks, and lines through its origin."""
     limits = around(places)
     lines = [
         Line(np.where(axis, limits, 0.0), FAINT, 0.5, opacity=0.5, layer=0.0)
@@ -46,7 +45,6 @@ def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[Sca
 
 
 def _stars(result: Result) -> Plot:
-    """Draw every star at its mean place on the plate."""
     problem = result.problem
     count = np.bincount(problem.image_stars, minlength=len(problem.star_ids))
     sums = np.zeros((len(problem.star_ids), 2))
@@ -72,7 +70,7 @@ def _residuals(result: Result) -> Plot:
 
 
 def _distortion(result: Result) -> Plot:
-    # Finer than the table, so that the curves are smooth.
+    # Finer than the table, for smooth curves.
     problem = result.problem
     fine = replace(problem.options, interval=(problem.options.extent or 0.1) / 200)
     found = distortion_curves(replace(result, problem=replace(problem, options=fine)))
@@ -93,7 +91,6 @@ def _distortion(result: Result) -> Plot:
 
 
 def _refraction(result: Result) -> Plot:
-    """Draw one curve, for all attitudes look through the same air, and where each of them looks."""
     groups = [group for group in range(3) if result.solved.free[3 * group]]
     every = {group: refraction_curves(result, group) for group in groups}
     z = np.concatenate([found.zenith_distance for found in every.values()])

@@ -1,7 +1,7 @@
-"""Printed pages of the 1967 program (NOAA TR NOS 55, figure 22): 132 columns, numbers as E14.8 wrote them.
+"""Printed pages of the 1967 program (NOAA TR NOS 55, figure 22): 132 columns, numbers as E14.8.
 
-Of the six pages of the figure two survive, the second in part: columns whose width is lost are as wide as
-their headings. What pages 3 to 6 held stands in `listing.txt`.
+Two of the six pages of the figure are available, the second in part. Columns of unknown width are as wide as
+their headings. `listing.txt` has the content of pages 3 to 6.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ WIDTH = 132
 
 
 def printout(result: Result) -> str:
-    """Return the pages: the problem, then stars with their plate coordinates; a form feed begins each."""
+    """Return the pages of the problem and of the stars, separated by form feeds."""
     pages = [_problem(result), _coordinates(result)]
     return "\f".join("".join(f"{line[:WIDTH].rstrip()}\n" for line in page) for page in pages)
 
@@ -80,7 +80,7 @@ def _problem(result: Result) -> Iterator[str]:
 
 
 def descriptors(result: Result) -> list[str]:
-    """Say of every option of the report in which state it is, in the words of figure 22 where it has them."""
+    """Return the states of all report options, in the words of figure 22 if possible."""
     o, problem = result.problem.options, result.given
     states = [
         (
@@ -178,7 +178,7 @@ def _stage(stage: Stage) -> Iterator[str]:
 
 
 def _coordinates(result: Result) -> Iterator[str]:
-    """Give each known star a block: weight and residuals, then its images, then their means."""
+    """Yield a block per known star: weight and residuals, images, means."""
     problem = result.problem
     names = problem.star_names or problem.star_ids
     means = {star: (mean, residual, parts) for star, mean, residual, parts in star_means(result)}
@@ -232,7 +232,7 @@ def _row(values: Sequence[float] | Floats, width: int) -> str:
 
 
 def plate_list(result: Result) -> bytes:
-    """Return plate coordinates and residuals (m) as option 11 punched them: 4(1X,E14.8), I6, problem."""
+    """Return plate coordinates and residuals (m) in the format of option 11."""
     number = result.problem.labels.get("problem", "")
     rows = zip(result.problem.image_xy, result.solved.residuals, result.problem.image_points, strict=True)
     lines = [

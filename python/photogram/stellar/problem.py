@@ -1,4 +1,4 @@
-"""The input of a calibration: stars, images, weights, counts, rejected observations."""
+"""Input of a plate calibration: stars, images, weights, counts, rejected observations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from photogram.words import Phrase, phrase
 
 
 def default_parameters(principal_distance: float) -> Floats:
-    """Return parameters of an undistorted camera that looks at the zenith, (26,)."""
+    """Return parameters (26,) of an undistorted camera that points to the zenith."""
     parameters = np.zeros(len(NAMES))
     parameters[[INDEX["cx"], INDEX["cy"]]] = principal_distance
     parameters[-4:] = TAU
@@ -28,18 +28,18 @@ def default_parameters(principal_distance: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """A direction of the camera known from outside (option 2, equation 72).
+    """Known external direction of the camera (option 2, equation 72).
 
     Attributes
     ----------
     azimuth
-        From south, positive west; radians.
+        Azimuth from south, positive west; radians.
     zenith_distance
-        Radians, neither refracted nor aberrated.
+        Zenith distance in radians, without refraction and aberration.
     xy
         (2,) plate coordinates of its image, metres.
     weight
-        (2, 2) weight matrix of these.
+        (2, 2) weight matrix of the plate coordinates.
     group
         0 pre, 1 post, 2 event.
     """
@@ -52,41 +52,42 @@ class Axis:
 
     @property
     def standard(self) -> tuple[float, float]:
-        """Xi and eta."""
+        """Standard coordinates xi and eta."""
         tangent = np.tan(self.zenith_distance)
         return (-tangent * np.cos(self.azimuth), -tangent * np.sin(self.azimuth))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(Brief):
-    """A calibration of S stars and m images.
+    """Plate calibration of S stars and m images.
 
-    Angles are radians, lengths metres; weights are for one unit weight (m0^2 times the inverse covariance).
+    Angles are in radians, lengths in metres. Weights are for one unit weight (m0^2 times the inverse
+    covariance).
 
     Attributes
     ----------
     site
-        Where the camera stands.
+        Station of the camera.
     star_ids, star_places, star_weights
-        (S,) numbers, (S, 2) apparent right ascension and declination, (S, 2, 2) weights: zero for directions
-        that are not known, infinite for places that are held.
+        (S,) numbers, (S, 2) apparent right ascension and declination, (S, 2, 2) weights: zero for unknown
+        directions, infinite for fixed positions.
     image_points, image_stars, image_groups, image_xy, image_weights, image_times
-        (m,) point numbers, (m,) index of the star, (m,) 0 pre, 1 post, 2 event, (m, 2) plate coordinates of
-        the diapositive, (m, 2, 2) weights, (m,) local apparent sidereal time.
+        (m,) point numbers, (m,) star indices, (m,) groups: 0 pre, 1 post, 2 event. (m, 2) plate coordinates
+        of the diapositive, (m, 2, 2) weights, (m,) local apparent sidereal time.
     initial
         (26,) parameters in the order of :data:`photogram.stellar.NAMES`.
     parameter_weights
-        (26, 26) weights of these values.
+        (26, 26) weights of the initial values.
     fixed
-        (26,) which parameters are held.
+        (26,) whether parameters are fixed.
     axis
         Direction of the axis, if known.
     star_names
         (S,) catalogue numbers.
     options
-        How to adjust and what to compute.
+        Options of the adjustment and computations.
     labels
-        What a listing says at its head: title, problem, event, camera, plate and so on.
+        Header of a listing: title, problem, event, camera, plate and so on.
     """
 
     site: Site
@@ -145,21 +146,21 @@ class Problem(Brief):
 
     @property
     def known(self) -> Bools:
-        """(S,) which stars have a place of the catalogue."""
+        """(S,) whether stars have a catalogue position."""
         return self.star_weights[:, 0, 0] > 0
 
     @property
     def held(self) -> Bools:
-        """(S,) which stars are held at their places."""
+        """(S,) whether stars have a fixed position."""
         return np.isinf(self.star_weights[:, 0, 0])
 
     @property
     def weighted(self) -> Bools:
-        """(26,) which parameters have weight."""
+        """(26,) whether parameters are weighted."""
         return np.diag(self.parameter_weights) > 0
 
     def without(self, stars: Bools, images: Bools) -> Problem:
-        """Return the problem without some stars and images, and without stars that have no image left."""
+        """Return the problem without some stars and images, and stars without images."""
         keep_images = ~(images | stars[self.image_stars])
         keep = ~stars & np.isin(np.arange(len(self.star_ids)), self.image_stars[keep_images])
         place = np.cumsum(keep) - 1
@@ -176,7 +177,7 @@ class Problem(Brief):
         )
 
     def places_at(self, parameters: Floats, free: Bools) -> Floats:
-        """Return (S, 2) catalogue places; of directions that are not known those of their first images."""
+        """Return (S, 2) catalogue positions, or directions of first images if unknown."""
         places = self.star_places.copy()
         stars, first = np.unique(self.image_stars, return_index=True)
         seen = ~self.known[stars]
@@ -185,7 +186,7 @@ class Problem(Brief):
         return places
 
     def core(self, parameters: Floats, places: Floats, fixed: Bools) -> _photocore.StellarProblem:
-        """Return the problem as the core takes it, at given values."""
+        """Return the problem of the core at given values."""
         axis, held = self.axis, self.held
         weighted = np.flatnonzero(self.weighted & ~fixed)
         return core_problem(
@@ -224,7 +225,7 @@ class Prior:
     names: Sequence[str]
 
     def root(self) -> Floats:
-        """Return R of P = R^T R; P is scaled since parameters differ by many orders of magnitude."""
+        """Return R of P = R^T R, computed with scaled P since parameter units differ."""
         scale = np.sqrt(np.diag(self.weights))
         try:
             lower = np.linalg.cholesky(self.weights / np.outer(scale, scale))
@@ -255,7 +256,7 @@ def core_problem(
     prior: Prior = NO_PRIOR,
     axis: tuple[int, tuple[float, float], list[float], list[list[float]]] | None = None,
 ) -> _photocore.StellarProblem:
-    """Return a problem of the core: values of attitudes (three each) and of the 17 common parameters."""
+    """Return a problem of the core with three values per attitude and 17 common ones."""
     attitudes = len(values) - len(COMMON)
     return _photocore.StellarProblem(
         station=site.core,
@@ -295,23 +296,23 @@ def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Counts:
-    """Observations and unknowns of an adjustment."""
+    """Numbers of observations and unknowns of an adjustment."""
 
-    plate_observations: int  # Plate coordinates with those of the axis
+    plate_observations: int  # Plate coordinates, including the axis
     star_observations: int  # Catalogue coordinates with a weight
     parameter_observations: int  # Parameters with a weight
     parameter_unknowns: int
     star_unknowns: int
-    constraints: int = 0  # Of a combined solution
+    constraints: int = 0  # Constraints of a combined solution
 
     @property
     def observations(self) -> int:
-        """All together."""
+        """Total number of observations."""
         return self.plate_observations + self.star_observations + self.parameter_observations
 
     @property
     def unknowns(self) -> int:
-        """All together."""
+        """Total number of unknowns."""
         return self.parameter_unknowns + self.star_unknowns
 
     @property
@@ -321,14 +322,14 @@ class Counts:
 
     @property
     def usable(self) -> int:
-        """Degrees of freedom, 1 where the solution is unique."""
+        """Degrees of freedom, 1 for a unique solution."""
         return self.degrees_of_freedom or 1
 
 
 def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
-    """Count observations and unknowns if some parameters are estimated.
+    """Count observations and unknowns for a set of free parameters.
 
-    Raises AdjustmentError: there are fewer observations than unknowns (error 3).
+    AdjustmentError: if there are fewer observations than unknowns (error 3).
     """
     free_stars = int((~problem.held).sum())
     counts = Counts(
@@ -346,9 +347,9 @@ def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
 
 
 def rejected(problem: Problem, stars: Collection[str], points: Collection[str]) -> Problem:
-    """Return a problem without some stars and plate points; stars without images left are removed, too.
+    """Return a problem without some stars and plate points, and stars without images.
 
-    Raises InputError: an unknown number.
+    InputError: if a number is unknown.
     """
     for kind, names, known in (
         ("star", stars, problem.star_ids),
@@ -378,7 +379,7 @@ def singular(parameters: Sequence[int]) -> AdjustmentError:
 
 
 def failure(problem: Problem, error: _photocore.StellarError) -> AdjustmentError:
-    """Return an error of the core with the names of stars or parameters of a problem."""
+    """Return an error of the core with the names of stars or parameters."""
     kind, message, indices = error.args
     if kind == "undetermined":
         return singular(indices)

@@ -1,7 +1,7 @@
-"""The report's own iteration: its approximate partials and its stop rules (NOAA TR NOS 55, sections 4 and 5).
+"""Iteration of the report: approximate partials and stop rules (NOAA TR NOS 55, sections 4 and 5).
 
-It differs from the strict one in that distortion is taken at the measured image, stars stay at their
-catalogue places while the parameters are iterated, and the change of refraction with direction is neglected.
+In contrast to the strict iteration, distortion is computed at the measured image, and stars remain at their
+catalogue positions while parameters are iterated. The change of refraction with direction is neglected.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _MAX_ITERATIONS = 100
 
 
 def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | None:
-    """Apply the three stop rules to the levels of discrepancies so far; None to go on.
+    """Apply the three stop rules to the levels of discrepancies; None to continue.
 
-    Levels are of every pass, before its correction; the tolerance is the largest difference of two successive
-    ones at which the iteration has settled; a limit of 0 is none.
+    Each level precedes the correction of its pass. The tolerance is the difference of successive levels at
+    convergence. A limit of 0 means unlimited.
     """
     if not np.isfinite(levels[-1]):
         return DIVERGED
@@ -56,11 +56,11 @@ def _tolerances(problem: Problem) -> dict[str, Any]:
 def iterate(
     problem: Problem, initial: Floats, free: Bools, *, solution: str, limit: int, once: bool = False
 ) -> Solved:
-    """Iterate from initial parameters (26,) to the report's solution, in those that are free.
+    """Iterate from initial parameters (26,) to the solution of the report.
 
-    A limit of 0 is none; `once` corrects once without a test, as the report does for refraction.
+    A limit of 0 means unlimited; `once` corrects once without a test, as in the report for refraction.
 
-    Raises AdjustmentError: a star or the parameters are not determined (errors 2 and 4).
+    AdjustmentError: if a star or the parameters are not determined (errors 2 and 4).
     """
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     known = problem.known[problem.image_stars]
@@ -70,13 +70,13 @@ def iterate(
     while True:
         core = problem.core(parameters, problem.places_at(parameters, free), ~free)
         constant = core.published(**_tolerances(problem))["constant"]
-        # What has diverged far enough has squares beyond all numbers.
+        # Squares may overflow after divergence.
         with np.errstate(over="ignore"):
             levels.append(float(np.sqrt(np.sum(constant[known] ** 2) / dof)))
         stop = stop_reason(levels, 0.0 if once else problem.options.tolerance, limit)
         if stop:
             break
-        # What the equations do not touch yet (a direction of no decentering) is not corrected.
+        # Parameters without an effect yet (a direction of zero decentring) are not corrected.
         correction = _correction(problem, core)
         parameters = parameters + correction["parameters"]
         if abs(parameters[21]) > 2 * np.pi:
@@ -90,7 +90,7 @@ def iterate(
         raise AdjustmentError(phrase("stars.initial-camera"))
     if correction["without_effect"]:
         raise singular(correction["without_effect"])
-    # Covariance and determinant are those of the last correction; the equations after it serve the residuals.
+    # Covariance and determinant belong to the last correction; later equations are used for the residuals.
     return residual_cycle(
         problem,
         parameters,
@@ -104,7 +104,7 @@ def iterate(
 
 
 def _correction(problem: Problem, core: _photocore.StellarProblem) -> dict[str, Any]:
-    """Return the correction at the values of the core; raise what the equations do not allow, by name."""
+    """Return the correction at core values; raise errors with names."""
     try:
         return core.correction(**_tolerances(problem))
     except _photocore.StellarError as error:
@@ -114,13 +114,14 @@ def _correction(problem: Problem, core: _photocore.StellarProblem) -> dict[str, 
 def residual_cycle(
     problem: Problem, parameters: Floats, free: Bools, *, cofactors: Floats, **others: Any
 ) -> Solved:
-    """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
+    """Compute star corrections, residuals and tests at final parameters (v-cycle).
 
-    Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
-    two millionths of the mean error of unit weight. The cofactors (26, 26) are those of the parameters,
-    `others` are further attributes of the solution.
+    Refraction refers to the corrected positions. The listing of the report uses catalogue positions, a
+    difference of two millionths of the mean error of unit weight. `cofactors` (26, 26) refer to the
+    parameters, `others` are further attributes of the solution.
 
-    Raises AdjustmentError: a star is not determined by its images (error 2), or has none at these parameters.
+    AdjustmentError: if a star is not determined by its images (error 2), or is not imaged with these
+    parameters.
     """
     tolerances = _tolerances(problem)
     core = problem.core(parameters, problem.places_at(parameters, free), ~free)

@@ -1,4 +1,4 @@
-"""A calibrated camera with its covariance, and what the stars and their images say about it."""
+"""Calibrated plate camera with its covariance, and statistics of stars and images."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Judged, Documented, Brief):
-    """A calibration.
+    """Result of a plate calibration.
 
-    Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be
-    added to an observation. Covariances are cofactors times the square of `mean_error`.
+    Residuals are computed minus measured (v of the report), for stars adjusted minus catalogue. They are
+    added to observations. Covariances are cofactors times the square of `mean_error`.
 
     Attributes
     ----------
     problem
-        What was adjusted.
+        Input of the adjustment.
     solved
-        Parameters, places, cofactors, residuals.
+        Adjusted parameters, star positions, cofactors, residuals.
     counts
         Observations and unknowns.
     messages
-        Remarks that did not stop the run.
+        Warnings.
     given
-        The whole problem, where only the minimum solution was computed.
+        Complete problem if only the minimum solution was computed.
     stages
-        The solutions of the run in their order; the last one is `solved`.
+        Solutions in order; the last one is `solved`.
     pre_run
-        Residuals of the images that took no part, if a pre-run was asked for.
+        Residuals of the unused images, if a pre-run was requested.
     movement
-        The movement test, if asked for.
+        Movement test, if requested.
     combined
-        The combined solution, if attitudes do not differ: a result of its own.
+        Combined solution, a separate result, if attitudes do not differ.
     pairs
-        Of a combined solution: the pairs that the movement test found equal.
+        For a combined solution: the pairs that passed the movement test.
     spoiled
-        The change of the camera by outliers, if it exceeds the uncertainty without them; else empty.
+        Change of the camera by outliers, if it exceeds the uncertainty without them; else empty.
     """
 
     problem: Problem
@@ -75,12 +75,12 @@ class Result(Judged, Documented, Brief):
 
     @property
     def converged(self) -> bool:
-        """Whether the last solution ended by its criterion."""
+        """Whether the last solution met its convergence criterion."""
         return self.solved.converged
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """The history of all solutions."""
+        """Iteration history of all solutions."""
         return tuple(level for stage in self.stages for level in stage.levels)
 
     @property
@@ -95,13 +95,13 @@ class Result(Judged, Documented, Brief):
 
     @property
     def test(self) -> GlobalTest | None:
-        """The global test where the mean error of unit weight is given (option 14); else it is not known."""
+        """Global test for a given mean error of unit weight (option 14), else None."""
         given = self.problem.options.mean_error
         return global_test(sum(self.solved.sums) / given**2, self.degrees_of_freedom) if given else None
 
     @property
     def mean_error(self) -> float:
-        """Mean error of unit weight in use: the given one (option 14), or the computed one."""
+        """Mean error of unit weight: given (option 14) or computed."""
         return self.problem.options.mean_error or self.computed_mean_error
 
     @property
@@ -110,25 +110,25 @@ class Result(Judged, Documented, Brief):
         return dict(zip(NAMES, self.solved.parameters.tolist(), strict=True))
 
     def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
-        """Return the camera as blocks take it, of the combined solution where there is one: `plate`, in mm.
+        """Return the camera of blocks, `plate` in mm, preferably of the combined solution.
 
         Parameters
         ----------
         name
-            For reports.
+            Name in reports.
         weighted
-            Whether its parameters are observations with their full covariance; otherwise they are known.
+            Whether parameters are weighted by their full covariance; otherwise they are fixed.
         """
         return PlateCamera.of(self).as_camera(name, weighted=weighted)
 
     @property
     def estimated(self) -> list[str]:
-        """Names of the parameters that were estimated."""
+        """Names of the estimated parameters."""
         return [name for name, free in zip(NAMES, self.solved.free, strict=True) if free]
 
     @cached_property
     def covariance(self) -> Floats:
-        """(26, 26) of all parameters; zero for what was not estimated."""
+        """(26, 26) covariance of all parameters; zero for fixed ones."""
         return self.mean_error**2 * self.solved.cofactors
 
     @property
@@ -138,7 +138,7 @@ class Result(Judged, Documented, Brief):
 
     @cached_property
     def correlation(self) -> Floats:
-        """(26, 26) correlations; zero for what was not estimated."""
+        """(26, 26) correlations; zero for fixed parameters."""
         return correlations(self.covariance)
 
     @property
@@ -148,7 +148,7 @@ class Result(Judged, Documented, Brief):
 
     @property
     def star_covariances(self) -> Floats:
-        """(S, 2, 2) of the adjusted places, radians squared, scaled by `mean_error`."""
+        """(S, 2, 2) of adjusted star positions, radians squared, scaled by `mean_error`."""
         return self.mean_error**2 * self.solved.star_cofactors
 
     @property
@@ -158,7 +158,7 @@ class Result(Judged, Documented, Brief):
 
     @property
     def star_standardized(self) -> Floats:
-        """(S, 2) residuals of the catalogue places over their mean errors."""
+        """(S, 2) residuals of the catalogue positions over their mean errors."""
         return self.solved.star_standardized / (self.mean_error or math.nan)
 
     def ellipses(self) -> list[Ellipse]:
@@ -171,7 +171,7 @@ class Result(Judged, Documented, Brief):
         return directions(self)
 
     def document(self) -> Document:
-        """Return the document: verdict, parameters, stars, images, curves, movement."""
+        """Return the document with verdict, parameters, observations, curves and movement."""
         from photogram.stellar.document import plate_document
 
         return plate_document(self)
@@ -182,17 +182,17 @@ class Result(Judged, Documented, Brief):
         return plate_findings(self)
 
     def correlated(self) -> list[tuple[str, str, float]]:
-        """Name pairs of parameters whose correlation exceeds 0.95."""
+        """Return pairs of parameters with correlations above 0.95."""
         return correlated(NAMES, self.covariance)
 
     def significance(self) -> dict[str, float]:
-        """Return each estimated distortion coefficient over its mean error."""
+        """Return the ratio of each estimated distortion coefficient to its mean error."""
         rows = [INDEX[name] for name in DISTORTION if self.solved.free[INDEX[name]]]
         names = [NAMES[row] for row in rows]
         return significance(names, self.solved.parameters[rows], self.covariance[np.ix_(rows, rows)])
 
     def doubtful(self) -> list[Phrase]:
-        """Name what the stars hardly determine: correlations, distortion terms that are not significant."""
+        """Return warnings on correlated parameters and insignificant distortion terms."""
         weak = {name: ratio for name, ratio in self.significance().items() if ratio < SIGNIFICANT}
         terms = [phrase("stars.weak-ratio", name=name, ratio=ratio) for name, ratio in weak.items()]
         remarks = [*correlation_remarks(self.correlated())]

@@ -1,4 +1,4 @@
-"""The sky over a station: refraction, aberration, standard coordinates (NOAA TR NOS 55, equations 1 to 18).
+"""Refraction, aberration and standard coordinates at a station (NOAA TR NOS 55, equations 1 to 18).
 
 Local coordinates are left-handed: xi north, eta east, zenith. Azimuths count from south, positive west; hour
 angles are positive west; longitudes are positive west.
@@ -18,16 +18,16 @@ from photogram.show.angles import ARCSEC as ARCSEC
 from photogram.words import phrase
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
-"""Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
+"""Refraction coefficients (arcsec), a fit of the report to Garfinkel's tables."""
 ABERRATION = 0.320 * ARCSEC
-"""Constant of diurnal aberration at the equator as the report has it, in radians; 0.3192 arcsec is nearer."""
+"""Diurnal aberration at the equator in the report, radians; better 0.3192 arcsec."""
 
 
-TEMPERATURES = (150.0, 350.0)  # Air on the ground in kelvin: -123 to 77 degrees Celsius
+TEMPERATURES = (150.0, 350.0)  # Ground temperature in kelvin: -123 to 77 degrees Celsius
 HIGHEST_PRESSURE = 850.0  # Millimetres of mercury; 840 at the Dead Sea in a strong anticyclone
-HECTOPASCAL = 1013.25 / 760.0  # Of a millimetre of mercury
-HOUR = 0.0  # Sidereal time of all images of a landmark, radians: it does not turn with the sky
-_STEP = 1e-6  # Of the differences that transform weights, radians
+HECTOPASCAL = 1013.25 / 760.0  # One millimetre of mercury in hectopascals
+HOUR = 0.0  # Sidereal time of all images of a landmark, radians: it does not rotate with the sky
+_STEP = 1e-6  # Step of the numerical weight transformation, radians
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class Air:
     temperature
         Kelvin.
     pressure
-        Millimetres of mercury; 0 for no refraction.
+        Millimetres of mercury; 0 disables refraction.
 
     Raises
     ------
     InputError
-        Air that cannot be, most often in other units.
+        If values are impossible, usually because of other units.
     """
 
     temperature: float = 273.15
@@ -65,18 +65,18 @@ class Air:
 def refraction(
     zenith_distances: ArrayLike, air: Air | None = None, *, tau: ArrayLike = TAU, observed: bool = False
 ) -> Floats:
-    """Return refraction (true minus observed zenith distance; equations 7 to 11).
+    """Compute refraction as true minus observed zenith distance (equations 7 to 11).
 
     Parameters
     ----------
     zenith_distances
-        (n,) radians.
+        (n,) zenith distances, radians.
     air
-        Of the station; 0 degrees Celsius and one atmosphere when None.
+        Air of the station; None: 0 degrees Celsius and one atmosphere.
     tau
         (4,) coefficients in seconds of arc.
     observed
-        Whether the zenith distances are observed ones; else they are true.
+        Whether the zenith distances are observed or true.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def refraction(
     Raises
     ------
     InputError
-        Arrays of other shapes.
+        If arrays have other shapes.
     """
     air = air or Air()
     return _photocore.refraction(
@@ -99,18 +99,18 @@ def refraction(
 
 @dataclass(frozen=True)
 class Effects:
-    """What apparent places are made of: an effect that is left out is taken for none.
+    """Effects included in apparent positions; others are neglected.
 
     Attributes
     ----------
     annual_aberration
-        Of the Earth's motion, up to 20.5 arcsec.
+        Effect of the Earth's motion, up to 20.5 arcsec.
     light_deflection
-        By the Sun, below 0.01 arcsec at night.
+        Deflection by the Sun, below 0.01 arcsec at night.
     diurnal_aberration
-        Of the station's motion, up to 0.32 arcsec.
+        Effect of the station's motion, up to 0.32 arcsec.
     refraction
-        By the air: a minute of arc at 45 degrees.
+        Refraction by the air: a minute of arc at 45 degrees.
     """
 
     annual_aberration: bool = True
@@ -120,13 +120,13 @@ class Effects:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Names of the effects that are left out, as reports have them."""
+        """Names of the neglected effects in reports."""
         return tuple(name.replace("_", " ") for name, taken in vars(self).items() if not taken)
 
 
 @dataclass(frozen=True)
 class Site:
-    """A station under the sky.
+    """Station for sky observations.
 
     Attributes
     ----------
@@ -137,13 +137,13 @@ class Site:
     elevation
         Metres.
     air
-        Its air.
+        Air at the station.
     aberration
         Constant of diurnal aberration at the equator, radians.
     number, name
-        As the station is called.
+        Number and name of the station.
     effects
-        Which effects places and standard coordinates have.
+        Effects included in positions and standard coordinates.
     """
 
     latitude: float
@@ -157,7 +157,7 @@ class Site:
 
     @property
     def core(self) -> tuple[float, float, float, float]:
-        """Latitude, aberration, temperature and pressure as the core takes them: 0 for what is left out."""
+        """Latitude, aberration, temperature and pressure of the core, 0 if neglected."""
         aberration = self.aberration if self.effects.diurnal_aberration else 0.0
         pressure = self.air.pressure if self.effects.refraction else 0.0
         return (self.latitude, aberration, self.air.temperature, pressure)
@@ -165,7 +165,7 @@ class Site:
     def standard_coordinates(
         self, places: ArrayLike, sidereal_times: ArrayLike, tau: ArrayLike = TAU
     ) -> Floats:
-        """Return refracted standard coordinates xi, eta of apparent places.
+        """Compute refracted standard coordinates xi, eta of apparent positions.
 
         Parameters
         ----------
@@ -185,29 +185,29 @@ class Site:
         return _photocore.standard_coordinates(places, times, self.core, np.asarray(tau, float))
 
     def places(self, standard: ArrayLike, sidereal_times: ArrayLike, tau: ArrayLike = TAU) -> Floats:
-        """Return apparent places of refracted standard coordinates, the inverse of `standard_coordinates`."""
+        """Compute apparent positions, the inverse of `standard_coordinates`."""
         standard = np.asarray(standard, float)
         times = np.ascontiguousarray(np.broadcast_to(np.asarray(sidereal_times, float), len(standard)))
         return _photocore.star_places(standard, times, self.core, np.asarray(tau, float))
 
 
 def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tuple[Floats, Floats]:
-    """Return the place of a star that is seen where a landmark is, at the sidereal time `HOUR`.
+    """Return the star position equivalent to a landmark at the sidereal time `HOUR`.
 
-    The direction is the observed one, with the refraction that the program applies to stars and without their
-    aberration: the place is what program and station turn into it.
+    The direction is observed, with the refraction of the program for stars and without their aberration.
+    Program and station transform the position to this direction.
 
     Parameters
     ----------
     site
         The station.
     azimuth
-        From north through east, radians.
+        Azimuth from north through east, radians.
     elevation
-        Observed, above the horizon, radians.
+        Observed elevation above the horizon, radians.
     weight
-        (2, 2) of azimuth and elevation; infinite or zero on the diagonal for a direction that is held, or not
-        known.
+        (2, 2) weight of azimuth and elevation. An infinite diagonal fixes the direction, a zero diagonal
+        makes it unknown.
 
     Returns
     -------
@@ -216,8 +216,8 @@ def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tu
     Raises
     ------
     InputError
-        An elevation that is not between the horizon and the zenith, an azimuth that is not finite, a weight
-        of another shape.
+        If the elevation is not between the horizon and the zenith, if the azimuth is not finite, or if the
+        weight has another shape.
     """
     weight = shaped("weight", weight, (2, 2))
     if not 0 < elevation < np.pi / 2:

@@ -1,7 +1,7 @@
-"""Digital exposures of the sky to a calibrated camera of any lens, with full covariance.
+"""Calibration of a camera with any lens from digital sky exposures, with full covariance.
 
-Pixels count right and down; x, y, axis of the camera are right-handed: the reflection in the
-report's matrix leads from the left-handed north, east, zenith to them.
+Pixels count right and down. x, y and the camera axis are right-handed. The reflection in the matrix of the
+report transforms the left-handed north, east, zenith to them.
 """
 
 from __future__ import annotations
@@ -31,24 +31,23 @@ from photogram.words import Phrase, phrase
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
-_PER_IMAGE = 2000  # Bytes of memory that an image takes
+_PER_IMAGE = 2000  # Memory per image, bytes
 
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """A digital exposure.
+    """Digital exposure with star images.
 
     Attributes
     ----------
     utc
-        Mid exposure, such as 2024-03-01T21:03:05.25.
+        UTC of mid exposure, such as 2024-03-01T21:03:05.25.
     xy
-        (k, 2) measured star images, pixels; the brightest first where stars are to be identified.
+        (k, 2) measured star images, pixels; brightest first for identification.
     attitude
         (3,) approximate alpha, omega, kappa, radians.
     stars
-        (k,) index of each image's star in the catalogue, -1 for none; None where they are not
-        known.
+        (k,) index of each image's star in the catalogue, -1 for none; None if unknown.
     """
 
     utc: str
@@ -59,48 +58,48 @@ class Exposure:
 
 @dataclass(frozen=True, eq=False)
 class SkyCalibration:
-    """A calibrated camera and the attitudes of E exposures."""
+    """Calibrated camera and the attitudes of E exposures."""
 
     camera: SkyCamera  # With covariance, scaled by the variance of unit weight
     attitudes: Floats  # (E, 3) alpha, omega, kappa in radians
     attitude_covariances: Floats  # (E, 3, 3)
-    cross_covariances: Floats  # (E, 3, k) of attitudes and camera
+    cross_covariances: Floats  # (E, 3, k) between attitudes and camera
     exposures: Indices  # (m,) exposure and catalogue star of each image
     stars: Indices
-    # (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their
-    # mean errors
+    # (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their mean
+    # errors
     xy: Floats
     residuals: Floats
     redundancy: Floats
     standardized: Floats
-    catalogue: Indices  # (S,) index in the catalogue of the stars used
+    catalogue: Indices  # (S,) catalogue index of the used stars
     # (S, 2) adjusted minus catalogue right ascension and declination, radians; redundancy numbers;
     # residuals over their mean errors. NaN for fixed stars.
     star_residuals: Floats
     star_redundancy: Floats
     star_standardized: Floats
-    mean_error: float  # Mean error of unit weight: of a pixel coordinate over its assumed standard deviation
-    degrees_of_freedom: int  # Of the adjustment
+    mean_error: float  # Mean error of unit weight: ratio of actual and assumed pixel standard deviations
+    degrees_of_freedom: int  # Degrees of freedom of the adjustment
     iterations: int
     status: str
 
 
 def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats, time: float) -> Floats:
-    """Return the pixels (n, 2) of apparent places.
+    """Return the pixels (n, 2) of apparent positions.
 
-    NaN below the horizon, behind the camera, and where distortion folds.
+    NaN below the horizon, behind the camera, and beyond the range of invertible distortion.
 
     Raises
     ------
     InputError
-        Other than three angles, and two coordinates of each place.
+        If the attitude does not have three angles, or if positions do not have two coordinates.
     """
     standard = site.standard_coordinates(shaped("places", places, (length("places", places), 2)), time)
     attitude = shaped("attitude", attitude, (3,))
     pixels = _photocore.plate_images(standard, attitude, camera.common[:-4], camera.kind)
     limit = _photocore.radial_domain(camera.facts.model, camera.model_values)
     if limit is not None:
-        # Where the radial distortion decreases, stars far outside would have images in the frame.
+        # If the radial distortion decreases, stars far outside would have images in the frame.
         ideal = replace(camera, values=np.where(np.arange(len(camera.values)) < 2, 1.0, 0.0))
         straight = _photocore.plate_images(standard, attitude, ideal.common[:-4], camera.kind)
         pixels[np.linalg.norm(straight, axis=1) >= limit[0]] = np.nan
@@ -116,17 +115,17 @@ def stars_near(
     margin: float,
     dut1: float = 0.0,
 ) -> Indices:
-    """Return the stars of a catalogue around the field of an exposure, by index.
+    """Return the indices of catalogue stars around the field of an exposure.
 
     `margin` is the largest error of the attitude, radians.
     """
     alpha, omega = exposure.attitude[:2]
     if not math.cos(alpha) * math.cos(omega) > 0.02:
-        # Nearly level or below: there are no standard coordinates to go by.
+        # At or below the horizon standard coordinates are undefined.
         return np.arange(len(catalogue.ids))
     axis = np.array([[math.tan(alpha), math.tan(omega) / math.cos(alpha)]])
     ((ra, dec),) = site.places(axis, sidereal_time(site, exposure.utc, dut1))
-    # Distortion, and precession over the years.
+    # Margin for distortion, and for precession over the years.
     reach = 1.1 * camera.largest_angle(frame) + margin + _SLACK
     centre = np.array([math.cos(dec) * math.cos(ra), math.cos(dec) * math.sin(ra), math.sin(dec)])
     return np.flatnonzero(catalogue.directions @ centre >= math.cos(min(reach, math.pi)))
@@ -146,41 +145,43 @@ def calibrate_exposures(
     earth: Earth = _STILL,
     threads: int | None = None,
 ) -> SkyCalibration:
-    """Calibrate a camera by digital exposures of the sky.
+    """Calibrate a camera with digital sky exposures.
 
     Parameters
     ----------
     exposures
-        With their stars.
+        Exposures with their stars.
     camera
-        Initial values.
+        Camera with initial values.
     site, catalogue
-        Where, and which stars. The aberration of the site is the diurnal one; its latitude and longitude, and
-        the attitudes that come out, are from the mean pole.
+        Station and stars. The aberration of the site is diurnal. Its latitude and longitude, and the
+        resulting attitudes, refer to the mean pole.
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     fixed
-        Names of camera parameters to hold (of `camera.names`).
+        Names of camera parameters to fix (of `camera.names`).
     common_scale
         Whether fx is the principal distance of both axes.
     prior
-        A calibrated camera, whose values take part with the weight of their covariance; what was held in it
-        has no weight.
+        Calibrated camera whose values are weighted by their covariance. Its fixed parameters have zero
+        weight.
     weigh_stars
-        Estimate the stars, too, with the mean errors of the catalogue; stars without are held. Else all are
-        held: catalogue places are a thousand times better than a pixel.
+        Whether to weight stars by the mean errors of the catalogue and estimate them. Stars without mean
+        errors are fixed. If False, all stars are fixed: catalogue positions are a thousand times more
+        accurate than a pixel.
     earth
         UT1 - UTC, and the pole.
     threads
-        Number of threads; all processors when None.
+        Number of threads; None: all processors.
 
     Raises
     ------
     InputError
-        No exposures, or one without stars; a parameter that does not exist; a standard deviation that is not
-        positive, or whose square is none; a prior of another lens; fewer than one thread.
+        If exposures or their stars are missing, if a parameter does not exist, or if the prior has another
+        lens. If a standard deviation is not positive or its square underflows, or if `threads` is less than
+        1.
     AdjustmentError
-        The stars do not determine the camera, or the memory does not hold the adjustment.
+        If the stars do not determine the camera, or if the memory is insufficient.
     """
     processors = core_threads(threads)
     for name in sorted(set(fixed) - set(camera.names)):
@@ -211,7 +212,7 @@ def calibrate_exposures(
     result = _result(found, images, camera, len(exposures), freedom)
     if earth.pole == (0.0, 0.0):
         return result
-    # The rotation between the poles is so small that covariances do not change.
+    # The rotation between the poles is too small to affect covariances.
     turned = [transformed_angles(angles, place, site, earth.pole) for angles in result.attitudes]
     change = np.array(turned) - result.attitudes
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
@@ -222,7 +223,6 @@ def _described(lens: str, common_scale: bool) -> Phrase:
 
 
 def _tied(camera: SkyCamera, common_scale: bool) -> SkyCamera:
-    """Return a camera with or without the condition that fy is fx."""
     values = camera.values.copy()
     if common_scale and not camera.common_scale:
         values[:2] = values[:2].mean()
@@ -230,7 +230,6 @@ def _tied(camera: SkyCamera, common_scale: bool) -> SkyCamera:
 
 
 def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: int) -> Phrase:
-    """Return the unknowns that the stars of some exposures do not determine."""
     kind, message, indices = error.args
     if kind != "undetermined" or not indices:
         return phrase("stars.no-solution", reason=str(message))
@@ -243,7 +242,6 @@ def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: 
 
 
 def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
-    """Refuse an adjustment that exceeds the memory: estimated stars connect all attitudes."""
     needed = _PER_IMAGE * images + (16 * (3 * exposures) ** 2 if weigh_stars else 0)
     free = available_memory()
     if free is not None and needed > free:
@@ -259,11 +257,11 @@ def partials(
     catalogue: Catalogue,
     earth: Earth = _STILL,
 ) -> tuple[Floats, Floats]:
-    """Return partials of the images that have a star, by their attitude and by the camera.
+    """Return partials of matched images by attitude and camera.
 
     Returns
     -------
-    (m, 2, 3) pixels a radian, and (m, 2, k) in the order of `camera.names`.
+    (m, 2, 3) pixels per radian, and (m, 2, k) in the order of `camera.names`.
     """
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, False)
@@ -273,8 +271,6 @@ def partials(
 
 
 class _Images:
-    """All images of all exposures, with the apparent places of their stars."""
-
     def __init__(
         self, exposures: Sequence[Exposure], site: Site, catalogue: Catalogue, dut1: float, weigh: bool
     ) -> None:
@@ -299,7 +295,7 @@ class _Images:
         self.shifts = shifts
         errors = catalogue.take(self.catalogue).mean_errors(epoch(exposures[0].utc))
         self.weighted: Bools = (errors.min(axis=1) > 0) & weigh
-        # The axes of date differ from those of the catalogue by minutes of arc: negligible for an ellipse.
+        # The axes of date and of the catalogue differ by minutes of arc, negligible for an ellipse.
         errors[:, 0] /= np.cos(self.places[:, 1])
         self.weights = np.zeros((len(errors), 2, 2))
         self.weights[self.weighted] = errors[self.weighted, :, None] ** -2.0 * np.eye(2)
@@ -320,7 +316,7 @@ def _core(
     fixed[:first] = fixed[place[free]] = False
     weighted = NO_PRIOR
     if prior is not None:
-        # Fixed parameters are conditions of the others: a block of the whole weight matrix.
+        # Fixed parameters are conditions of the others: a block of the full weight matrix.
         weights = np.zeros((len(free), len(free)))
         known = np.ix_(prior.known, prior.known)
         weights[known] = weight_of(prior.covariance[known])

@@ -1,4 +1,4 @@
-"""Calibrated cameras of digital exposures with their covariance, of any lens, in pixels, and their files."""
+"""Calibrated cameras of digital exposures with covariance, of any lens, in pixels, and their files."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from photogram.words import phrase
 
 
 def weight_of(covariance: Floats) -> Floats:
-    """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
+    """Return the weight matrix of a covariance with rows of different magnitude.
 
-    Raises InputError: the covariance is not positive definite.
+    InputError: if the covariance is not positive definite.
     """
     sd = np.sqrt(np.diag(covariance))
     try:
@@ -37,7 +37,10 @@ def weight_of(covariance: Floats) -> Floats:
 
 
 def of_kind(document: Tree, kinds: Sequence[str]) -> Tree:
-    """Return a document of one of some kinds; InputError: it is another document."""
+    """Return a document of one of several kinds.
+
+    InputError: if it is another document.
+    """
     kind = document["kind"]
     if kind.value not in kinds:
         raise kind.error(phrase("error.choice", value=str(kind.value), names=kinds))
@@ -45,9 +48,9 @@ def of_kind(document: Tree, kinds: Sequence[str]) -> Tree:
 
 
 def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Return the parameters of a camera and their covariance: zero for those that are not in its order.
+    """Return camera parameters and their covariance, zero for unlisted parameters.
 
-    Raises InputError: a missing parameter, another name, a wrong number, a negative variance.
+    InputError: if a parameter is missing or unknown, a number is invalid, or a variance is negative.
     """
     members = [document["parameters"][name] for name in names]
     values = [member.get("value", None) if isinstance(member.value, dict) else member for member in members]
@@ -64,20 +67,20 @@ def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
     return np.array([value.number() for value in values]), covariance
 
 
-_EQUAL = 1e-4  # Pixels by which fy may differ from fx in blocks, if the two were one parameter
+_EQUAL = 1e-4  # Allowed difference of fy and fx in blocks, pixels, if the two were one parameter
 _KINDS = ("brown camera", "sky camera")
 
 
 @dataclass(frozen=True, eq=False)
 class SkyCamera:
-    """A camera of digital exposures: x counts right, y down.
+    """Camera of digital exposures: x counts right, y down.
 
     Attributes
     ----------
     values
         (k,) parameters in the order of `names`; principal distances and principal point in pixels.
     covariance
-        (k, k); zero for what was held, and for fy where there is a `common_scale`.
+        (k, k); zero for fixed parameters, and for fy with a `common_scale`.
     lens
         Name of the lens (`photogram.stellar.LENSES`).
     common_scale
@@ -86,7 +89,7 @@ class SkyCamera:
     Raises
     ------
     InputError
-        There is no such lens, or it has more or fewer parameters.
+        If the lens is unknown, or has another number of parameters.
     """
 
     values: Floats
@@ -103,12 +106,12 @@ class SkyCamera:
 
     @classmethod
     def of_field(cls, width: float, height: float, field_of_view: float, lens: str = "brown") -> Self:
-        """Return an ideal camera of a frame in pixels and a horizontal field of view in radians.
+        """Return an ideal camera from frame size (pixels) and horizontal field (radians).
 
         Raises
         ------
         InputError
-            There is no such lens, or it does not see so much.
+            If the lens is unknown, or does not reach the field of view.
         """
         facts = lens_named(lens)
         if not 0 < field_of_view < facts.widest:
@@ -121,17 +124,17 @@ class SkyCamera:
 
     @property
     def facts(self) -> Lens:
-        """The lens."""
+        """Lens of the camera."""
         return LENSES[self.lens]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(k,) of the parameters."""
+        """(k,) names of the parameters."""
         return LENSES[self.lens].names
 
     @property
     def kind(self) -> tuple[str, bool]:
-        """The kind of camera as the core takes it."""
+        """Camera type of the core."""
         return self.facts.model, self.common_scale
 
     @property
@@ -143,7 +146,7 @@ class SkyCamera:
 
     @property
     def common(self) -> Floats:
-        """(17,) as the core takes it: those of the model, zeros, coefficients of refraction."""
+        """(17,) core parameters: model parameters, zeros, refraction coefficients."""
         common = np.zeros(len(COMMON))
         common[: len(self.facts.order)] = self.model_values
         common[len(INTERIOR) :] = TAU
@@ -151,40 +154,43 @@ class SkyCamera:
 
     @property
     def known(self) -> Bools:
-        """(k,) which parameters have a mean error."""
+        """(k,) whether parameters have a mean error."""
         return np.asarray(np.diag(self.covariance) > 0)
 
     def rays(self, xy: Floats) -> Floats:
-        """Return unit directions (n, 3) of images (n, 2), NaN for none: x right, y down, z along the axis."""
+        """Return unit directions (n, 3) of images (n, 2), NaN if undefined.
+
+        Axes are x right, y down, z along the axis.
+        """
         rays = _photocore.camera_rays(self.facts.model, self.model_values, np.asarray(xy, float))
         return np.asarray(rays * (1.0, -1.0, -1.0), float)
 
     def images(self, rays: Floats) -> Floats:
-        """Return images (n, 2), pixels, of directions as of `rays`."""
+        """Return images (n, 2), pixels, of directions as in `rays`."""
         return _photocore.camera_images(self.facts.model, self.model_values, _turned(rays))
 
     def partials(self, rays: Floats) -> Floats:
-        """Return partials (n, 2, k), pixels, of images of directions, as of `rays`, by the parameters."""
+        """Return partials (n, 2, k), pixels, of images of directions by the parameters."""
         _, _, found = _photocore.camera_partials(self.facts.model, self.model_values, _turned(rays))
         return np.asarray(found[:, :, list(self.facts.places)], float)
 
     def largest_angle(self, frame: tuple[float, float]) -> float:
-        """Return the largest angle (radians) from the axis in a frame; pi where a part has no direction."""
+        """Return the largest axis angle (rad) in a frame; pi if undefined for a part."""
         x, y = (np.linspace(0, size, 9) for size in frame)
         rim = [(a, b) for a in x for b in (0.0, frame[1])] + [(a, b) for a in (0.0, frame[0]) for b in y]
         cosine = self.rays(np.array(rim))[:, 2]
         return math.acos(max(-1.0, min(1.0, float(cosine.min())))) if np.isfinite(cosine).all() else math.pi
 
     def as_camera(self, name: str = "", *, weighted: bool = True) -> Camera:
-        """Return the camera as blocks take it: columns and rows, y down, the model of its lens.
+        """Return the camera of blocks with the model of its lens: columns, rows, y down.
 
         Parameters
         ----------
         name
-            For reports.
+            Name in reports.
         weighted
-            Whether its parameters are observations with their full covariance; otherwise they are known. What
-            was held here is held there; of a common scale fy is fx to a ten-thousandth of a pixel.
+            Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
+            parameters remain fixed. With a common scale, fy equals fx within a ten-thousandth of a pixel.
         """
         names, model = self.names, self.facts.model
         values = dict(zip(names, self.values.tolist(), strict=True))
@@ -200,7 +206,7 @@ class SkyCamera:
         return Camera(model, values, covariance=covariance, name=name)
 
     def document(self) -> dict[str, Any]:
-        """Return the camera as it is written."""
+        """Return the members of the JSON document."""
         brown = self.lens == "brown"
         return {
             "program": f"photogram {_photocore.__version__}",
@@ -218,12 +224,12 @@ class SkyCamera:
 
     @classmethod
     def read(cls, path: Path) -> SkyCamera:
-        """Read what `to_json` wrote.
+        """Read a camera file of `to_json`.
 
         Raises
         ------
         InputError
-            The file cannot be read, or is another document.
+            If the file cannot be read, or is another document.
         """
         document = of_kind(read_json(path), _KINDS)
         lens = document.get("lens", "brown")
@@ -239,11 +245,13 @@ def _turned(rays: Floats) -> Floats:
 
 
 class BrownCamera(SkyCamera):
-    """A pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
+    """Pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
 
     With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-    x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx,
-    and y likewise with fy, cy, and p1, p2 exchanged. `values` are fx, fy, cx, cy, k1, k2, k3, p1, p2.
+
+        x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx.
+
+    The formula of y has fy, cy, and p1, p2 exchanged. `values` are fx, fy, cx, cy, k1, k2, k3, p1, p2.
     """
 
     NAMES = LENSES["brown"].names

@@ -1,4 +1,4 @@
-"""Values that an iteration has reached, and its history."""
+"""Current values of an iteration, and its history."""
 
 from __future__ import annotations
 
@@ -15,44 +15,44 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class Level:
-    """One pass of an iteration."""
+    """Pass of an iteration."""
 
     solution: str  # `minimum`, `maximum` or `refraction`
-    number: int  # From 1
-    # Level of discrepancies before its correction, metres. As published: root of the sum of squares of the
-    # plate discrepancies over the degrees of freedom, with stars at their catalogue places. Else: root of the
-    # whole weighted sum of squares over the degrees of freedom.
+    number: int  # Number, from 1
+    # Level of discrepancies before its correction, metres. As published: root of the plate sum of squares
+    # over the degrees of freedom, with stars at their catalogue positions. Otherwise: root of the total
+    # weighted sum of squares over the degrees of freedom.
     level: float
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The result of an iteration."""
+    """Result of an iteration."""
 
     parameters: Floats  # (26,) values
-    places: Floats  # (S, 2) adjusted places of the stars
-    free: Bools  # (26,) which parameters were estimated
+    places: Floats  # (S, 2) adjusted star positions
+    free: Bools  # (26,) whether parameters were estimated
     cofactors: Floats  # (26, 26) for unit weight; zero for fixed parameters
-    star_cofactors: Floats  # (S, 2, 2) of the places
-    star_inverse: Floats  # (S, 2, 2) the same with known parameters: the report's (1)^-1
+    star_cofactors: Floats  # (S, 2, 2) of the positions
+    star_inverse: Floats  # (S, 2, 2) of the positions for fixed parameters: (1)^-1 of the report
     residuals: Floats  # (m, 2) computed minus measured plate coordinates, metres
     redundancy: Floats  # (m, 2) of the images
     standardized: Floats
-    star_redundancy: Floats  # (S, 2) of the catalogue places; NaN if they have no weight
+    star_redundancy: Floats  # (S, 2) of the catalogue positions; NaN without weight
     star_standardized: Floats
     axis_residual: Floats | None  # Computed minus measured plate coordinates of the axis
     sums: tuple[float, float, float]  # Weighted sums of squares of plate, stars, parameters (with the axis)
     log_determinant: (
-        float  # Natural logarithm, of the reduced normal equations in the units of the parameters
+        float  # Natural logarithm for the reduced normal equations in the units of the parameters
     )
-    stop: str  # Why the iteration stopped
-    converged: bool  # Whether by its criterion
+    stop: str  # Reason of the end of the iteration
+    converged: bool  # Whether its convergence criterion was met
     levels: tuple[Level, ...]
     remarks: tuple[Phrase, ...] = ()
 
     @classmethod
     def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **others: Any) -> Solved:
-        """Return the result of the core for stars and images, and the other attributes.
+        """Return a result from the core values of stars and images, and other attributes.
 
         `unit` is the mean error of unit weight in the standardized residuals of the core.
         """
@@ -77,7 +77,7 @@ class Solved:
 
 @dataclass(frozen=True)
 class Stage:
-    """One of the solutions of a run."""
+    """Solution of a run."""
 
     solution: str  # `minimum`, `maximum` or `refraction`
     counts: Counts
@@ -105,7 +105,7 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class PreRun:
-    """Images without a part in the minimum solution (option 7)."""
+    """Images not used in the minimum solution (option 7)."""
 
     points: tuple[str, ...]
     stars: tuple[str, ...]

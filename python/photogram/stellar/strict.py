@@ -1,4 +1,4 @@
-"""The strict iteration: exact partials, on the engine of all programs."""
+"""Strict iteration with exact partials, on the common engine of all programs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from photogram.stellar.state import Level, Solved
 
 _EXPECTED = 1e-6  # Initial mean error of a direction, radians
 _ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9
-"""Largest changes in standard deviations: of a first solution, of one that has converged, of the best."""
+"""Largest changes in standard deviations for rough, converged and best solutions."""
 _MAX_ITERATIONS, _MORE = 100, 5
 _FIRST, _NEXT = 25, 8  # Iterations before the sum of squares is tested, and between tests
 _STILL = 1e-6
-"""Negligible change of the sum of squares, in units of the squared mean error of unit weight: its root is the
-distance of unknowns from the smallest sum, in mean errors."""
+"""Negligible change of the sum of squares, in squared mean errors of unit weight.
+
+Its root is the distance of the unknowns from the minimum, in mean errors.
+"""
 _STOPS = {
     "converged": "NO UNKNOWN CHANGES BY MORE THAN 1E-4 OF ITS MEAN ERROR",
     "still": "THE SUM OF SQUARES STANDS STILL: NO CHANGE BY 1E-6 OF THE SQUARED MEAN ERROR",
@@ -41,14 +43,14 @@ def iterate(
 ) -> Solved:
     """Iterate to the least-squares solution.
 
-    Parameters without an effect at the initial values (the centre of a distortion that is zero) are estimated
-    once the others have given them one. Weights are known except for a factor, so a first solution estimates
-    the mean error of unit weight. A second one continues until its corrections are rounding errors, a
-    billionth of the standard deviations on an ordinary plate, and a few iterations more for the cofactors. If
-    some combination of parameters hardly has an effect (the centre of a small distortion), corrections
-    decrease slowly or not at all: the iteration stops, too, when the sum of squares does not change.
+    Parameters without an effect at the initial values (the centre of zero distortion) are estimated after the
+    others. Weights are known up to a factor, so a first solution estimates the mean error of unit weight. A
+    second one continues until its corrections are rounding errors: a billionth of the standard deviations on
+    an ordinary plate. A few more iterations serve the cofactors. If a combination of parameters hardly has an
+    effect (the centre of small distortion), corrections decrease slowly or not at all. Therefore, iteration
+    also stops if the sum of squares is constant.
 
-    Raises AdjustmentError: stars or parameters are not determined, or the initial values give no image.
+    AdjustmentError: if stars or parameters are not determined, or the initial values give no image.
     """
     parameters, places = initial.copy(), problem.places_at(initial, free)
     dof = degrees_of_freedom(problem, free).usable
@@ -81,7 +83,7 @@ def iterate(
 
 
 def _rounding(problem: Problem, parameters: Floats) -> float:
-    """Return the root of the weighted sum of squares of rounding errors of all observations."""
+    """Return the root of the weighted sum of squares of observation rounding errors."""
     plate = parameters[12] ** 2 * np.einsum("mii->", problem.image_weights)
     tested = problem.known & ~problem.held
     stars = np.einsum("sii,si->", problem.star_weights[tested], problem.star_places[tested] ** 2)
@@ -91,8 +93,6 @@ def _rounding(problem: Problem, parameters: Floats) -> float:
 
 @dataclass
 class _Run:
-    """A problem and the history of its iteration."""
-
     problem: Problem
     limit: int
     dof: int
@@ -104,7 +104,7 @@ class _Run:
     def settle(
         self, parameters: Floats, places: Floats, free: Bools, unit: float, fraction: float
     ) -> dict[str, Any]:
-        """Adjust until corrections are small, the sum of squares does not change, or the limit is reached."""
+        """Adjust to small corrections, a constant sum of squares, or the iteration limit."""
         found = self.adjust(parameters, places, free, unit, fraction, most=_FIRST)
         while found["status"] != "converged":
             if self._still():
@@ -115,7 +115,6 @@ class _Run:
         return found
 
     def _still(self) -> bool:
-        """Return whether the last sums of squares are equal except for rounding."""
         last = np.array(self.levels[-_NEXT:])
         if len(last) < _NEXT or not last[-1] > 0:
             return False
@@ -155,7 +154,7 @@ class _Run:
             )
         except _photocore.StellarError as error:
             raise failure(self.problem, error) from None
-        # A sum of squares of the engine is in units of the expected mean error.
+        # Sums of squares of the engine are in units of the expected mean error.
         sums = [found["initial_sum_of_squares"], *(row[1] for row in found["iterations"])]
         levels = [math.sqrt(value / self.dof) * unit for value in sums]
         self.levels += levels[1:] if self.levels else levels

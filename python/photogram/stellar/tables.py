@@ -1,4 +1,4 @@
-"""Tables of a calibrated plate (NOAA TR NOS 55, section E; section 9 of its specification)."""
+"""Tables of a calibrated plate (NOAA TR NOS 55, section E)."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _NONE = np.zeros(0)
 
 
 def parameters(result: Result) -> list[Table]:
-    """Return the parameters, given and adjusted, and their changes with weights (section 5.9a)."""
+    """Return prior and adjusted parameters with weighted changes (section 5.9a)."""
     problem, count = result.problem, len(NAMES) if result.problem.options.refraction else 22
     names, free = NAMES[:count], result.solved.free[:count]
     weights = np.diag(problem.parameter_weights)[:count]
@@ -83,7 +83,7 @@ def parameters(result: Result) -> list[Table]:
 
 
 def stages(result: Result) -> list[Table]:
-    """Return the solutions of the run, and the levels of discrepancies of all iterations."""
+    """Return the solutions of the run, and the discrepancy levels of all iterations."""
     counts = {field.name: f"counts.{field.name}" for field in fields(Counts)}
     attributes = {
         "solution": "solution",
@@ -112,7 +112,7 @@ def stages(result: Result) -> list[Table]:
 
 
 def transformed_attitudes(result: Result) -> dict[str, Floats]:
-    """Return attitudes in the system of the reference station and the mean pole; none without a station."""
+    """Return attitudes at the reference station and mean pole, if one is given."""
     options, site = result.problem.options, result.problem.site
     if options.reference is None:
         return {}
@@ -134,15 +134,15 @@ def transformed(result: Result) -> Table:
 
 
 def solved_groups(result: Result) -> dict[str, int]:
-    """Return the orientations whose attitude was estimated, by name."""
+    """Return the orientations with an estimated attitude, by name."""
     free = result.solved.free[:9].reshape(3, 3)
     return {name: g for g, name in enumerate(GROUPS) if free[g].any()}
 
 
 def stars(result: Result) -> Table:
-    """Return the stars: residuals of known ones, corrections and ellipses of unknown directions.
+    """Return the stars: residuals of known ones, and estimated unknown directions.
 
-    People see the known ones; `directions` has the others.
+    Only known stars are printed; `directions` has the others.
     """
     problem, known = result.problem, result.problem.known
     residuals = np.where(known[:, None], result.star_residuals / ARCSEC, np.nan)
@@ -205,7 +205,7 @@ def _ellipses(ellipses: Sequence[Ellipse], of: str) -> list[Quantity]:
 
 
 def directions(result: Result) -> Table:
-    """Return unknown directions; ellipses from the orientation alone, in total, and in total with m_i."""
+    """Return unknown directions with orientation and total ellipses."""
     found = result.directions()
     columns = [
         names_column((d.star for d in found), "Star"),
@@ -234,7 +234,7 @@ def _places(places: Sequence[tuple[float, float]]) -> list[Quantity]:
 
 
 def fictitious(result: Result) -> Table:
-    """Return directions of plate points under every attitude, with ellipses from the orientation."""
+    """Return directions of plate points for every attitude, with orientation ellipses."""
     points = fictitious_points(result) if result.movement else ()
     deviations = [np.sqrt(np.diag(p.covariance)) * [math.cos(p.place[1]), 1.0] for p in points]
     columns = [
@@ -252,7 +252,7 @@ def fictitious(result: Result) -> Table:
 
 
 def images(result: Result) -> Table:
-    """Return plate coordinates with residuals, redundancy numbers r and standardized residuals w."""
+    """Return plate coordinates with residuals v, redundancy r and tests w."""
     problem, solved = result.problem, result.solved
     columns = [
         *_images_of(result),
@@ -298,13 +298,12 @@ def worst(result: Result, most: int) -> Table:
 
 
 def _before(result: Result, weights: Floats) -> Floats:
-    """Return the (n, 2) mean errors before the adjustment."""
     with np.errstate(divide="ignore"):
         return np.asarray(result.mean_error / np.sqrt(np.diagonal(weights, axis1=1, axis2=2)), float)
 
 
 def means(result: Result) -> Table:
-    """Return means of stars with two images at least, and radial and tangential parts of their residuals."""
+    """Return means of stars with several images, and radial and tangential residuals."""
     rows = list(star_means(result))
     columns = [
         names_column((star for star, *_ in rows), "Star", "star"),
@@ -317,7 +316,7 @@ def means(result: Result) -> Table:
 
 
 def pre_run(result: Result) -> Table:
-    """Return residuals of the images without a part in the minimum solution."""
+    """Return residuals of the images not used in the minimum solution."""
     found = result.pre_run
     columns = [
         names_column(found.stars if found else (), "Star"),
@@ -345,7 +344,7 @@ def movement(result: Result) -> Table:
 
 
 def distortion(result: Result) -> Table:
-    """Return distortion and its mean errors over the distance from its centre."""
+    """Return distortion and its mean errors against the distance from its centre."""
     curves = distortion_curves(result) if result.problem.options.curves else None
     columns = [column(getattr(curves, "distance", _NONE), MM, "Distance", 1)]
     for name in ("radial", "transformed", "decentering"):
@@ -361,7 +360,7 @@ def distortion(result: Result) -> Table:
 
 
 def refraction(result: Result) -> Table:
-    """Return refraction around the axes with the given and the corrected coefficients."""
+    """Return refraction around the axes for given and corrected coefficients."""
     groups = solved_groups(result) if result.problem.options.refraction else {}
     curves = [refraction_curves(result, group) for group in groups.values()]
     names = np.repeat([*groups], [len(curve.zenith_distance) for curve in curves])
@@ -378,7 +377,7 @@ def refraction(result: Result) -> Table:
 
 
 def histograms(result: Result) -> list[Table]:
-    """Return classes of the residuals of known stars, with the numbers of the normal curve."""
+    """Return classes of the residuals of known stars, with normal frequencies."""
     tables = []
     for name, values in residual_classes(result).items():
         found = histogram(1e6 * values)

@@ -1,4 +1,4 @@
-"""Parts of TOML files of calibrations by stars: station, effects on places, pole, names of other files."""
+"""Parts of TOML files of stellar calibrations: station, effects, pole, names of other files."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _STATION = {
 def named_files(
     path: Path, tables: Mapping[str, Sequence[str] | None], keys: Sequence[tuple[str, str]]
 ) -> list[Path]:
-    """Return a file and the files that keys of its tables name: results must not replace them."""
+    """Return a file and the files named in its tables, which results must not replace."""
     document = read_document(path, tables)
     named = [(document.optional(table), key) for table, key in keys]
     return [path, *(table.path(key) for table, key in named if key in table)]
 
 
 def effects(table: Table) -> Effects:
-    """Return the effects on apparent places: all that the table does not switch off."""
+    """Return the effects on apparent positions, except for disabled ones."""
     return Effects(**{one.name: table.switch(one.name, True) for one in fields(Effects)})
 
 

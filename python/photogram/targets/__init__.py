@@ -1,4 +1,4 @@
-"""Calibration with targets: boards, their corners in pictures, and what these say of cameras and rigs."""
+"""Target calibration of cameras and rigs from board corners in images."""
 
 from photogram.arguments.on_demand import attach_checked
 

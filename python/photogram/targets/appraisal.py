@@ -1,6 +1,6 @@
-"""What a calibration is worth, found: maps, cross-validation, views to take next.
+"""Assessment of a calibration: uncertainty maps, cross-validation, suggested views.
 
-Cross-validation adjusts parts of the views by themselves, and compares them.
+Cross-validation adjusts subsets of the views separately and compares them.
 """
 
 from __future__ import annotations
@@ -38,26 +38,28 @@ def cross_validate(
     *,
     progress: Callable[[str], None] | None = None,
 ) -> CrossValidation:
-    """Adjust parts of the views by themselves, and test whether they agree (docs/targets.md).
+    """Adjust subsets of the views separately and test their differences.
+
+    See docs/targets.md.
 
     Parameters
     ----------
     result
         The adjusted calibration.
     into
-        `odd`: views of even against those of odd numbers. `halves`: the first against the last. A number K:
-        each K-th part against the rest.
+        `odd`: even against odd views. `halves`: the first half against the second. A number K: each K-th
+        subset against the rest.
     camera
-        Of cameras that are not tied to each other, the one whose views are split; of a rig any.
+        Camera whose views are split if cameras are separate; any camera of a rig.
     progress
-        Is told which part is adjusted.
+        Called with the part that is adjusted.
 
     Raises
     ------
     InputError
-        Fewer than three views in a part; a camera that there is not.
+        If a subset has fewer than three views, or if the camera does not exist.
     RankError
-        The views of a part do not determine all unknowns.
+        If the views of a subset do not determine all unknowns.
     """
     if isinstance(into, int) and into < 2:
         raise argument_error("into", "least", low=2, value=into)
@@ -94,11 +96,10 @@ def cross_validate(
 
 
 def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibrated:
-    """Adjust some pictures by themselves, from the values of the whole and with its priors."""
     given, restarted, priors = whole.calibration, whole.restarted(), whole.result.block.cameras
     corners = given.corners.of_pictures(pictures)
     views = np.unique(given.corners.views[pictures])
-    free = []  # unknown parameters are free until the first adjustment ends: then the priors follow
+    free = []  # unknown parameters are free until the first adjustment ends; the priors are added afterwards
     for camera in (whole.cameras[each].camera for each in cameras):
         unknown = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
         free.append(camera.replace(sd=dict.fromkeys(unknown, np.inf), covariance=None))
@@ -128,29 +129,29 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     return Calibrated(calibration=part, result=result)
 
 
-DISTANCE_FIGURES = 2  # significant, of the median distance of boards
+DISTANCE_FIGURES = 2  # significant digits of the median board distance
 
 
 def appraise(
     calibrated: Calibrated, asked: WorthOptions | None = None, progress: Callable[[str], None] | None = None
 ) -> Worth:
-    """Return what a calibration is worth.
+    """Assess the quality of a calibration.
 
     Parameters
     ----------
     calibrated
         The adjusted calibration.
     asked
-        What is asked; None: maps and cross-validation.
+        Requested assessments; None: maps and cross-validation.
     progress
-        Is told what is computed.
+        Called with the current step.
 
     Raises
     ------
     InputError
-        A distance that is not positive.
+        If a distance is not positive.
     OutOfMemoryError, KeyboardInterrupt
-        As of the adjustment.
+        As in the adjustment.
     """
     asked = asked or WorthOptions()
     report = progress or (lambda _: None)
@@ -183,7 +184,7 @@ def appraise(
 
 
 def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossValidation]) -> str:
-    """Return what is known of the model of a camera's lens: by other views, and by a pattern of residuals."""
+    """Return the verdict on a lens model from cross-validation and residual patterns."""
     name = calibrated.cameras[camera].name
     verdicts = [each.verdict for each in cross if name in each.cameras]
     verdicts = verdicts or ["model not tested by cross-validation"]
@@ -194,7 +195,7 @@ def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossVali
 
 
 def median_distance(calibrated: Calibrated, camera: int) -> float:
-    """Return how far the middle of the board was from a camera in the median view, in two figures."""
+    """Return the median distance of board centre and camera, rounded to two digits."""
     housing, own = housing_of(calibrated, camera)
     return float(f"{np.median(housing.board_distances(own)):.{DISTANCE_FIGURES}g}")
 

@@ -1,4 +1,4 @@
-"""Boards: targets in a known order on a plane, or points anywhere on a rigid thing.
+"""Calibration boards: planar targets in a known order, or arbitrary points on a rigid body.
 
 Points of a board are numbered row by row, x fastest, from 0. The origin is point 0; x runs along the columns,
 y along the rows.
@@ -31,48 +31,49 @@ from photogram.show.methods import Brief, Rows
 from photogram.words import phrase
 
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
-Shape = Literal["held", "bend", "points"]  # unknowns: none, deflections of the middle lines, every point
+Shape = Literal["held", "bend", "points"]  # estimated: none, centre-line deflections, every point
 
 MAX_POINTS = 100_000
-MAX_LENGTH = 1e50  # in the unit of the board: fourth powers of lengths remain finite
+MAX_LENGTH = 1e50  # in the unit of the board; fourth powers of lengths remain finite
 MIN_VIEWS_OF_FREE_POINTS = 8  # the default shape is `points` from this number
 PLANE_SDS_PER_SPACING, PLACE_SDS_PER_SPACING = 200.0, 500.0
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Board(Valued, Brief):
-    """A board with its targets.
+    """Calibration board with its targets.
 
     Parameters
     ----------
     kind
-        `chessboard`, `charuco` (corners of a chessboard), `aprilgrid`, `circles`, `asymmetric_circles`, or
-        `points` anywhere.
+        `chessboard`, `charuco` (chessboard corners), `aprilgrid`, `circles`, `asymmetric_circles`, or
+        arbitrary `points`.
     columns, rows
-        Corners along x and y (not squares), or circles; of an AprilGrid tags; of `points` nothing counts.
+        Number of corners along x and y (not squares), circles, or AprilGrid tags; not used for `points`.
     spacing
-        From one corner to the next along x and y, one number for both; in `unit`. Of asymmetric circles from
-        one row to the next. An AprilGrid has `tag_size` and `tag_spacing` in its place.
+        Distance of adjacent corners along x and y (one number for both), in `unit`. For asymmetric circles,
+        distance of adjacent rows. An AprilGrid has `tag_size` and `tag_spacing` instead.
     unit
-        Of all lengths.
+        Unit of all lengths.
     tag_size, tag_spacing
-        Of an AprilGrid: the edge of a tag, and the gap between tags over the edge.
+        For an AprilGrid: tag edge length, and ratio of gap and edge length.
     points, point_names
-        Of `points`: (n, 3) nominal positions, and names; None: numbers from 0.
+        For `points`: (n, 3) nominal positions, and names; None: numbers from 0.
     shape
-        `held`, `bend` (two parabolas: :meth:`bent`), or `points`: each coordinate is an unknown that is
-        observed with its nominal value. None: `points` where there are 8 views or more, else `held`.
+        `held` (fixed), `bend` (two parabolas: :meth:`bent`), or `points` (each coordinate is weighted about
+        its nominal value). None: `points` for 8 or more views, else `held`.
     sd_plane, sd_spacing
-        Standard deviations of z, and of x and y, of each point for `points`. None: 1/200 and 1/500 of the
+        For `points`: standard deviations of z, and of x and y, of each point. None: 1/200 and 1/500 of the
         spacing.
     point_sd
-        (n, 3) in the place of these; None: these.
+        (n, 3) standard deviations instead of `sd_plane` and `sd_spacing`.
 
     Raises
     ------
     InputError
-        Another kind or shape, fewer than 2 columns or rows, more than 100,000 points in them, lengths that
-        are not positive, what does not belong to the kind, a bend of points that lie anywhere.
+        If the kind or shape is unknown, or if a field does not belong to the kind. If there are fewer than 2
+        columns or rows or more than 100,000 points. If lengths are not positive, or if arbitrary points have
+        the shape `bend`.
     """
 
     kind: BoardKind = "chessboard"
@@ -166,7 +167,7 @@ class Board(Valued, Brief):
             self._set("point_names", tuple(point_names))
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what the board is in a few lines."""
+        """Return a short summary of the board."""
         return f"Board: {self.described}", [
             ("points", str(len(self.places))),
             ("shape", self.shape or "points with 8 views or more, else held"),
@@ -174,7 +175,7 @@ class Board(Valued, Brief):
 
     @property
     def described(self) -> str:
-        """What it is in a line: kind, columns and rows, spacing."""
+        """Short description: kind, columns and rows, spacing."""
         if self.kind == "points":
             return f"{len(self.places)} points, {self.unit}"
         size = f"{self.columns} x {self.rows}"
@@ -186,19 +187,22 @@ class Board(Valued, Brief):
 
     @property
     def found_whole(self) -> bool:
-        """Whether a picture must show all of its points for any to be found: they are not numbered."""
+        """Whether detection requires all points because they are not numbered."""
         return self.kind in ("chessboard", "circles", "asymmetric_circles")
 
     @property
     def grid(self) -> tuple[int, int]:
-        """Points along x and y: twice the tags of an AprilGrid; of points anywhere their number, and 1."""
+        """Number of points along x and y.
+
+        An AprilGrid has twice its tags; arbitrary points have their number and 1.
+        """
         if self.kind == "points":
             return len(self.places), 1
         return (2 * self.columns, 2 * self.rows) if self.kind == "aprilgrid" else (self.columns, self.rows)
 
     @property
     def pitch(self) -> tuple[float, float]:
-        """From one column to the next, and from one row to the next; of points anywhere what is typical."""
+        """Distance of adjacent columns and of adjacent rows; typical for `points`."""
         if isinstance(self.spacing, tuple):
             return self.spacing
         places = self.places
@@ -225,21 +229,21 @@ class Board(Valued, Brief):
 
     @property
     def names(self) -> list[str]:
-        """N names of the points: their numbers, unless they have others."""
+        """N names of the points, by default their numbers."""
         return [str(k) for k in range(len(self.places))] if self.point_names is None else [*self.point_names]
 
     def bent(self, x: float, y: float) -> Floats:
-        """Return (n, 3) positions on the board with two parabolas: z = 4 x a (1 - a) + 4 y b (1 - b).
+        """Return (n, 3) positions for two parabolas: z = 4 x a (1 - a) + 4 y b (1 - b).
 
         Parameters
         ----------
         x, y
-            The deflections in the middle along the columns and along the rows; a and b go from 0 to 1 there.
+            Centre deflections along columns and rows. The coordinates a and b run from 0 to 1.
         """
         return np.asarray(self.places + np.einsum("nki,k->ni", self.shifts(), [x, y]))
 
     def shifts(self) -> Floats:
-        """Return (n, 2, 3) how points move with a deflection of one along the columns, and along the rows."""
+        """Return (n, 2, 3) point movements for unit deflections along columns and rows."""
         places = self.places
         a, b = (places[:, :2] / places[:, :2].max(axis=0)).T
         found = np.zeros((len(places), 2, 3))
@@ -247,11 +251,11 @@ class Board(Valued, Brief):
         return found
 
     def shape_of(self, views: int) -> Shape:
-        """Return what of the board is unknown where it is seen in so many views."""
+        """Return the estimated shape of the board for a number of views."""
         return self.shape or ("points" if views >= MIN_VIEWS_OF_FREE_POINTS else "held")
 
     def deviations(self, views: int) -> Floats:
-        """Return (n, 3) standard deviations of the points: those of their shape, 0 where they are held."""
+        """Return (n, 3) standard deviations of the points, 0 for fixed ones."""
         count = len(self.places)
         if self.shape_of(views) != "points":
             return np.zeros((count, 3))
@@ -263,7 +267,7 @@ class Board(Valued, Brief):
         return np.tile([spacing, spacing, plane], (count, 1))
 
     def replace(self, **changes: Any) -> Self:
-        """Return the board with some fields replaced, checked anew."""
+        """Return the board with some fields replaced and validated."""
         if self.kind == "aprilgrid":
             changes = {"spacing": None} | changes
         return replace(self, **changes)

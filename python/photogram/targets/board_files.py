@@ -1,4 +1,4 @@
-"""Descriptions of boards: `board.toml`, and the target files of Kalibr."""
+"""Board descriptions: `board.toml`, and Kalibr target files."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _SD = ("sd_x", "sd_y", "sd_z")
 
 
 def is_board(path: Path) -> bool:
-    """Return whether a file describes a board: by its name, or by the type of a target of Kalibr."""
+    """Return whether a file describes a board, by its name or Kalibr target type."""
     if path.name == BOARD_FILE:
         return True
     return path.suffix.lower() in (".yaml", ".yml") and "target_type" in read_beginning(path)
 
 
 def read_board(path: Path) -> Board:
-    """Read a `board.toml`, or a target of Kalibr."""
+    """Read a `board.toml` or a Kalibr target."""
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
 
 
 def picture_size(path: Path) -> tuple[int, int] | None:
-    """Return width and height of the pictures that a `board.toml` was seen in, where it says them."""
+    """Return width and height of the images given in a `board.toml`, if any."""
     if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
         return None
     value = file.content["picture_size"]
@@ -90,7 +90,7 @@ def _points(file: TomlFile, path: Path) -> dict[str, Any]:
 
 
 def _value(file: TomlFile, key: str, kind: type | UnionType, code: str) -> Any:
-    """Return a value of a kind, and not true or false."""
+    """Return a value of a type, excluding Booleans."""
     value = file.content[key]
     if isinstance(value, bool) or not isinstance(value, kind):
         message = phrase(code, value=value_field(value))
@@ -106,7 +106,6 @@ _KINDS_OF_KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "cir
 
 
 def _of_kalibr(path: Path) -> Board:
-    """Read a target of Kalibr, in metres."""
     content = Tree(read_yaml_text(path), path)
     kind = content["target_type"].text()
     if kind not in _KINDS_OF_KALIBR:

@@ -1,4 +1,4 @@
-"""A calibration as users have it: corners of a board with values to start from, adjusted or simulated."""
+"""Target calibration with initial values, its adjustment and simulation."""
 
 from __future__ import annotations
 
@@ -30,59 +30,59 @@ from photogram.words import phrase
 
 
 class Calibration(Start):
-    """Corners of a board in pictures of K cameras, with values to start from: what is adjusted.
+    """Board corners in images of K cameras with initial values: the adjustment input.
 
     Parameters
     ----------
     board
         The board.
     corners
-        Its corners in P pictures, in V views. Pictures with fewer than 6, or whose corners lie on one line,
-        are left out; `messages` name them.
+        Its corners in P images and V views. Images with fewer than 6 corners, or with collinear ones, are
+        omitted and listed in `messages`.
     cameras
-        K cameras in pixels, counted from 0 at the centre of the first; free parameters start where they are.
+        K cameras in pixels, with origin at the centre of the first. Free parameters have initial values.
     poses
-        (V, 4, 4) of the views: board -> reference of the cameras that took the pictures of the view. Vision
+        (V, 4, 4) of the views: board -> reference of the cameras that took the images of the view. Vision
         axes: x right, y down, z forward.
     sensors
-        (K, 4, 4) reference -> camera k; None: one camera, or none that is tied to another.
+        (K, 4, 4) reference -> camera k; None: one camera, or independent cameras.
     references
-        (K,) the camera that each one's sensor counts from. None: camera 0. Where images are not synchronised,
-        each itself.
+        (K,) the reference camera of each sensor. None: camera 0. For unsynchronised images, each camera is
+        its own reference.
     sd0
-        Standard deviation of a corner of level 0, pixels. None: it is not known; the adjustment estimates it,
-        and nothing tests it.
+        Standard deviation of a corner of level 0, pixels. None: unknown; the adjustment estimates it, and
+        global tests are omitted.
     sync
-        `known`: pictures of one view were taken at one time. `none`: every picture has a pose of its own.
-        `offset`: corners have times, by the clock of each camera; a picture of camera k that is dated t shows
-        the board where it is at t + tau_k by the clock of its reference (docs/targets.md).
+        `known`: images of one view are simultaneous. `none`: every image has its own pose. `offset`: corners
+        have times by the clock of each camera. An image of camera k with time t shows the board pose at t +
+        tau_k by the clock of its reference (docs/targets.md).
     regularise
-        `mrcal`: the weak priors that mrcal 2.2 gives lens terms and centres. None: no priors.
+        `mrcal`: the weak priors of mrcal 2.2 on lens terms and centres. None: no priors.
     bend
-        Deflections in the middle of the board along x and y that `bend` starts from, and with which a board
-        of the shape `held` is held.
+        Initial centre deflections of the board along x and y for the shape `bend`, and fixed ones for the
+        shape `held`.
     messages
-        Remarks of whoever read it.
+        Warnings of the reader.
     assumed
-        Where `sd0` is None: the standard deviation of a corner, pixels, that weighted points of the board are
-        weighed against; the adjustment finds it.
+        If `sd0` is None: standard deviation of a corner, pixels, relative to weighted board points. The
+        adjustment estimates it.
     offsets, sd_offsets
-        (K,) of `offset`: what is given of tau_k, and its standard deviations, seconds; infinite: free.
+        (K,) for `offset`: prior values of tau_k and their standard deviations, seconds; infinite: free.
     motion
-        (V, 4, 6) of `offset`: how photos of the reference move about the time of each view, as coefficients
-        of powers 1 to 4 of time: positions in the axes of the board, rotation vectors about those of the
-        photo. None: through the poses of the views before and after.
+        (V, 4, 6) for `offset`: motion of reference photos at the time of each view, as coefficients of powers
+        1 to 4 of time. Positions are in the board axes, rotation vectors in the photo axes. None:
+        interpolated from the poses of the views before and after.
     sd_sensors, sd_bend
-        (K, 6) and (2,) standard deviations with which `sensors` and `bend` are known, infinite: free. Of
-        sensors those of :class:`photogram.network.Sensor`: its position in the axes of the
-        reference, rotations about its own axes in radians.
+        (K, 6) and (2,) standard deviations of `sensors` and `bend`; infinite: free. The sensor components
+        follow :class:`photogram.network.Sensor`: position in the axes of the reference, rotations about its
+        own axes in radians.
 
     Raises
     ------
     InputError
-        Arrays of other shapes, points that the board does not have, pictures without corners that count,
-        several cameras on a rig without sensors; of `offset`, pictures without times, no view between others
-        within 0.2 s.
+        If arrays have other shapes, if points are missing on the board, or if images lack used corners. If
+        several cameras of a rig lack sensors. For `offset`, if image times are missing, or if all views lack
+        neighbours within 0.2 s.
     """
 
     def adjust(
@@ -98,18 +98,19 @@ class Calibration(Start):
         Parameters
         ----------
         loss, threads, progress
-            As of :func:`photogram.adjust`.
+            As in :func:`photogram.adjust`.
         outliers
-            `mrcal`: corners are taken out, and all is adjusted again, as mrcal does it (docs/targets.md).
+            `mrcal`: remove outlying corners and readjust as in mrcal (docs/targets.md).
 
         Raises
         ------
         RankError
-            The corners do not determine all unknowns: names them. Of offsets: the board hardly moves.
+            If the corners do not determine all unknowns, which the message names. With offsets, if the board
+            hardly moves.
         AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-            As of :func:`photogram.adjust`.
+            As in :func:`photogram.adjust`.
         InputError
-            Priors without the size of pictures.
+            If priors require an unknown image size.
         """
         if outliers is not None:
             one_of("outliers", outliers, ("mrcal",))
@@ -122,7 +123,7 @@ class Calibration(Start):
         start: Start = self
         rounds = 0
         while True:
-            # Knots that no image touches are determined by priors alone.
+            # Only priors determine knots without image observations.
             free = None if _has_knots(start) else adjust(start.block(), **how)
             if free is None:
                 result = adjust(weighted_block(start), **how, tolerance=SPLINE_TOLERANCE)
@@ -149,19 +150,19 @@ class Calibration(Start):
         return judged(Calibrated(calibration=start, result=result, unregularised=before))
 
     def snoop(self, **options: Any) -> Calibrated:
-        """Take gross errors out one after the other, and adjust what is left.
+        """Remove gross errors one by one by data snooping, and adjust the rest.
 
         Parameters
         ----------
         options
-            Those of :func:`photogram.snoop`.
+            Options of :func:`photogram.snoop`.
 
         Raises
         ------
         InputError
-            Priors of cameras, which snooping does not take.
+            If cameras have priors, which data snooping does not support.
         RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-            As of :func:`photogram.snoop`.
+            As in :func:`photogram.snoop`.
         """
         if self.regularise is not None and not _has_knots(self):
             raise InputError(phrase("targets.priors"))
@@ -175,26 +176,26 @@ class Calibration(Start):
 
 
 MAX_ROUNDS = 8
-MIN_CHANGE = 0.01  # of the standard deviation of corners, and of poses in standard deviations
+MIN_CHANGE = 0.01  # relative change of corner sd, and pose change in standard deviations
 SPLINE_TOLERANCE = 1e-6  # convergence limit of splined lenses, in standard deviations
 
 
 def _better(start: Start, result: Result) -> Start | None:
-    """Return a start with another sd of corners or motion of the board; None if neither changes."""
+    """Return a start with updated corner sd or board motion; None if both are stable."""
     better = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
     if start.sd0 is None and start.shape == "points" and result.converged:
         change = deviation_of_corners(result)
         sd = start.assumed * change
-        if abs(change - 1) > MIN_CHANGE and sd > 1e-6:  # corners that fit to the last digit are simulated
+        if abs(change - 1) > MIN_CHANGE and sd > 1e-6:  # else simulated without errors
             better = better.replace(assumed=sd)
     return None if better is start else better
 
 
 def _in_motion(start: Start, result: Result) -> Start:
-    """Return a calibration whose board moves as its adjusted poses say; itself where this changes nothing."""
+    """Return the calibration with motion from adjusted poses, if that changes it."""
     ended = Calibrated(calibration=start, result=result)
     again = ended.restarted().replace(motion=None)
-    # Where the new motion has pictures, with everything else as adjusted.
+    # Image positions with the new motion, everything else as adjusted.
     late = {name: each.values[0] for name, each in ended.offsets.items()}
     there = again.replace(
         sensors=ended.sensors, offsets=[late.get(each.name, 0.0) for each in ended.cameras]
@@ -208,14 +209,14 @@ def _has_knots(start: Start) -> bool:
     return any(each.knot_unknowns for each in start.cameras)
 
 
-NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # shares of the motion: remark, error if an offset is free
+NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # relative motion errors: warning, error for a free offset
 
 
 def checked_clocks(calibrated: Calibrated) -> list[Message]:
-    """Return what is to be said of the motion of a board by which offsets between cameras are known.
+    """Return messages on the accuracy of the motion that determines clock offsets.
 
-    Its speeds follow from poses that have errors: v = v_true + e. An offset comes out too small by the share
-    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation.
+    Speeds follow from poses with errors: v = v_true + e. The offset is too small by the ratio of E(e'e) to
+    v'v, weighted by the poses. Its standard deviation is too small as well.
     """
     messages = []
     start, result = calibrated.calibration, calibrated.result
@@ -237,7 +238,7 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
 
 
 def _shares(calibrated: Calibrated) -> Floats:
-    """Return (2, V): squared speeds that errors of poses make on average, and those that are there."""
+    """Return (2, V): expected squared speeds from pose errors, and observed ones."""
     start, result = calibrated.calibration, calibrated.result
     steps = ("step", [result.block.photo_ids[row] for row in calibrated.photos.tolist()])
     joint = result.covariance([steps]) / result.covariance_scale
@@ -249,14 +250,14 @@ def _shares(calibrated: Calibrated) -> Floats:
     return np.stack([6 * np.nan_to_num(by_errors) * result.covariance_scale, there])
 
 
-REMOVAL_FACTOR, OUTLIER_FACTOR = 5.0, 4.0  # times the rms: start of removal, removed corners
+REMOVAL_FACTOR, OUTLIER_FACTOR = 5.0, 4.0  # multiples of the rms: start of removal, removed corners
 
 
 def marked_as_mrcal(result: Result) -> Bools:
-    """Return (m,) which images mrcal takes out: only to reproduce its results.
+    """Return (m,) the images that mrcal removes, to reproduce its results.
 
-    None, unless a weighted residual is beyond 5 rms of all; then those with one beyond 4. Snooping tests each
-    corner by its own accuracy.
+    If a weighted residual exceeds 5 rms, all above 4 rms are removed. Data snooping tests each corner by its
+    own precision.
     """
     weighted = np.abs(result.residuals / result.image_given_sd)
     rms = np.sqrt(np.nanmean(weighted**2))
@@ -267,21 +268,21 @@ def marked_as_mrcal(result: Result) -> Bools:
 
 
 def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
-    """Return a calibration whose corners are images of its own values, with errors as large as it says.
+    """Simulate corners from the values of a calibration, with random errors.
 
-    The points of a board whose shape is `points` are drawn about their nominal places, once for all views.
+    For the shape `points`, board points are drawn about their nominal positions, once for all views.
 
     Parameters
     ----------
     calibration
-        Its cameras, poses and sensors are taken for true; which corners there are stays as it is.
+        True cameras, poses and sensors. The set of corners is unchanged.
     seed
         The same seed gives the same errors.
 
     Raises
     ------
     InputError
-        Nobody has said how well corners are measured, or one has no image by these values.
+        If the corner standard deviation is unknown, or if a corner is not imaged with these values.
     """
     if calibration.sd0 is None:
         raise argument_error("sd0", "empty")

@@ -1,4 +1,4 @@
-"""Difference of two calibrations as arrays, and whether their uncertainties explain it."""
+"""Difference of two calibrations as arrays, and its test against the uncertainties."""
 
 from __future__ import annotations
 
@@ -23,57 +23,58 @@ TEST_GRID = (12, 8)  # pixels across and down, for cameras of different models
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of two calibrations."""
+    """One of two compared calibrations."""
 
-    name: str  # The camera
+    name: str  # Name of the camera
     camera: Camera
-    # (m, 2) where it has seen the board; none where that is not known
+    # (m, 2) observed board corners; empty if unknown
     corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    covariance: Floats | None = None  # (p, p) of its parameters; None where it is not known
+    covariance: Floats | None = None  # (p, p) of its parameters; None if unknown
     # (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as
     # `covariance`
     rows: Floats | None = None
 
     def covariances(self, points: Floats, finite: bool, rows: Floats | None) -> Floats:
-        """Return (n, 2, 2) of the images of (n, 3) points in its axes, in the datum of (6, p) rows."""
+        """Return covariances (n, 2, 2) of projected points (n, 3), with datum rows (6, p)."""
         assert self.covariance is not None
         assert rows is not None
         return of_functions(self.partials(points, finite, rows), self.covariance)
 
     def partials(self, points: Floats, finite: bool, rows: Floats) -> Floats:
-        """Return (n, 2, p) partials of the images of points, in the datum of (6, p) rows."""
+        """Return (n, 2, p) partials of projected points, with datum rows (6, p)."""
         found = point_partials(self.camera, points, finite)
         return np.asarray(found[:, :, :-6] + found[:, :, -6:] @ rows)
 
     def sees(self, pixels: Floats) -> Bools:
-        """Return (n,) whether pixels lie where it has seen the board, as far as that is known."""
+        """Return (n,) whether pixels are in the observed board region, if known."""
         return ~outside(pixels, hull(self.corners)) if len(self.corners) else np.ones(len(pixels), dtype=bool)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CameraDifference(Brief):
-    """Where two calibrated cameras image the same points.
+    """Difference of the projections of the same points by two calibrated cameras.
 
     Attributes
     ----------
     cameras, size, unit
-        Names of a and b, width and height of the pictures of a, and the unit of lengths.
+        Names of a and b, image width and height of a, and the unit of lengths.
     criterion, fitted
-        How the motion between their axes was found, and the motion.
+        Criterion for the motion between their axes, and the fitted motion.
     columns, rows
-        (w,) and (h,) of the grid over the picture of camera a.
+        (w,) and (h,) grid coordinates in the image of camera a.
     distances
-        D, from the centre of camera a.
+        D distances from the centre of camera a.
     vectors
-        (D, h, w, 2) d: images by b, the motion out, less those by a, pixels.
+        (D, h, w, 2) d: projections by b without the motion minus projections by a, pixels.
     covariances
-        (D, h, w, 2, 2) what they should have, a and b being independent; None where one is not known.
+        (D, h, w, 2, 2) expected covariances for independent a and b; None if one is unknown.
     inside
-        (h, w) whether both, as far as is known, have seen the board there.
+        (h, w) whether both observed the board there, as far as known.
     shared
-        Share of the corners of a that b has, too: above 0 they are not independent.
+        Fraction of the corners of a used by b as well: above 0, a and b are correlated.
     test
-        Of both together, free of the motion; None where one is not known, or they share corners.
+        Joint test of both, independent of the motion; None if a covariance is unknown, or if a and b share
+        corners.
     """
 
     cameras: tuple[str, str]
@@ -99,27 +100,27 @@ class CameraDifference(Brief):
 
     @property
     def translation(self) -> Floats:
-        """(3,) of the motion, in axes of camera b; zero at infinity."""
+        """(3,) translation in axes of camera b; zero at infinity."""
         return self.fitted.motion[:3, 3]
 
     @property
     def lengths(self) -> Floats:
-        """(D, h, w) of the vectors."""
+        """(D, h, w) lengths of the vectors."""
         return np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
 
     @property
     def rms(self) -> float:
-        """Root mean square of the lengths where the board was seen, pixels."""
+        """Root mean square of the lengths in the observed board region, pixels."""
         return float(np.sqrt(np.nanmean(self.lengths[:, self.inside] ** 2)))
 
     @property
     def largest(self) -> float:
-        """Largest length where the board was seen, pixels."""
+        """Largest length in the observed board region, pixels."""
         return float(np.nanmax(self.lengths[:, self.inside]))
 
     @property
     def chi2(self) -> Floats | None:
-        """(D, h, w) d' (Q_a + Q_b)^-1 d / 2: about 1 where the uncertainties explain the difference."""
+        """(D, h, w) d' (Q_a + Q_b)^-1 d / 2: about 1 if explained by the uncertainties."""
         if self.covariances is None:
             return None
         with np.errstate(invalid="ignore"):
@@ -133,12 +134,12 @@ class CameraDifference(Brief):
 
     @property
     def title(self) -> str:
-        """What is compared."""
+        """Title with the compared cameras and distances."""
         at = " and ".join(distance_text(each, self.unit) for each in self.distances)
         return f"{self.cameras[1]} less {self.cameras[0]} {at}, the motion between them out"
 
     def brief(self) -> tuple[str, Rows]:
-        """Return the difference in a few lines."""
+        """Return a short summary of the difference."""
         shift = ", ".join(f"{each:.3g}" for each in self.translation)
         moved = f", {shift} {self.unit}" if self.fitted.finite else ""
         rows = [
@@ -149,13 +150,13 @@ class CameraDifference(Brief):
 
     @property
     def sentences(self) -> list[str]:
-        """The difference in lines of text."""
+        """Difference as lines of text."""
         title, rows = self.brief()
         return [title, *(f"{name}: {said}" if name else said for name, said in rows)]
 
     @property
     def remarks(self) -> list[str]:
-        """What limits the comparison, and what came out of its test."""
+        """Limitations of the comparison, and the result of its test."""
         said = []
         if self.fitted.finite and len(self.distances) == 1:
             said.append("one distance leaves the translation arbitrary: give a near and a far one")
@@ -187,11 +188,11 @@ def compared(
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
 ) -> CameraDifference:
-    """Compare two cameras at some distances over the pictures of a, `size` their width and height.
+    """Compare two cameras at several distances over the image of a.
 
-    `criterion` says what is least when the motion between them is fitted, `radius` which pixels about the
-    middle count in the fit; None: all where both are known, each with its weight, else a sixth of the shorter
-    side. The grid is pixels across and down.
+    `size` is the image width and height of a. `criterion` selects the misfit minimised by the motion between
+    them. `radius` limits the pixels of the fit about the centre. Without it, all weighted pixels are used if
+    both covariances are known, else a sixth of the shorter side. The grid is pixels across and down.
     """
     columns, rows, pixels = image_grid(size, grid)
     known = a.covariance is not None and b.covariance is not None
@@ -223,7 +224,7 @@ def compared(
 
 
 def _weights(a: Side, b: Side, pixels: Floats, distances: tuple[float, ...], criterion: Criterion) -> Floats:
-    """Return what the fit gives each pixel at each distance, by the uncertainties in the datum `corners`."""
+    """Return pixel weights at each distance from covariances in datum `corners`."""
     found = []
     for each in distances:
         finite = bool(np.isfinite(each))
@@ -244,7 +245,7 @@ def _inverted(covariances: Floats) -> Floats:
 
 
 class _Expected:
-    """What a difference should be: both calibrations in the datum of the fit, whose motion is out of both."""
+    """Expected difference in the datum of the fit, with the motion removed from both."""
 
     def __init__(
         self, a: Side, b: Side, fitted: Fitted, pixels: Floats, distances: tuple[float, ...]
@@ -260,7 +261,6 @@ class _Expected:
         ]
 
     def _moved(self, points: Floats, finite: bool) -> Floats:
-        """Return points of axes of a in axes of b."""
         motion = self.fitted.motion
         return transformed(motion, points) if finite else points @ motion[:3, :3].T
 
@@ -275,7 +275,7 @@ class _Expected:
         return np.stack(found)
 
     def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> DifferenceTest:
-        """Test both together: parameters where the model is the same, else the differences over a grid."""
+        """Test parameters jointly for equal models, else differences over a grid."""
         a, b = self.a, self.b
         assert a.covariance is not None
         assert b.covariance is not None
@@ -302,7 +302,7 @@ class _Expected:
 
 
 def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
-    """Test (n, 2) vectors by (n, 2, r) F of their covariance F F', which has no more than r dimensions."""
+    """Test (n, 2) vectors with F (n, 2, r) of the covariance F F' of rank at most r."""
     known = np.isfinite(vectors).all(axis=1) & np.isfinite(effects).all(axis=(1, 2))
     u, s, _ = np.linalg.svd(effects[known].reshape(-1, effects.shape[2]), full_matrices=False)
     defined = s > RANK_TOLERANCE * s[0]
@@ -311,7 +311,6 @@ def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
 
 
 def _root(covariance: Floats | None) -> Floats:
-    """Return S with S S' the covariance."""
     assert covariance is not None
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -1,6 +1,6 @@
-"""An adjusted calibration: cameras, sensors, views and the board, with the cofactors of all of them.
+"""Adjusted calibration: cameras, sensors, views and board, with joint cofactors.
 
-What it is worth goes with it: maps of uncertainty, what cross-validation says of them, what to do next.
+It can contain an assessment: uncertainty maps, cross-validation and suggested views.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, visi
 from photogram.targets.worth import Worth
 
 Part = Literal["cameras", "sensors", "board", "views"]
-# Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
-# that are such steps
+# Names of unknowns, their identifiers in the result, and their partials by steps of the block, or the numbers
+# of unknowns that are such steps
 Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats | int]]
 STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vision axes
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Calibrated(Brief, Judged, Documented):
-    """An adjusted calibration of K cameras in V views of a board of n points.
+    """Adjusted calibration of K cameras in V views of a board of n points.
 
     Attributes
     ----------
     calibration
-        What was adjusted; without outliers that were taken out.
+        Calibration input, without removed outliers.
     result
         The adjusted block: residuals, redundancy numbers, tests, the verdict.
     unregularised
-        The adjustment without priors of cameras, where there are any: what these have moved.
+        Adjustment without camera priors, if any, which shows their effect.
     snooped
-        What was taken out, where gross errors were looked for; `result` is what is left.
+        Result of data snooping, if used; `result` is the adjustment of the rest.
     worth
-        Maps of uncertainty, cross-validation and what else was asked for, which reports show.
+        Assessment with uncertainty maps and cross-validation for reports.
     """
 
     calibration: Start
@@ -61,12 +61,12 @@ class Calibrated(Brief, Judged, Documented):
     worth: Worth | None = None
 
     def brief(self) -> tuple[str, Rows]:
-        """Return how the adjustment ended in a few lines."""
+        """Return a short summary of the adjustment."""
         title, rows = self.result.brief()
         return title, [*self.calibration.brief()[1], *rows]
 
     def document(self) -> Document:
-        """Return the document: judgement, the board, the views, and the block."""
+        """Return the document with verdict, board, views and block."""
         from photogram.targets.page import calibration_page
 
         return calibration_page(self)
@@ -82,7 +82,7 @@ class Calibrated(Brief, Judged, Documented):
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the result can be used, and if not, what is wrong."""
+        """Verdict on the usability of the result, with reasons."""
         return self.result.verdict
 
     @property
@@ -92,7 +92,7 @@ class Calibrated(Brief, Judged, Documented):
 
     @cached_property
     def sensors(self) -> Floats:
-        """(K, 4, 4) adjusted: camera 0 -> camera k; the identity where cameras are not tied."""
+        """(K, 4, 4) adjusted: camera 0 -> camera k; the identity for separate cameras."""
         found = np.tile(np.eye(4), (len(self.cameras), 1, 1))
         for each in self.result.unknowns:
             if each.kind == "sensor":
@@ -105,52 +105,52 @@ class Calibrated(Brief, Judged, Documented):
 
     @cached_property
     def photos(self) -> Indices:
-        """(V,) the photo of the block whose pose is that of each view."""
+        """(V,) the photo of the block with the pose of each view."""
         return self.calibration.frames()[1]
 
     @cached_property
     def poses(self) -> Floats:
-        """(V, 4, 4) adjusted: board -> camera 0, or the camera itself where images are not synchronised."""
+        """(V, 4, 4) adjusted: board -> camera 0, or the camera of unsynchronised images."""
         rows, result = self.photos, self.result
         attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[rows])
         return vision_poses(result.photo_positions[rows], attitudes)
 
     @cached_property
     def picture_poses(self) -> Floats:
-        """(P, 4, 4) adjusted: board -> the camera of each picture, at its time."""
+        """(P, 4, 4) adjusted: board -> the camera of each image, at its time."""
         own, result = slice(len(self.calibration.corners.pictures)), self.result
         attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[own])
         return vision_poses(result.photo_positions[own], attitudes)
 
     @property
     def offsets(self) -> dict[str, AdjustedUnknown]:
-        """The adjusted offsets between cameras, by the names of those that have one, in seconds."""
+        """Adjusted clock offsets between cameras, by camera name, in seconds."""
         clocks = [each for each in self.result.unknowns if each.kind == Clock.KIND]
         return {each.name.removeprefix(CLOCK): each for each in clocks}
 
     @property
     def points(self) -> Floats:
-        """(n, 3) adjusted points of the board; nominal where no picture shows them."""
+        """(n, 3) adjusted points of the board; nominal for points without observations."""
         found, board = self.result.point_positions, self.calibration.board
         given = board.places if self.bend is None else board.bent(*self.bend.position[:2])
         return np.where(np.isnan(found), given, found)
 
     @property
     def bend(self) -> AdjustedUnknown | None:
-        """The deflections of the middle of the board, where these are unknowns."""
+        """Centre deflections of the board, if estimated."""
         return next((each for each in self.result.unknowns if each.kind == Bend.KIND), None)
 
     def sensors_adjusted(self) -> list[int]:
-        """Return the cameras that have a sensor whose pose was adjusted."""
+        """Return the cameras with an adjusted sensor pose."""
         return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
 
     def restarted(self) -> Start:
-        """Return the calibration with what is free where the adjustment has ended; the rest is as given."""
+        """Return the calibration with adjusted free values; other values are as given."""
         own, bend, found = self.calibration, self.bend, self.offsets
         late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
         free = np.isinf(np.asarray(own.sd_sensors)).all(axis=1)[:, np.newaxis, np.newaxis]
         bends = own.bend if bend is None else np.where(np.isinf(own.sd_bend), bend.position[:2], own.bend)
-        # Priors as those of mrcal are added again to what is free; knots begin where they are in any case.
+        # Priors of the mrcal type are added again to free parameters; initial knots do not matter.
         given = [
             each if each.camera.knots is not None else replace(each, given=before)
             for each, before in zip(self.cameras, own.cameras, strict=True)
@@ -169,19 +169,18 @@ class Calibrated(Brief, Judged, Documented):
         Parameters
         ----------
         parts
-            In the order of rows: `cameras` (all parameters, and knots that are unknown; what is held has
-            zeros), `sensors` and `views` (six
-            steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
-            that pictures show, or `bend_x` and `bend_y`).
+            Parts in the order of rows. `cameras`: all parameters and free knots (fixed ones have zeros).
+            `sensors` and `views`: six steps each, R <- Exp(w) R, t <- t + dt in vision axes, ordered dt, w.
+            `board`: x, y, z of the observed points, or `bend_x` and `bend_y`.
 
         Returns
         -------
-        Names of the q unknowns (`left fx`, `right tx`, `17.z`, `view 3 wx`), and (q, q) their cofactors.
+        Names of the q unknowns (`left fx`, `right tx`, `17.z`, `view 3 wx`), and their (q, q) cofactors.
 
         Raises
         ------
         InputError, OutOfMemoryError, KeyboardInterrupt
-            As of :meth:`photogram.Result.covariance`; a part that there is not.
+            As in :meth:`photogram.Result.covariance`, or if a part does not exist.
         """
         names, wanted, steps = self._selected(parts)
         found = self.result.covariance(wanted) / self.result.covariance_scale
@@ -202,12 +201,12 @@ class Calibrated(Brief, Judged, Documented):
         partials
             (m, q) J: a column for each of the q unknowns of :meth:`cofactors`.
         parts
-            As of :meth:`cofactors`.
+            As in :meth:`cofactors`.
 
         Raises
         ------
         InputError, OutOfMemoryError, KeyboardInterrupt
-            As of :meth:`cofactors`.
+            As in :meth:`cofactors`.
         """
         _, wanted, steps = self._selected(parts)
         own, start = partials.copy(), 0

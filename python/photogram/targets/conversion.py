@@ -1,6 +1,6 @@
-"""Conversion of lenses: the camera of another model that shows what a camera shows, and what it misses.
+"""Conversion of lenses: fit of another camera model to the images of a camera.
 
-Over pixels q of the source, with its rays r(q), the new camera f and a motion T of its axes:
+With the rays r(q) of source pixels q, the new camera f and a motion T of its axes minimise
 
     sum |f(T d r(q)) - q|^2 = min
 """
@@ -40,23 +40,23 @@ from photogram.targets.output.rig import Rig
 from photogram.targets.vision import TURNED
 from photogram.words import phrase
 
-MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance, so that no pixel dominates
+MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance to limit the weight of a pixel
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Conversion(Brief, Documented):
-    """A lens of another model in place of a camera.
+    """Camera converted to another lens model.
 
     Attributes
     ----------
     source, camera
-        What was converted, and what it has become: held, or with the covariance that the source gives it.
+        Original and converted camera. The latter is fixed, or has the covariance propagated from the source.
     difference
-        Images by the new camera less pixels of the source, over 60 x 40 pixels, and the motion between their
-        axes; `inside` are those that took part in the fit.
+        Projections by the new camera minus pixels of the source, over 60 x 40 pixels, and the motion between
+        their axes. `inside` marks the pixels of the fit.
     names, covariance
-        (p,) parameters that were fitted, and (p, p) what the covariance of the source makes of them; None
-        where that has none. The misfit of the models is not in it.
+        (p,) fitted parameters, and (p, p) their covariance propagated from the source; None if the source has
+        none. It does not contain the misfit of the models.
     """
 
     source: Camera
@@ -67,32 +67,32 @@ class Conversion(Brief, Documented):
 
     @property
     def rms(self) -> float:
-        """Root mean square of the differences where the lens was fitted, pixels."""
+        """Root mean square of the differences at pixels of the fit."""
         return self.difference.rms
 
     @property
     def largest(self) -> float:
-        """The largest of them, pixels."""
+        """Largest difference, pixels."""
         return self.difference.largest
 
     @property
     def where(self) -> tuple[float, float]:
-        """The pixel that it belongs to: column, row."""
+        """Pixel of the largest difference: column, row."""
         lengths = np.nanmax(np.where(self.difference.inside, self.difference.lengths, -1.0), axis=0)
         row, column = np.unravel_index(np.argmax(lengths), lengths.shape)
         return float(self.difference.columns[column]), float(self.difference.rows[row])
 
     @property
     def unseen(self) -> float:
-        """The share of the picture that the new camera does not show."""
+        """Fraction of the source image that the new camera cannot image."""
         return float(np.mean(~np.isfinite(self.difference.lengths).all(axis=0)))
 
     def within(self, tolerance: float) -> bool:
-        """Return whether no difference is larger than so many pixels."""
+        """Return whether all differences are at most `tolerance` pixels."""
         return self.largest <= tolerance
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what came out in a few lines."""
+        """Return a short summary of the conversion."""
         found = self.difference
         at = " and ".join(distance_text(each, found.unit) for each in found.distances)
         shift = ", ".join(f"{each:.3g}" for each in found.translation)
@@ -111,7 +111,7 @@ class Conversion(Brief, Documented):
         return f"{self.source.title}: {self.source.model} as {self.camera.model}", rows
 
     def document(self) -> Document:
-        """Return the conversion as a document: figures, differences over the picture, the new camera."""
+        """Return the document with results, differences over the image and new camera."""
         title, rows = self.brief()
         found, camera = self.difference, self.camera
         down, across = np.meshgrid(found.rows, found.columns, indexing="ij")
@@ -150,11 +150,11 @@ class Conversion(Brief, Documented):
         )
 
     def to_csv(self) -> bytes:
-        """Return a row for each distance and pixel: column, row, dx, dy; empty where nothing is shown."""
+        """Return one row per distance and pixel: column, row, dx, dy; empty if not imaged."""
         return self.document().table("differences").csv()
 
     def rig(self) -> Rig:
-        """Return the new camera as files of other programs take it."""
+        """Return the new camera for files of other programs."""
         own = self.camera.replace(name=self.source.title)
         return Rig(cameras=(own,), sizes=(self.difference.size,), sensors=np.eye(4)[np.newaxis])
 
@@ -170,34 +170,36 @@ def convert_lens(
     knots: tuple[int, int] = KNOTS,
     covariance: tuple[Sequence[str], ArrayLike] | None = None,
 ) -> Conversion:
-    """Fit a lens of another model to what a camera shows.
+    """Fit another lens model to the projections of a camera.
 
     Parameters
     ----------
     source
-        The camera; pixels count from 0 at the centre of the first.
+        Camera with pixel origin at the centre of the first pixel.
     model
-        A model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`.
+        Model name from `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`.
     size
-        Width and height of its pictures, pixels.
+        Image width and height, pixels.
     radius
-        Pixels farther from the middle of the picture do not count.
+        Largest distance of used pixels from the image centre.
     distances
-        At which both are compared, from the centre of the source. At infinity a rotation of the axes is
-        fitted, at finite distances a translation as well.
+        Distances of comparison from the source centre. At infinity a rotation of the axes is fitted, at
+        finite distances a translation as well.
     intrinsics_only
-        Whether the axes stay. So do those of a splined lens, whose knots do what a rotation does.
+        Whether to fix the axes. They are always fixed for splined lenses, whose knots can represent a
+        rotation.
     knots
-        Along columns and rows, of a splined model.
+        Number of knots along columns and rows, for a splined model.
     covariance
-        Names of parameters and knots of the source, and their (p, p) covariance. None: that which it has as
-        an observation. Images then count by the inverse of their covariance, and the new camera has one.
+        Names of parameters and knots of the source, and their (p, p) covariance. None: the source covariance,
+        if it is weighted. Image points are then weighted by their inverse covariance, and the new camera has
+        a covariance.
 
     Raises
     ------
     InputError
-        A model that there is not or cannot show what the source shows; distances that are not positive, or
-        infinite beside finite ones; a radius that leaves too few pixels.
+        If the model is unknown or cannot image the source rays, or if the radius leaves too few pixels. If
+        distances are not positive, or mix finite and infinite ones.
     """
     size = (whole_number("size", size[0]), whole_number("size", size[1]))
     apart = tuple(number("distance", each) for each in distances)
@@ -223,7 +225,7 @@ def convert_lens(
     images[~shows(start, points)] = np.nan
     shape = (len(apart), len(rows), len(columns))
     passed = None if known is None else _passed_on(source, known, shown, found, free, moving)
-    # Knots and singular covariances cannot be observed: such a camera is fixed
+    # Knots and singular covariances cannot be weighted: such a camera is fixed
     can = passed is not None and start.knots is None and is_covariance(passed)
     return Conversion(
         source=source,
@@ -249,7 +251,7 @@ def convert_lens(
 
 
 def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tuple[list[int], Floats] | None:
-    """Return which parameters and knots of a camera have a covariance, and the matrix."""
+    """Return the source parameters and knots with a covariance, and the matrix."""
     names = source.names + source.knot_names
     if given is not None:
         own, matrix = list(given[0]), np.asarray(given[1], dtype=float)
@@ -266,7 +268,7 @@ def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tup
 
 
 def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> Floats:
-    """Return (m, 2, 2) roots of the weights of the images of points: of the inverse of their covariance."""
+    """Return (m, 2, 2) roots of the inverse covariances of projected points."""
     rows, matrix = known
     partials = source.partials(points * TURNED)[2][..., rows]
     covariances = partials @ matrix @ partials.transpose(0, 2, 1)
@@ -283,10 +285,10 @@ def _passed_on(
     free: Sequence[str],
     moving: slice,
 ) -> Floats:
-    """Return the covariance of fitted parameters: J S J' with J = -(A'A)^-1 A'B of the least squares.
+    """Return the covariance of fitted parameters: J S J' with J = -(A'A)^-1 A'B.
 
-    A are the partials of images by what is fitted, B those by the parameters of the source: at a pixel that
-    stays, its ray moves by dr = -Pi^+ K ds.
+    A contains the partials of image points by fitted parameters, B by source parameters. At a fixed pixel,
+    the ray moves by dr = -Pi^+ K ds.
     """
     rows, matrix = known
     names = found.names

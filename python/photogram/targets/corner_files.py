@@ -1,6 +1,6 @@
-"""Files of corners, boards and models at a path: how they are known, and whether a board was shown there.
+"""Files of corners, boards and camera models: recognition and reading.
 
-Tables of corners are read: CSV under all usual names of its columns, the text of mrcal (`.vnl`), Kalibr's.
+Corner tables are CSV with all usual column names, mrcal text (`.vnl`) and Kalibr tables.
 """
 
 from __future__ import annotations
@@ -42,19 +42,18 @@ MISSING = "-"  # in the text format of mrcal
 
 
 def _spelled(names: Sequence[str]) -> list[str]:
-    """Return the columns by their own names; `corner` beside `tag` is that of a tag."""
+    """Return standard column names; with `tag`, `corner` is the corner of a tag."""
     own = {"corner": "corner"} if {"tag", "tag_id"} & {*names} else {}
     return [own.get(name) or _SYNONYMS.get(name, name) for name in names]
 
 
 def _first_line(path: Path) -> str:
-    """Return the first line that is neither empty nor a comment."""
     lines = (line.strip() for line in read_beginning(path).splitlines())
     return next((line for line in lines if line and line[0] != "#"), "")
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file is a table of corners by its columns."""
+    """Return whether the columns of a file define a corner table."""
     if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
     cells = _first_line(path).replace(";", ",").split(",")
@@ -63,7 +62,7 @@ def is_table(path: Path) -> bool:
 
 
 def is_headless(path: Path) -> bool:
-    """Return whether a file has rows of a time, a corner, x and y, and no header."""
+    """Return whether a file has rows of time, corner, x and y without a header."""
     if path.suffix.lower() not in (".csv", ".txt"):
         return False
     cells = _first_line(path).replace(",", " ").split()
@@ -74,19 +73,19 @@ def is_headless(path: Path) -> bool:
 
 
 def is_vnl(path: Path) -> bool:
-    """Return whether a file is the text of mrcal: a comment that names its columns."""
+    """Return whether a file is mrcal text: a comment with its column names."""
     heads = [line[1:].split() for line in read_beginning(path).splitlines() if line.startswith("#")]
     return any(head[:3] == ["filename", "x", "y"] for head in heads)
 
 
 def read_vnl(path: Path, board: Board | None) -> Measured:
-    """Read the text of mrcal: all corners of an image, row by row; `-` for what is missing."""
+    """Read mrcal text: all corners of an image by row, with `-` for missing values."""
     table = read_columns(path, known=("filename",), spelling=lambda names: names[:4])
     table.require("filename", "x", "y")
     images = table.names("filename")
     counts = np.bincount(images.rows, minlength=len(images.names))
     order = np.argsort(images.rows, kind="stable")
-    within = np.empty(len(order), dtype=np.int64)  # which row of its image each row is
+    within = np.empty(len(order), dtype=np.int64)  # row number within its image
     within[order] = np.arange(len(order)) - (np.cumsum(counts) - counts)[images.rows[order]]
     missing = np.array([cell == MISSING for cell in table.texts("x")], dtype=bool)
     none = np.bincount(images.rows[~missing], minlength=len(counts)) == 0
@@ -108,7 +107,6 @@ def _dashed(cell: str) -> float:
 
 
 def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
-    """Return standard deviations over that of level 0, and which corners count."""
     if "level" in table:
         level = table.numbers("level", np.nan, read=_dashed)
         use = level >= 0
@@ -132,13 +130,13 @@ def _refusal(table: ColumnTable, row: int, column: str, message: Phrase) -> Inpu
 
 
 def read_table(path: Path, board: Board | None) -> Measured:
-    """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y."""
+    """Read a table with columns image or time; point, or i, j, or tag, corner; x, y."""
     table = read_columns(path, known=("image", "time"), numbers=_NUMBERS, spelling=_spelled)
     return _of_table(table, board)
 
 
 def read_headless(path: Path, board: Board | None) -> Measured:
-    """Read rows of a time, a corner, x and y; the camera is what the file is called."""
+    """Read rows of time, corner, x and y; the file name is the camera name."""
     found = _of_table(read_rows(path, HEADLESS, numbers=("time", "x", "y")), board)
     return replace(found, cameras=[path.stem] * len(found.images))
 
@@ -154,7 +152,7 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
     keys = table.texts(own)
     if own == "image":
         table.names(own)
-    # An image may be called alike once for each camera.
+    # Image names may be repeated for different cameras.
     whole = (
         keys if cameras is None else [f"{camera}\0{key}" for camera, key in zip(cameras, keys, strict=True)]
     )
@@ -224,7 +222,7 @@ def _whole(table: ColumnTable, name: str, count: int) -> Indices:
 
 
 def _of_tags(table: ColumnTable, board: Board) -> Indices:
-    """Return points of an AprilGrid: tags from the lower left, their corners anticlockwise from there."""
+    """Return points of an AprilGrid, numbered from the lower left."""
     if board.kind != "aprilgrid":
         raise table.head.error(phrase("targets.tags", board=board.described))
     table.require("corner")
@@ -236,7 +234,7 @@ def _of_tags(table: ColumnTable, board: Board) -> Indices:
 
 
 MODEL = ".cameramodel"
-KEY = "optimization_inputs"  # in camera models of mrcal with corners
+KEY = "optimization_inputs"  # key in mrcal camera models with corners
 PICTURES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
 ENDINGS = frozenset(
     {*(".vnl", ".csv", ".tsv", ".txt", ".yml", ".yaml", ".xml", ".json", ".npz", ".toml"), MODEL}
@@ -246,7 +244,7 @@ MAX_FILES_EXAMINED = 2000
 
 @dataclass(frozen=True)
 class Form:
-    """A format of corners: how its files are known, and read; `clear` where nothing else looks like it."""
+    """Corner file format: recognition and reading; `clear` if unambiguous."""
 
     title: str
     knows: Callable[[Path], bool]
@@ -264,12 +262,12 @@ _FORMS = (
 
 
 def is_picture(path: Path) -> bool:
-    """Return whether a file is a picture, by its name."""
+    """Return whether a file name has an image suffix."""
     return path.suffix.lower() in PICTURES
 
 
 def files_at(path: Path) -> list[Path]:
-    """Return the files at a path: itself, or those of a folder and of the folders in it."""
+    """Return a file, or the files of a folder and its direct subfolders."""
     with reading(path):
         if not path.is_dir():
             path.stat()
@@ -282,7 +280,7 @@ def files_at(path: Path) -> list[Path]:
 
 
 def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Path]]]:
-    """Return models of mrcal, descriptions of boards, and files of corners by their formats."""
+    """Return mrcal models, board descriptions, and corner files by format."""
     models, boards = [], []
     corners: dict[Form, list[Path]] = {}
     for each in files_at(path):
@@ -298,7 +296,7 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
 
 
 def holds_targets(path: Path) -> bool:
-    """Return whether corners of a board lie at a path, beside a board or in a format that only they have."""
+    """Return whether a path contains board corners, or a board and corner files."""
     with reading(path):
         if path.is_dir() and (path / "project.toml").exists():
             return False

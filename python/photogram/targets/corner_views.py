@@ -1,4 +1,4 @@
-"""Corners as files have them, and which camera and which view each image is of."""
+"""Corners of files, and assignment of images to cameras and views."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """The n corners in I images of files of one format."""
+    """Corners (n) in I images of files of one format."""
 
     path: Path  # the file or folder
-    images: Sequence[str]  # I names; a name may occur once for each camera
-    image: Indices  # (n,) the image of each corner, and the number of the board's point
+    images: Sequence[str]  # I names, unique per camera
+    image: Indices  # (n,) the image of each corner, and the number of the board point
     point: Indices
-    xy: Floats  # as of :class:`Corners`, but in the pixels of the file
+    xy: Floats  # as in :class:`Corners`, in the pixel convention of the file
     sd: Floats = field(default_factory=lambda: np.array(1.0))
     use: Bools = field(default_factory=lambda: np.array(True))
     cameras: Sequence[str] | None = None  # I names; None if the file does not contain them
     views: Sequence[str] | None = None
     times: Floats | None = None  # (I,) seconds
-    # Width and height by the name of a camera, of all by ""
+    # Width and height by camera name, or of all cameras by ""
     sizes: Mapping[str, Size] = field(default_factory=dict)
-    picture_sizes: Sequence[Size] = ()  # I widths and heights, if they were read from pictures
+    picture_sizes: Sequence[Size] = ()  # I widths and heights, if read from image files
     board: Board | None = None
     messages: Sequence[Message] = ()
 
@@ -52,19 +52,19 @@ class Measured:
 class Grouping:
     """Cameras and views of images as specified by the user."""
 
-    cameras: Sequence[str] = ()  # a pattern (`left*.jpg`) of names of images for each camera
-    views: ViewBy = "name"  # by which images belong to one view
-    within: float = 0.005  # largest difference of times in one view, seconds
-    apart: bool = False  # whether every image is a view of its own: not synchronised
-    size: Size | None = None  # width and height of all pictures
-    # Which place has the coordinates 0, 0: center or upper-left corner of the first pixel
+    cameras: Sequence[str] = ()  # a pattern (`left*.jpg`) of image names for each camera
+    views: ViewBy = "name"  # criterion for images of one view
+    within: float = 0.005  # largest time difference within a view, seconds
+    apart: bool = False  # whether every image is a separate view: not synchronised
+    size: Size | None = None  # width and height of all images
+    # Location of coordinates 0, 0: center or upper-left corner of the first pixel
     origin: Literal["center", "corner"] = "center"
 
 
 def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
-    """Return corners by cameras and views, and remarks."""
+    """Return corners by cameras and views, and warnings."""
     names, keys, keep, messages = _cameras_and_views(measured, how)
-    # An image without corners is no picture.
+    # Images without corners are not used.
     keep &= np.bincount(measured.image, minlength=len(keep)) > 0
     if not keep.any():
         raise InputError(phrase("targets.no-corners"), file=measured.path)
@@ -109,7 +109,7 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
 def _sizes_of_pictures(
     measured: Measured, names: Sequence[str], rows: list[int], how: Grouping
 ) -> dict[str, Size]:
-    """Return the size of the pictures of each camera, where pictures say it: they are alike."""
+    """Return the common size of the images of each camera, if known."""
     found: dict[str, Size] = {}
     for row in rows if measured.picture_sizes else ():
         width, height = measured.picture_sizes[row]
@@ -124,7 +124,7 @@ def _sizes_of_pictures(
 def _cameras_and_views(
     measured: Measured, how: Grouping
 ) -> tuple[list[str], list[str], Bools, list[Message]]:
-    """Return of each image the name of its camera, what names its view, and whether it is wanted."""
+    """Return camera names, view keys and use of images, and messages."""
     images = measured.images
     keep = np.ones(len(images), dtype=bool)
     if how.cameras:
@@ -146,7 +146,7 @@ def _cameras_and_views(
     names = list(measured.cameras)
     several = len(set(names)) > 1
     keys = list(images)
-    if several:  # the digits of a name, or all of it without digits
+    if several:  # the digits of a name, or the full name without digits
         rests = [image.replace(name, "", 1) for image, name in zip(images, names, strict=True)]
         keys = ["-".join(re.findall(r"\d+", rest)) or rest for rest in rests]
     return names, _views_or(measured, keys), keep, []
@@ -157,7 +157,7 @@ def _views_or(measured: Measured, keys: Sequence[str]) -> list[str]:
 
 
 def _with_groups(pattern: str) -> str:
-    """Return a pattern of names as a regular expression whose groups are what its marks stand for."""
+    """Convert a name pattern to a regular expression with groups for wildcards."""
     parts = re.split(r"(\*|\?|\[[^]]*\])", pattern)
     return "".join(
         f"({translate(part).removeprefix('(?s:').removesuffix(')' + chr(92) + 'Z')})"
@@ -168,7 +168,6 @@ def _with_groups(pattern: str) -> str:
 
 
 def _name_of(pattern: str, number: int) -> str:
-    """Return what a camera is called: what its pattern says beside its marks."""
     bare = re.sub(r"\*|\?|\[[^]]*\]", "", pattern.rpartition(".")[0] or pattern).strip(" ._-/")
     return bare or f"camera {number}"
 

@@ -1,4 +1,4 @@
-"""Corners of boards in pictures: what every reader and detector hands over."""
+"""Board corners in images: common output of readers and detectors."""
 
 from __future__ import annotations
 
@@ -27,42 +27,42 @@ from photogram.show.methods import Brief, Rows, few
 from photogram.words import Phrase, phrase
 
 MIN_CORNERS_PER_VIEW = 6
-_MAX_WIDTH_OF_LINE = 1e-3  # width over length of the corners of a view on one line
+_MAX_WIDTH_OF_LINE = 1e-3  # ratio of width and length of collinear corners of a view
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Corners(Valued, Brief):
-    """Corners of a board in P pictures of K cameras in V views; n corners.
+    """Corners of a board in P images of K cameras and V views; n corners.
 
     Parameters
     ----------
     pictures
-        P names.
+        P image names.
     cameras
-        (P,) which camera took each picture.
+        (P,) camera of each image.
     views
-        (P,) the view of each picture, from 0: pictures of one view show the board in one pose.
+        (P,) view of each image, from 0. Images of one view show the board in one pose.
     times
-        (P,) seconds; None where they are not known.
+        (P,) seconds; None if unknown.
     camera_names
-        K names.
+        K camera names.
     sizes
-        Width and height of the pictures of each camera, pixels; None where they are not known.
+        Image width and height of each camera, pixels; None if unknown.
     picture, point
-        (n,) the picture of each corner, and the number of the board's point.
+        (n,) image of each corner, and number of the board point.
     xy
         (n, 2) pixels from 0 at the centre of the first pixel: x to the right, y down.
     sd
-        (n,) standard deviation of each corner over that of a corner of level 0: 1, 2, 4 ...
+        (n,) standard deviation of each corner relative to level 0: 1, 2, 4 ...
     use
-        (n,) whether a corner counts; others were left out by whoever measured them.
+        (n,) whether a corner is used; the source excluded the others.
 
     Raises
     ------
     InputError
-        Arrays of other shapes, indices out of range, names that repeat, values that are not finite, standard
-        deviations that are not positive, a corner that is twice in a picture, two pictures of one camera in
-        one view.
+        If arrays have other shapes, indices are out of range, names repeat, values are not finite, or
+        standard deviations are not positive. If a corner repeats in an image, or if one view has two images
+        of one camera.
     """
 
     pictures: Sequence[str]
@@ -130,23 +130,23 @@ class Corners(Valued, Brief):
         object.__setattr__(self, name, value)
 
     def title(self, row: int) -> str:
-        """Return what a corner is called."""
+        """Return the name of a corner with its image."""
         return f"corner {self.point[row]} of {self.pictures[self.picture[row]]}"
 
     @property
     def view_count(self) -> int:
-        """V."""
+        """Number of views."""
         return int(self.views.max(initial=-1)) + 1
 
     def view_names(self) -> list[str]:
-        """Return V names: those of the first pictures of the views."""
+        """Return V names: the first image name of each view."""
         found = [""] * self.view_count
         for name, view in zip(reversed(self.pictures), self.views[::-1].tolist(), strict=True):
             found[view] = name
         return found
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what they are in a few lines."""
+        """Return a short summary of the corners."""
         return "Corners", [
             ("pictures", few(list(self.pictures))),
             ("cameras", few(list(self.camera_names))),
@@ -155,11 +155,11 @@ class Corners(Valued, Brief):
         ]
 
     def replace(self, **changes: Any) -> Self:
-        """Return corners with some fields replaced, checked anew."""
+        """Return corners with some fields replaced and validated."""
         return replace(self, **changes)
 
     def of_pictures(self, keep: Bools) -> Corners:
-        """Return the corners of some pictures (P,) alone; views are numbered anew, cameras stay."""
+        """Return the corners of some images (P,), with views renumbered."""
         pictures = np.flatnonzero(keep).tolist()
         place = np.full(len(self.pictures), -1)
         place[pictures] = np.arange(len(pictures))
@@ -177,9 +177,9 @@ class Corners(Valued, Brief):
         )
 
     def poor(self, places: Floats) -> dict[str, Phrase]:
-        """Return the pictures that do not determine a camera, and why.
+        """Return images that do not determine a camera, with reasons.
 
-        Too few corners, or all on one line: of the picture, or of the board with the points (b, 3).
+        They have too few corners, or collinear ones in the image or among the board points (b, 3).
         """
         reasons = {}
         for row, name in enumerate(self.pictures):

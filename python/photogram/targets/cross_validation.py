@@ -1,12 +1,12 @@
-"""Cross-validation: whether parts of the views agree as well as their cofactors say.
+"""Cross-validation: agreement of subsets of the views within their cofactors.
 
-Parts a and b are adjusted by themselves from the values of the whole. With the weights P of what both share,
-priors and the nominal points of the board,
+Subsets a and b are adjusted separately from the values of the whole. With the weights P of common
+information, priors and the nominal points of the board,
 
     cov(k_b - k_a) = Q_a + Q_b - Q_a P Q_b - Q_b P Q_a
 
-in all common unknowns. A lens that bends as the model cannot, boards that were not flat, views that were not
-still: all make the parts differ by more, while the residuals of each part look as before.
+for all common unknowns. Unmodelled lens distortion, deformed boards and moving views increase the
+differences, while the residuals of each subset may be unchanged.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
 @dataclass(frozen=True)
 class DifferenceTest:
-    """The test of a difference of two calibrations."""
+    """Test of a difference of two calibrations."""
 
-    name: str  # of the difference
+    name: str  # name of the difference
     chi2: float  # dk' cov(dk)^-1 dk over the variance of unit weight
     dof: int
-    probability: float  # of a difference as large
+    probability: float  # probability of an equal or larger difference
 
     @classmethod
     def of(cls, name: str, chi2: float, dof: int, freedom: float = math.inf) -> Self:
-        """Return the test of a difference; `freedom`: that of the unit weight, infinite where known."""
+        """Return the test; `freedom` is the redundancy of unit weight, infinite if known."""
         known = math.isinf(freedom)
         logarithm = log_chi_square(chi2, dof) if known else log_fisher(chi2 / dof, dof, freedom)
         return cls(name, chi2, dof, float(np.exp(logarithm)))
@@ -63,20 +63,20 @@ RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the c
 
 @dataclass(frozen=True, eq=False)
 class CrossMap:
-    """Where a camera of the two parts images the same points."""
+    """Differences of the projections of a camera between two subsets."""
 
-    differences: Floats  # (n, 2) images by part b less images by part a, pixels, in the datum of the whole
+    differences: Floats  # (n, 2) projections by part b minus part a, pixels, in the datum of the whole
     covariances: Floats  # (n, 2, 2) expected covariances of the differences
 
     @property
     def chi2(self) -> Floats:
-        """(n,) d' cov(d)^-1 d, of two degrees of freedom."""
+        """(n,) d' cov(d)^-1 d with two degrees of freedom."""
         solved = np.linalg.solve(self.covariances, self.differences[:, :, np.newaxis])[:, :, 0]
         return np.asarray((self.differences * solved).sum(axis=1))
 
 
 def splits(views: int, into: str | int) -> list[tuple[list[int], list[int]]]:
-    """Return parts of the views in pairs: `odd`: even, odd numbers; `halves`; K: each part and the rest."""
+    """Return pairs of view subsets for `odd`, `halves` or K subsets."""
     numbers = list(range(views))
     if into == "odd":
         return [(numbers[::2], numbers[1::2])]
@@ -87,7 +87,7 @@ def splits(views: int, into: str | int) -> list[tuple[list[int], list[int]]]:
 
 
 def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
-    """Return (c,) values of b less those of a, and their (c, c) cofactors; of the board none are compared."""
+    """Return (c,) changes from a to b without the board, and their (c, c) cofactors."""
     found = np.zeros(a.common)
     for number, (first, second) in enumerate(zip(a.cameras, b.cameras, strict=True)):
         found[a.parameters(number)] = (values_of(second) - values_of(first))[unknown_of(first)]
@@ -106,7 +106,7 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
 ) -> list[DifferenceTest]:
-    """Test the differences of two parts, of each of K cameras, and of all cameras and sensors together."""
+    """Test the differences of each of K cameras, and of all cameras and sensors."""
     change, cofactors = changes_between(a, b)
     variance, freedom = unit
     groups = {name: a.parameters(number) for number, name in enumerate(names)}
@@ -124,10 +124,10 @@ def parts_agree(
 
 
 def _seen_by_both(change: Floats, cofactors: Floats, whole: Floats) -> tuple[Floats, Floats]:
-    """Return (r,) the combinations of changes that corners determine, and their (r, r) cofactors.
+    """Return (r,) changes that corners determine, and their (r, r) cofactors.
 
-    Combinations of knots that come from the prior that both parts share do not change. `whole` are the
-    cofactors (u,) of changes if each part had a prior of its own.
+    Combinations of knots determined only by common priors do not change. `whole` contains the cofactors (u,)
+    of changes for separate priors.
     """
     scale = 1 / np.sqrt(whole)
     values, vectors = np.linalg.eigh(cofactors * scale[:, np.newaxis] * scale)
@@ -138,7 +138,7 @@ def _seen_by_both(change: Floats, cofactors: Floats, whole: Floats) -> tuple[Flo
 def cross_map(
     whole: Housing, a: Housing, b: Housing, camera: int, pixels: Floats, distance: float
 ) -> CrossMap:
-    """Return where the parts image the same points, by the linear map of the whole in its datum `corners`."""
+    """Return linearised projection differences of subsets in the datum `corners`."""
     rows = datum_rows(whole, camera, "corners")
     partials = common_partials(whole, camera, pixels, distance, rows)
     change, cofactors = changes_between(a, b)
@@ -147,20 +147,20 @@ def cross_map(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CrossValidation(Brief):
-    """Parts of the views, adjusted by themselves, and how they agree.
+    """Separately adjusted subsets of the views, and tests of their agreement.
 
     Attributes
     ----------
     into
-        How the views were split.
+        Type of split.
     cameras
-        Names of the cameras, which are in one housing.
+        Names of the cameras of the housing.
     parts
-        Of each split the views of its two parts.
+        Views of both subsets of each split.
     tests
-        Of each split the tests of the cameras, and of all with their sensors where there are several.
+        For each split the tests of the cameras, and of all with their sensors if there are several.
     whole, housings
-        The housing by all views, and of each split by its two parts.
+        The housing from all views, and from both subsets of each split.
     """
 
     into: str
@@ -172,17 +172,17 @@ class CrossValidation(Brief):
 
     @property
     def explained(self) -> bool:
-        """Whether covariances explain how parts differ: no p below 0.01 over the number of splits."""
+        """Whether covariances explain the differences (all p >= 0.01 / number of splits)."""
         return min(each[-1].probability for each in self.tests) > MIN_PROBABILITY / len(self.tests)
 
     @property
     def factor(self) -> float:
-        """By which the parts differ more than their standard deviations say, in the mean of the splits."""
+        """Mean ratio of the differences to their standard deviations over the splits."""
         return float(np.sqrt(np.mean([each[-1].factor ** 2 for each in self.tests])))
 
     @property
     def verdict(self) -> str:
-        """What it says of every map of uncertainty."""
+        """Verdict of the cross-validation on every uncertainty map."""
         probability = min(each[-1].probability for each in self.tests)
         if self.explained:
             return f"cross-validation explained (p {probability:.2g})"
@@ -192,7 +192,7 @@ class CrossValidation(Brief):
         )
 
     def brief(self) -> tuple[str, Rows]:
-        """Return splits and tests in a few lines."""
+        """Return a short summary of splits and tests."""
         rows = []
         for (a, b), tests in zip(self.parts, self.tests, strict=True):
             said = ", ".join(
@@ -202,15 +202,15 @@ class CrossValidation(Brief):
         return "Cross-validation", [*rows, ("verdict", self.verdict)]
 
     def map(self, camera: int, pixels: Floats, distance: float, split: int = 0) -> CrossMap:
-        """Return where the two parts of a split image the same points.
+        """Return the projection differences between two subsets of a split.
 
         Parameters
         ----------
         camera
-            Number of the camera in the housing.
+            Camera number in the housing.
         pixels, distance
-            (n, 2) where, and how far from the centre of the camera; infinite: directions.
+            (n, 2) pixels, and distance from the camera centre; infinite: directions.
         split
-            Which.
+            Split number.
         """
         return cross_map(self.whole, *self.housings[split], camera, pixels, distance)

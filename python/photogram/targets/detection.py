@@ -1,11 +1,11 @@
-"""Corners from photographs of a board (needs `pip install 'photogram[targets]'`).
+"""Board detection in photographs (requires `pip install 'photogram[targets]'`).
 
-Pixels count from 0 at the centre of the first one, as files hold them: an orientation in the head of a
-picture is not applied, since a camera is calibrated as its sensor is read.
+Pixels count from 0 at the centre of the first one, as stored in files. The orientation in an image header is
+ignored, since a calibration refers to the sensor readout.
 
-Tags, which tell corners apart, are placed by their centres, where their diagonals meet: a homography of these
-says which corner of a tag lies where on the board, whichever way its pattern was printed, and tells false
-tags apart. Corners are saddle points of grey values, each where its neighbours put it.
+Tags identify corners. They are located by their centres, the intersections of their diagonals. A homography
+of the centres assigns tag corners to board points, for all print patterns, and detects false tags. Corners
+are saddle points of grey values near the positions predicted by their neighbours.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from photogram.words import phrase
 Picture = NDArray[np.uint8]
 MAX_REFINEMENT_STEPS, MIN_REFINEMENT_PX = 50, 1e-4
 MIN_HALF_WINDOW_PX, MAX_HALF_WINDOW_PX = 2, 15
-NEIGHBOURS = 14  # corners that predict the place of another
+NEIGHBOURS = 14  # corners that predict the position of another
 MAX_PREDICTION_ERROR_PX = 1.0
 
 
 def refined(cv2: Any, picture: Picture, xy: Floats, half: Floats) -> Floats:
-    """Return the saddle points next to corners (n, 2), in windows of their half sides (n,), pixels."""
+    """Return the saddle points near corners (n, 2), in windows of half sides (n,), px."""
     found = xy.copy()
     end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, MAX_REFINEMENT_STEPS, MIN_REFINEMENT_PX)
     sides = np.clip(half, MIN_HALF_WINDOW_PX, MAX_HALF_WINDOW_PX).astype(int)
@@ -50,18 +50,18 @@ def refined(cv2: Any, picture: Picture, xy: Floats, half: Floats) -> Floats:
 def settled(
     cv2: Any, picture: Picture, points: Indices, xy: Floats, places: Floats, half: float
 ) -> tuple[Indices, Floats]:
-    """Return corners that agree with their neighbours, refined, and the numbers of their points.
+    """Return refined corners consistent with their neighbours, and point numbers.
 
-    Those that do not are looked for again where their neighbours put them, and left out if not there. Seven
-    corners or fewer say nothing of each other, and are left out. Points and xy are (n,) numbers and (n, 2)
-    first places in the picture, `places` (b, 2) points of the board; `half` is that of the window of a
-    corner, over the distance between the nearest points of the board.
+    Inconsistent corners are searched again at their predicted positions and rejected if absent. Seven corners
+    or fewer do not check each other and are rejected. Points and xy are (n,) numbers and (n, 2) initial image
+    positions, `places` (b, 2) board points. `half` is the half window of a corner over the least distance of
+    board points.
     """
     own = places[points]
     apart = np.linalg.norm(own[:, np.newaxis] - own, axis=2)
     np.fill_diagonal(apart, np.inf)
     scales = np.linalg.norm(xy - xy[apart.argmin(axis=1)], axis=1)
-    # The distance of two misplaced corners is not their scale: the median limits windows
+    # The distance of two wrong corners is not their scale: the median limits windows
     sides = half * np.minimum(scales, np.median(scales))
     found = refined(cv2, picture, xy, sides)
     expected = _by_neighbours(cv2, own, found)
@@ -75,7 +75,7 @@ def settled(
 
 
 def _by_neighbours(cv2: Any, places: Floats, xy: Floats) -> Floats:
-    """Return (n, 2) where a homography of the points around each one puts it; NaN where there are too few."""
+    """Return (n, 2) homography predictions from neighbours; NaN if too few."""
     found = np.full_like(xy, np.nan)
     if len(xy) <= NEIGHBOURS // 2:
         return found
@@ -90,33 +90,31 @@ def _by_neighbours(cv2: Any, places: Floats, xy: Floats) -> Floats:
 
 
 FAMILIES = ("4X4", "5X5", "6X6", "7X7")
-DICTIONARY_SIZES = (50, 100, 250, 1000)  # smaller dictionaries are the begin of larger ones
+DICTIONARY_SIZES = (50, 100, 250, 1000)  # smaller dictionaries are the beginning of larger ones
 MIN_TAGS_OF_HOMOGRAPHY = 4
-MAX_TAG_ERROR = 0.5  # distance of a tag from its predicted place, in pitches of the board
-WINDOW_OF_GAP = 0.8  # half window over the distance to the neighbour of a corner, tag or square
+MAX_TAG_ERROR = 0.5  # distance of a tag from its prediction, in board spacings
+WINDOW_OF_GAP = 0.8  # ratio of half window to the distance of corners, tags or squares
 
-Found = tuple[Indices, Floats]  # (n,) numbers of points of the board, and their (n, 2) images
+Found = tuple[Indices, Floats]  # (n,) numbers of board points, and their (n, 2) images
 Placed = tuple[Found, float] | None
 
 
 @dataclass
 class Tags:
-    """How tags of a board are looked for, and what becomes of them."""
+    """Tag detectors for a board, and conversion of tags to corners."""
 
-    # Detectors of families of tags that the board may have, and where on it their centres are, by
-    # number
+    # Detectors of possible tag families, and tag centres on the board by number
     ways: Sequence[tuple[Any, Floats]]
-    # Returns corners from a picture, the way, numbers and corners of tags, the homography of their
-    # centres; with them half the window of a corner over the distance between nearest points of the
-    # board
+    # Returns corners from an image, the detector number, tag numbers and corners, and the homography of their
+    # centres. The second result is half the corner window over the least distance of board points
     corners_of: Callable[..., Placed]
-    places: Floats  # (n, 2) of the points of the board
+    places: Floats  # (n, 2) board points
     cv2: Any  # OpenCV
     chosen: int | None = field(default=None, init=False)
-    """The way of the first picture that showed the board: it has one family of tags."""
+    """Detector of the first image with the board, since it has one tag family."""
 
     def corners(self, picture: Any) -> Found | None:
-        """Return points of the board and where a picture shows them; None where it shows too few tags."""
+        """Return board points and their image positions; None for too few tags."""
         numbers = range(len(self.ways)) if self.chosen is None else [self.chosen]
         placed = [(number, found) for number in numbers if (found := self._placed(picture, number))]
         if not placed:
@@ -129,7 +127,7 @@ class Tags:
         return settled(self.cv2, picture, points, xy, self.places, half)
 
     def _placed(self, picture: Any, number: int) -> tuple[Indices, Floats, Floats] | None:
-        """Return numbers, (n, 4, 2) corners, and the homography to the board of tags that fit together."""
+        """Return numbers, (n, 4, 2) corners, and the board homography of consistent tags."""
         detector, centres = self.ways[number]
         found, ids, _ = detector.detectMarkers(picture)
         if ids is None:
@@ -141,7 +139,7 @@ class Tags:
         if len(ids) < MIN_TAGS_OF_HOMOGRAPHY:
             return None
         pitch = float(np.abs(np.diff(np.unique(centres.round(9)))).min())
-        # Diagonals of tags meet in the images of the centres of squares
+        # Diagonals of tags intersect in the images of the centres of squares
         a, b, c, d = np.concatenate([tags, np.ones((*tags.shape[:2], 1))], axis=2).transpose(1, 0, 2)
         meet = np.cross(np.cross(a, c), np.cross(b, d))
         images = meet[:, :2] / meet[:, 2:]
@@ -153,7 +151,7 @@ class Tags:
 
 
 def charuco_tags(cv2: Any, board: Board) -> Tags:
-    """Return the tags of a ChArUco board: in its white squares, of any family of ArUco, of any size."""
+    """Return tags of a ChArUco board: in white squares, any ArUco family and size."""
     squares = board.columns + 1, board.rows + 1
     i, j = np.tile(np.arange(squares[0]), squares[1]), np.repeat(np.arange(squares[1]), squares[0])
     ways, boards = [], []
@@ -171,7 +169,7 @@ def charuco_tags(cv2: Any, board: Board) -> Tags:
 
     def corners_of(picture: Any, number: int, ids: Indices, tags: Floats, plane: Floats) -> Placed:
         dictionary, legacy = boards[number]
-        # Interpolated between tags, whose edge in squares the picture says.
+        # Interpolated between tags, whose edge in squares follows from the image.
         flat = _mapped(plane, tags)
         edge = float(np.median(np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2)))
         layout = cv2.aruco.CharucoBoard(squares, 1.0, min(edge, 0.99), dictionary)
@@ -188,7 +186,7 @@ def charuco_tags(cv2: Any, board: Board) -> Tags:
 
 
 def grid_tags(cv2: Any, board: Board) -> Tags:
-    """Return the tags of an AprilGrid: of the family 36h11, with a black border of two bits, or of one."""
+    """Return tags of an AprilGrid: family 36h11, border of two bits or one."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
     columns, wide = board.columns, 2 * board.columns
     t = np.arange(board.columns * board.rows)
@@ -203,7 +201,7 @@ def grid_tags(cv2: Any, board: Board) -> Tags:
 
     def corners_of(_picture: Any, _number: int, ids: Indices, tags: Floats, plane: Floats) -> Placed:
         flat, own = _mapped(plane, tags), places[ids]
-        # Seen from the front OpenCV goes round clockwise, and the board does not.
+        # OpenCV runs clockwise as seen from the front, the board counter-clockwise.
         turns = [np.roll(flat[:, ::-1], turn, axis=1) for turn in range(4)]
         turn = int(np.argmin([np.abs(each - own).sum() for each in turns]))
         return (points[ids].ravel(), np.roll(tags[:, ::-1], turn, axis=1).reshape(-1, 2)), WINDOW_OF_GAP / 2
@@ -212,21 +210,20 @@ def grid_tags(cv2: Any, board: Board) -> Tags:
 
 
 def _mapped(plane: Floats, xy: Floats) -> Floats:
-    """Return (..., 2) places behind a homography."""
     found = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1) @ plane.T
     return np.asarray(found[..., :2] / found[..., 2:])
 
 
-WINDOW_OF_SPACING = 0.4  # half window over the least distance between corners
-MAX_FIRST_SIDE_PX = 1600  # longer side of the reduced picture that is searched first
-MIN_CIRCLE_AREAS_PX = (25.0, 8.0)  # largest first, so that film grain is not taken for circles
+WINDOW_OF_SPACING = 0.4  # ratio of half window to the least distance of corners
+MAX_FIRST_SIDE_PX = 1600  # longer side of the reduced image that is searched first
+MIN_CIRCLE_AREAS_PX = (25.0, 8.0)  # largest first, so that film grain is not detected as circles
 MIN_CIRCULARITY, MIN_INERTIA_RATIO = 0.5, 0.05  # of circles tilted by 75 degrees
 
 
 def detected(
     path: Path, files: Sequence[Path], board: Board, progress: Callable[[str], None] | None = None
 ) -> Measured:
-    """Find a board in photographs; where these lie in several folders, each folder is a camera."""
+    """Detect a board in photographs; each of several folders is a camera."""
     try:
         import cv2
     except ModuleNotFoundError:
@@ -262,7 +259,6 @@ def detected(
 
 
 def _picture(cv2: Any, file: Path) -> Picture:
-    """Return the grey values of a picture as its file holds them."""
     content = np.frombuffer(read_bytes(file), dtype=np.uint8)
     how = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
     found = cv2.imdecode(content, how) if len(content) else None
@@ -291,9 +287,9 @@ def _finder(cv2: Any, board: Board, path: Path) -> Callable[[Picture], Found | N
 
 
 def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:
-    """Return all corners: by the detector of squares, which is quick, or else by that of sectors.
+    """Return all corners from the fast square detector, else from the sector detector.
 
-    That of sectors, which blur does not disturb, takes seconds for a large picture: a reduced one goes first.
+    The latter is robust to blur but requires seconds per large image: it first searches a reduced one.
     """
     how = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     there, xy = cv2.findChessboardCorners(picture, board.grid, flags=how)
@@ -309,10 +305,10 @@ def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:
 
 
 def _by_sectors(cv2: Any, board: Board, picture: Picture, times: int) -> Floats | None:
-    """Return all corners in a picture that is made so many times smaller, in pixels of the picture."""
+    """Return all corners of an image reduced `times`, in full-size pixels."""
     high, wide = (side // times for side in picture.shape)
     if times > 1:
-        # Whole squares of pixels become one.
+        # Average whole blocks of pixels.
         picture = cv2.resize(
             picture[: high * times, : wide * times], (wide, high), interpolation=cv2.INTER_AREA
         )
@@ -321,7 +317,7 @@ def _by_sectors(cv2: Any, board: Board, picture: Picture, times: int) -> Floats 
 
 
 def _circles(cv2: Any, board: Board, picture: Picture) -> Floats | None:
-    """Return the centres of all circles, which tilted boards show as ellipses."""
+    """Return the centres of all circles, which are ellipses on tilted boards."""
     skewed = board.kind == "asymmetric_circles"
     how = cv2.CALIB_CB_ASYMMETRIC_GRID if skewed else cv2.CALIB_CB_SYMMETRIC_GRID
     for least in MIN_CIRCLE_AREAS_PX:
@@ -338,7 +334,7 @@ def _circles(cv2: Any, board: Board, picture: Picture) -> Floats | None:
 
 
 def _nearest(grid: Floats) -> Floats:
-    """Return (n,) distances of corners (rows, columns, 2) to the next one along their row or column."""
+    """Return (n,) distances of corners (rows, columns, 2) to the next row or column."""
     found = np.full(grid.shape[:2], np.inf)
     for turned, own in ((grid, found), (grid.swapaxes(0, 1), found.T)):
         apart = np.linalg.norm(np.diff(turned, axis=0), axis=2)

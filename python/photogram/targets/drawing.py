@@ -1,4 +1,4 @@
-"""Plots of the uncertainty of calibrations, and of the differences of two calibrations."""
+"""Plots of calibration uncertainty and calibration differences."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ __all__ = [
     "steps_of_125",
 ]
 
-MAX_DOTS = 4000  # corners
+MAX_DOTS = 4000  # plotted corners
 ARROWS_ALONG_PICTURE = 24
 WIDTH_INCHES = 7.6
 COLOURS_PER_CONTOUR = 4
 
 
 def steps_of_125(low: float, high: float) -> Floats:
-    """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
+    """Return values 1, 2, 5 times powers of ten that enclose two positive numbers."""
     start = round_length(low)
     powers = np.arange(math.floor(math.log10(start)), math.floor(math.log10(high)) + 2)
     steps = np.concatenate([np.array([1.0, 2.0, 5.0]) * 10.0**power for power in powers])
@@ -48,12 +48,12 @@ def steps_of_125(low: float, high: float) -> Floats:
 
 
 def plot_uncertainty(found: UncertaintyMap) -> Plot:
-    """Plot a map of the uncertainty of projection: contours, the corners that were seen and their hull.
+    """Plot a projection-uncertainty map with contours, corners and their hull.
 
     Parameters
     ----------
     found
-        The map.
+        Uncertainty map.
     """
     marks, coverage = _known(found), found.coverage
     if len(found.corners):
@@ -68,12 +68,12 @@ def plot_uncertainty(found: UncertaintyMap) -> Plot:
 
 
 def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
-    """Plot the uncertainty of projection of a pixel against distance, its minimum marked.
+    """Plot projection uncertainty of a pixel against distance, with its minimum.
 
     Parameters
     ----------
     found
-        The curve; where it has a value at infinity this is a line across.
+        Uncertainty curve. A value at infinity is drawn as a horizontal line.
     """
     away = np.isfinite(found.distances)
     order = np.argsort(found.distances[away])
@@ -107,7 +107,9 @@ def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
 
 
 def plot_difference(found: CameraDifference) -> Plot:
-    """Plot the difference of two calibrations: its length as contours, its vectors; a panel each distance.
+    """Plot the difference of two calibrations as contours and vectors.
+
+    There is one panel per distance.
 
     Parameters
     ----------
@@ -128,14 +130,14 @@ def plot_difference(found: CameraDifference) -> Plot:
 
 
 def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
-    """Plot how the first two parts of a cross-validation differ, and that beside its covariance.
+    """Plot the difference of two subsets, also relative to its covariance.
 
     Parameters
     ----------
     cross
         The cross-validation.
     over
-        A map of the camera, whose grid and distance it is drawn at.
+        Uncertainty map that defines camera, grid and distance.
     """
     found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
     shape = over.sd.shape
@@ -148,7 +150,7 @@ def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
 
 @dataclass(frozen=True, eq=False)
 class _Apart:
-    """Differences over a picture: (h, w, 2) vectors, and (h, w) where their lengths set the scale."""
+    """Differences over an image: (h, w, 2) vectors, and (h, w) mask for the scale."""
 
     size: tuple[int, int]
     columns: Floats
@@ -157,7 +159,7 @@ class _Apart:
     inside: Bools
 
     def panel(self, title: str) -> Panel:
-        """Return lengths as contours, and some of the vectors, the longest as long as they are apart."""
+        """Return lengths as contours, with vectors scaled to their spacing."""
         lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
         step = max(1, round(len(self.columns) / ARROWS_ALONG_PICTURE))
         every = (slice(None, None, step), slice(None, None, step))
@@ -171,7 +173,7 @@ class _Apart:
         return replace(panel, title=title)
 
     def beside(self, chi2: Floats) -> Panel:
-        """Return what they are beside their covariances."""
+        """Return the differences relative to their covariances."""
         panel = _map(self.size, self.columns, self.rows, chi2, "", lowest=0.1)
         return replace(panel, title="beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it")
 
@@ -189,7 +191,7 @@ def _map(
     marks: Sequence[Mark] = (),
     lowest: float = 0.01,
 ) -> Panel:
-    """Return filled contours at 1, 2, 5 steps, from a share of the largest value, under other marks."""
+    """Return filled contours at 1, 2, 5 steps below other marks."""
     panel = in_pixels(size)
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
@@ -203,7 +205,7 @@ def _map(
 
 
 def _known(found: UncertaintyMap) -> list[Mark]:
-    """Return where what is known of the lens ends, such as the knots of splines."""
+    """Return the boundary of the known lens region, such as the limit of knots."""
     known = np.isfinite(found.sd)
     if known.all() or not known.any():
         return []
@@ -218,7 +220,7 @@ def _known(found: UncertaintyMap) -> list[Mark]:
 
 
 def in_pixels(size: tuple[int, int]) -> Panel:
-    """Return a panel with the columns and rows of a picture."""
+    """Return a panel with the columns and rows of an image."""
     limits = np.array([[-0.5, size[1] - 0.5], [size[0] - 0.5, -0.5]])
     return Panel(limits, across="column, px", up="row, px", equal=True)
 
@@ -226,11 +228,11 @@ def in_pixels(size: tuple[int, int]) -> Panel:
 __all__ = ["plot_board_residuals", "plot_poorest_views"]
 
 VIEWS_DRAWN = 3
-MAX_VECTOR, OUTLIER_FACTOR = 1.5, 3.0  # spacings of the points; times that of a vector far longer than others
+MAX_VECTOR, OUTLIER_FACTOR = 1.5, 3.0  # in point spacings; multiple of the length limit of other vectors
 
 
 def plot_board_residuals(calibrated: Calibrated) -> Plot:
-    """Plot the mean residual of each point of the board, in axes of the picture: errors of its print.
+    """Plot the mean residual of each board point in image axes: printing errors.
 
     Parameters
     ----------
@@ -253,7 +255,7 @@ def plot_board_residuals(calibrated: Calibrated) -> Plot:
 
 
 def plot_poorest_views(calibrated: Calibrated) -> Plot:
-    """Plot the residuals of the pictures of the three views that fit worst.
+    """Plot the residuals of the images of the three views that fit worst.
 
     Parameters
     ----------
@@ -276,9 +278,8 @@ def plot_poorest_views(calibrated: Calibrated) -> Plot:
 
 
 def _with_vectors(panel: Panel, places: Floats, vectors: Floats, marked: Bools, room: float) -> Panel:
-    """Return a panel with vectors whose longest takes some room, in colour where marked, and their scale."""
     lengths = np.hypot(*vectors.T)
-    # One that is far longer than the others is not to hide them.
+    # A single far longer vector must not hide the others.
     longest = (
         float(max(lengths.max() / OUTLIER_FACTOR, min(lengths.max(), 4 * np.quantile(lengths, 0.9)))) or 1.0
     )

@@ -1,6 +1,6 @@
-"""What the verdict on a calibration rests on: its block, how the board was shown, what other views say.
+"""Findings for the verdict: block, views of the board, cross-validation.
 
-Of the board: which parts of the picture it reached, how far away, how tilted.
+Views of the board are described by covered image parts, distance and tilt.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from photogram.targets import Calibrated
 
 MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
-MIN_DISTANCE_RATIO = 1.3  # farthest over nearest view
+MIN_DISTANCE_RATIO = 1.3  # ratio of farthest and nearest view
 
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """How a board was shown to a camera."""
+    """Views of the board by a camera."""
 
-    camera: str  # Its name, and the unit of distances
+    camera: str  # Camera name, and the unit of distances
     unit: str
-    # How many of the 5 x 4 parts of its picture show anything through the lens, and the names of those
-    # where no corner was; None where nobody knows the size of the picture
+    # Number of the 5 x 4 image parts visible through the lens, and names of those without corners; None if
+    # the image size is unknown
     parts: int
     empty: tuple[str, ...] | None
-    distances: Floats  # (n,) of the middle of the board, in the views of the camera
-    tilts: Floats  # (n,) of the board against the picture, degrees
+    distances: Floats  # (n,) of the board centre, in the views of the camera
+    tilts: Floats  # (n,) of the board relative to the image plane, degrees
 
     @property
     def line(self) -> Phrase:
-        """What was seen of the board."""
+        """Summary of the views of the board."""
         fields: dict[str, Any] = {"camera": self.camera, "n": len(self.distances), "unit": self.unit}
         fields |= {"near": _rounded(self.distances.min()), "far": _rounded(self.distances.max())}
         fields |= {"flat": float(self.tilts.min()), "steep": float(self.tilts.max()), "corners": ""}
@@ -72,15 +72,14 @@ class Showing:
 
 
 def _rounded(value: float) -> str:
-    """Return a length in two figures."""
     return f"{float(f'{value:.2g}'):g}"
 
 
 def showings(calibrated: Calibrated) -> list[Showing]:
-    """Return how the board was shown to each camera that saw it."""
+    """Return the board views of each camera with corners."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
     middle = [*middle_of(calibrated.points), 1.0]
-    # A picture whose corners were all taken out, or left out, shows nothing.
+    # Images whose corners were all removed or excluded are not counted.
     shows = np.bincount(corners.picture[corners.use], minlength=len(corners.pictures)) > 0
     found = []
     for number, camera in enumerate(calibrated.cameras):
@@ -95,7 +94,7 @@ def showings(calibrated: Calibrated) -> list[Showing]:
 
 
 def _parts(calibrated: Calibrated, number: int) -> tuple[int, tuple[str, ...] | None]:
-    """Return how many parts of a picture there are, and which no corner reached."""
+    """Return the number of image parts, and the names of those without corners."""
     corners = calibrated.calibration.corners
     size = corners.sizes[number]
     if size is None:
@@ -113,9 +112,9 @@ FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 
 
 def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | None = None) -> Calibrated:
-    """Return a calibration whose parts all have the verdict on it, also by its maps of uncertainty.
+    """Return a calibration with its verdict in all parts, including uncertainty maps.
 
-    `need` is the largest standard deviation of projection that is accepted, px.
+    `need` is the largest accepted standard deviation of projection, px.
     """
     own = verdict(replace(_findings(calibrated, worth), shortfall=_shortfall(worth, need)))
     result, snooped = copy(calibrated.result), calibrated.snooped
@@ -127,7 +126,6 @@ def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | Non
 
 
 def _shortfall(worth: Worth | None, need: float | None) -> Phrase | None:
-    """Return the map with the largest standard deviation, if that is above what is accepted."""
     if worth is None or need is None or worth.largest <= need:
         return None
     worst = max(worth.maps, key=lambda found: found.largest)
@@ -161,7 +159,7 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
 
 
 def _other_model(calibrated: Calibrated) -> list[Phrase]:
-    """Return what to try where the model is too stiff: lenses with more freedom, and a board with more."""
+    """Return advice on more flexible lens and board models."""
     corners = calibrated.calibration.corners
     free, wide = 0, False
     for number, each in enumerate(calibrated.cameras):
@@ -182,7 +180,7 @@ def _other_model(calibrated: Calibrated) -> list[Phrase]:
 
 
 def _systematic(cross: CrossValidation) -> Systematic:
-    """Return the test that rejects: of the split that agrees least."""
+    """Return the rejected test of the split with the poorest agreement."""
     test = min((each[-1] for each in cross.tests), key=lambda each: each.probability)
     names = ", ".join(cross.cameras)
     return Systematic(

@@ -1,6 +1,6 @@
-"""First values of cameras, poses and rig from corners of boards alone, for any lens.
+"""Initial cameras, poses and rig from board corners only, for any lens.
 
-Where only the data sheet of a camera is known it is a nominal one: what pictures of a board are planned for.
+A nominal camera is based on its data sheet and serves to plan images of a board.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from photogram.targets.vision import composed, inverted
 from photogram.words import Phrase, phrase
 
 WIDE_FAMILY = "fisheye"  # equidistant
-PRIOR_SHIFT_OF_WIDTH = 0.1  # sd of images by each free parameter of a nominal camera, in picture widths
+PRIOR_SHIFT_OF_WIDTH = 0.1  # sd of image points from each free parameter of a nominal camera, in image widths
 RATIONAL_TERM = "k6"  # a term in the denominator
 
 
@@ -39,28 +39,28 @@ def nominal_camera(
     focal: float | None = None,
     knots: tuple[int, int] = KNOTS,
 ) -> Camera:
-    """Return a camera with a field of view or a focal length, and all that a calibration finds free.
+    """Return a nominal camera with free calibration parameters.
 
-    Its principal point is in the middle of the picture. Below 90 degrees of field it is a perspective lens
-    without distortion, beyond an equidistant one, to which the terms of the model are fitted; so is a lens of
-    any field with terms in a denominator, which without distortion do what those in the numerator do.
+    Its principal point is in the image centre. Below 90 degrees of field it is a perspective lens without
+    distortion, above an equidistant lens, to which the model terms are fitted. Lenses with denominator terms
+    are always fitted, since these terms are not separable from the numerator without distortion.
 
     Parameters
     ----------
     size
-        Width and height of its pictures, pixels.
+        Image width and height, pixels.
     model
-        The lens, as of :func:`first_values`; None: the one that is usual at its field of view.
+        Lens model as in :func:`first_values`; None: the usual one for the field of view.
     field, focal
-        Its horizontal field of view, degrees, or its focal length, pixels: one of both.
+        Horizontal field of view, degrees, or focal length, pixels: exactly one.
     knots
-        Along columns and rows, of a splined lens.
+        Number of knots along columns and rows, for a splined lens.
 
     Raises
     ------
     InputError
-        Neither field nor focal length, or both; values that no camera has; a model that there is not, or that
-        shows nothing of such a picture.
+        If neither or both of field and focal length are given, or if they are invalid. If the model is
+        unknown or cannot represent the camera.
     """
     if (field is None) == (focal is None):
         raise InputError(phrase("targets.nominal"))
@@ -87,10 +87,10 @@ def nominal_camera(
 
 
 def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
-    """Return a camera whose free parameters have standard deviations: they move images by a tenth of a width.
+    """Return a camera with weak priors that move image points by a tenth of the width.
 
-    So much a data sheet says; it makes any number of views determine the camera, and next to nothing of what
-    they determine well. Knots have their usual weights.
+    They represent a data sheet. They make any number of views determine the camera, and hardly affect
+    parameters that views determine well. Knots have their usual weights.
     """
     if camera.knots is not None:
         return camera.replace(knot_sd=WEAK_KNOT_SD) if camera.knot_unknowns else camera
@@ -103,25 +103,26 @@ def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
     return camera.replace(sd=sd)
 
 
-MAX_SENSOR_DIFFERENCE = 0.2  # radians, and parts of the distance of the boards
-PREFERENCE_OF_UNTURNED = 1e-3  # misfit in the same units that a board without a turn may have more
+MAX_SENSOR_DIFFERENCE = 0.2  # radians, and relative to the board distance
+PREFERENCE_OF_UNTURNED = 1e-3  # larger misfit in the same units accepted for an unrotated board
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """K cameras, as far as they have views in common."""
+    """K cameras, connected by common views."""
 
     sensors: Floats  # (K, 4, 4) from the reference of a camera to the camera
-    references: Indices  # (K,) the first of the cameras that have views in common
-    turned: Indices  # (P,) the order of `turns` in which a picture lists its corners; 0: as numbered
-    apart: Bools  # (P,) whether a picture disagrees with the pose of its camera on the rig
+    references: Indices  # (K,) first camera of its group with common views
+    turned: Indices  # (P,) the key of `turns` with the corner order of an image; 0: as numbered
+    apart: Bools  # (P,) whether an image disagrees with the pose of its camera on the rig
 
 
 def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns: dict[int, Floats]) -> Rig:
-    """Return the poses of cameras on their rig, each by the one before with which it has most views.
+    """Return poses of cameras on their rig, connected by most common views.
 
-    Poses are (P, 4, 4) board -> camera of each picture, NaN where not known; cameras and views (P,) of each,
-    `count` is K. `turns` are turns of the board that are not seen, by their orders; order 0 is none.
+    Each camera is connected to an earlier one. Poses are (P, 4, 4) board -> camera of each image, NaN if
+    unknown; cameras and views are (P,), `count` is K. `turns` contains undetected board rotations by corner
+    order; order 0 is the identity.
     """
     sensors, references = np.tile(np.eye(4), (count, 1, 1)), np.full(count, -1)
     found, turned = poses.copy(), np.zeros(len(poses), dtype=np.int64)
@@ -150,13 +151,13 @@ def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns
 
 
 def mean_pose(poses: Floats) -> Floats:
-    """Return the (4, 4) chordal mean of the attitudes of poses with the median of their translations."""
+    """Return the mean pose: chordal mean attitude and median translation."""
     rotation = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
     return composed(rotation, np.median(poses[:, :3, 3], axis=0))
 
 
 def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[Floats, Indices, Bools]:
-    """Return the pose of a second camera by a first, turns of its (m) boards, and which boards disagree."""
+    """Return the relative pose of two cameras, (m) board rotations, and outliers."""
     orders = np.array([*turns])
     turned = second[:, np.newaxis] @ np.linalg.inv(np.array([*turns.values()]))
     poses = turned @ np.linalg.inv(first)[:, np.newaxis]
@@ -175,7 +176,7 @@ def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[
 
 
 def _apart(poses: Floats, other: Floats, far: float) -> Floats:
-    """Return how far (..., 4, 4) poses are from another: chords of attitudes, shifts over a length."""
+    """Return distances of (..., 4, 4) poses: attitude chords and relative shifts."""
     turns = np.linalg.norm(poses[..., :3, :3] - other[:3, :3], axis=(-2, -1)) / math.sqrt(2)
     shifts = np.linalg.norm(poses[..., :3, 3] - other[:3, 3], axis=-1) / far
     return np.asarray(turns + shifts)
@@ -186,27 +187,26 @@ MIN_TILT_RAD = math.radians(3.0)  # less tilted boards do not determine a focal 
 
 @dataclass(frozen=True, eq=False)
 class FirstCalibration:
-    """Where the adjustment of a calibration begins: K cameras, V views, P pictures.
+    """Initial values of a calibration: K cameras, V views, P images.
 
     Attributes
     ----------
     cameras
-        K cameras of the wanted model; what an adjustment may change is free.
+        K cameras of the requested model; estimated parameters are free.
     sensors
-        (K, 4, 4) from the reference camera to each camera, axes of vision.
+        (K, 4, 4) from the reference camera to each camera, vision axes.
     references
-        (K,) the reference of each camera: 0, or, of cameras without a view in common with those of 0, the
-        first of the cameras that hang together with them.
+        (K,) the reference of each camera: 0, or the first camera of its group connected by common views.
     poses
-        (V, 4, 4) board -> reference, of the cameras with the lowest reference that see it; NaN where unknown.
+        (V, 4, 4) board -> reference of the first camera group with the view; NaN if unknown.
     picture_poses
-        (P, 4, 4) board -> camera of the picture; NaN where unknown.
+        (P, 4, 4) board -> camera of the image; NaN if unknown.
     corners
-        The corners, numbered anew where they were listed in another order.
+        Corners, renumbered if they were listed in another order.
     without
-        Pictures without a pose, and why.
+        Images without a pose, and reasons.
     remarks
-        What was found on the way: orders of corners, frontal views, cameras by themselves.
+        Messages on corner orders, frontal views and separate cameras.
     """
 
     cameras: list[Camera]
@@ -222,27 +222,26 @@ class FirstCalibration:
 def first_values(
     board: Board, corners: Corners, model: str | None = None, knots: tuple[int, int] = KNOTS
 ) -> FirstCalibration:
-    """Find cameras, rig and poses from corners of a board alone.
+    """Compute initial cameras, rig and poses from board corners only.
 
     Parameters
     ----------
     board
-        The board. Where its points lie in no plane, pictures that show those of a plane alone have no pose.
+        The board. If it is not planar, images that show only coplanar points get no pose.
     corners
         The corners of all cameras.
     model
-        The lens that is wanted: a model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`,
-        `opencv_pinhole` with so many terms. None: `opencv5` below 90 degrees of horizontal field, `opencv8`
-        above, `opencv_fisheye` where corners are seen beside the camera and behind it, or hardly determine
-        that. Knots of `splined_stereographic` are fitted to what None gives.
+        Requested lens: a model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`, i.e.
+        `opencv_pinhole` with this number of terms. None: `opencv5` below 90 degrees of horizontal field,
+        `opencv8` above. `opencv_fisheye` is used if corners are at the side of or behind the camera, or
+        hardly determine `opencv8`. Knots of `splined_stereographic` are fitted to the default model.
     knots
-        Along columns and rows, of a splined lens.
+        Number of knots along columns and rows, for a splined lens.
 
     Raises
     ------
     InputError
-        Points that the board does not have, a camera without a picture that could be used, a model that
-        cannot be.
+        If points are missing on the board, if a camera lacks usable images, or if the model is invalid.
     """
     seen = Sightings.of_corners(board, corners)
     in_a_plane, hidden_corners = phrase("targets.plane"), phrase("targets.hidden", least=MIN_CORNERS_PER_VIEW)
@@ -316,7 +315,6 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
 
 
 def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:
-    """Return (V, 4, 4) poses board -> reference camera, of all pictures of a view the middle."""
     found = np.full((corners.view_count, 4, 4), np.nan)
     known = np.isfinite(made).all(axis=(1, 2))
     to_reference = np.linalg.inv(rig.sensors[corners.cameras]) @ made

@@ -1,6 +1,6 @@
-"""The first values of one camera: a family of lenses that fits, adjusted, and the wanted model from it.
+"""Initial values of one camera: best lens family, adjusted and converted.
 
-Families and fields of view are tried without any start value.
+Families and fields of view are tested without initial values.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ ROUGH_TOLERANCE = 1e-3  # convergence limit of initial values, in standard devia
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """A camera with the poses of its views, adjusted."""
+    """Adjusted camera with the poses of its views."""
 
-    camera: Camera  # The camera; what was free of it is
+    camera: Camera  # The camera with its estimated parameters free
     poses: Floats  # (P, 4, 4) board -> camera
     variance: float  # The variance of unit weight, px^2
-    is_whole: bool  # Whether all that was free was adjusted, converged, and is more than hardly determined
+    is_whole: bool  # Whether all free parameters were adjusted, converged, and are well determined
 
 
 def adjusted_views(
     camera: Camera, seen: Sightings, poses: Floats, tolerance: float = ROUGH_TOLERANCE
 ) -> Adjusted | None:
-    """Adjust a camera and the poses of views; with less of it free where they do not determine all.
+    """Adjust a camera and view poses, with fewer free parameters if underdetermined.
 
-    What is unknown of the camera is free; nothing is where the poses alone are adjusted. Corners are in the
-    order of their numbers, poses (P, 4, 4) board -> camera to begin with; `tolerance` is that of
-    :func:`photogram.adjust`. None where the adjustment fails, whatever is held.
+    Unknown camera parameters are free; without any, only the poses are adjusted. Corners are in point order,
+    poses (P, 4, 4) board -> camera are initial values. `tolerance` is defined in :func:`photogram.adjust`.
+    None if all adjustments fail.
     """
     view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
     positions, attitudes = photo_poses(poses)
@@ -68,7 +68,7 @@ def adjusted_views(
         cameras=[camera],
         photo_cameras=0,
     )
-    # All free parameters, then without the terms of the lens, then without the principal point
+    # All free parameters, then without the lens terms, then without the principal point
     names = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
     attempts: list[list[str]] = []
     for kept in ({*names}, {"f", "fx", "fy", "cx", "cy"}, {"f", "fx", "fy"}):
@@ -93,14 +93,14 @@ def adjusted_views(
     return None
 
 
-FIELDS_DEG = np.linspace(60.0, 200.0, 15)  # horizontal fields that are tried first
+FIELDS_DEG = np.linspace(60.0, 200.0, 15)  # horizontal fields tested first
 MAX_TRIAL_PICTURES = 24
 FIELD_TOLERANCE_DEG = 0.5
 RIVAL_MISFIT_RATIO = 1.5  # all families with misfits below this ratio are adjusted
-MAX_VIEW_MISFIT = 5.0  # misfit of a view over the median
-DEFAULT_FOCAL_LENGTH = 1.2  # in picture widths
+MAX_VIEW_MISFIT = 5.0  # ratio of view misfit and median
+DEFAULT_FOCAL_LENGTH = 1.2  # in image widths
 
-# Wide families: focal length in picture widths, by the horizontal field in radians
+# Wide families: focal length in image widths, by the horizontal field in radians
 FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
     {"fisheye": lambda field: 1 / field, "stereographic": lambda field: 1 / (4 * math.tan(field / 4))}
 )
@@ -108,30 +108,30 @@ FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A lens that was tried."""
+    """Tested lens."""
 
-    camera: Camera  # Its focal length and principal point, free
-    orders: Indices  # (P,) in which order the corners of each picture fit best
-    misfits: Floats  # (P,) median angles (rad) between rays and the board in each
+    camera: Camera  # Its free focal length and principal point
+    orders: Indices  # (P,) the best corner order of each image
+    misfits: Floats  # (P,) median angles (rad) between rays and board of each image
 
     @property
     def angle(self) -> float:
-        """Median over the pictures, radians."""
+        """Median over the images, radians."""
         return float(np.median(self.misfits))
 
     @property
     def pixels(self) -> float:
-        """The same near the axis, pixels: what families are compared by."""
+        """Median near the axis, pixels, for the comparison of families."""
         return self.angle * self.camera.scale
 
 
 def rays_of(camera: Camera, xy: Floats) -> Floats:
-    """Return (P, n, 3) rays, axes of vision, of (P, n, 2) pixels; NaN where there are none."""
+    """Return (P, n, 3) rays, vision axes, of (P, n, 2) pixels; NaN if undefined."""
     return np.asarray((camera.rays(xy.reshape(-1, 2)) * [1.0, -1.0, -1.0]).reshape(*xy.shape[:2], 3))
 
 
 def misfits(seen: Sightings, rays: Floats) -> Floats:
-    """Return (P,) the median angle (rad) between the rays of each picture and those of the board."""
+    """Return (P,) median angles (rad) between the rays of images and board."""
     found = ray_homographies(seen.coordinates, rays)
     angles = angles_apart(seen.coordinates, rays, found)
     angles[np.isnan(angles).all(axis=1)] = np.inf
@@ -139,7 +139,6 @@ def misfits(seen: Sightings, rays: Floats) -> Floats:
 
 
 def _tried(seen: Sightings, camera: Camera) -> Trial:
-    """Return how a lens fits, each picture in the order that fits best; one without rays does not."""
     own = []
     for order in seen.listings.shapes:
         listed = seen.listed(np.full(len(seen.xy), order))
@@ -157,7 +156,7 @@ def _camera(family: str, fx: float, fy: float, size: tuple[int, int]) -> Camera:
 
 
 def perspective(seen: Sightings, size: tuple[int, int]) -> Trial:
-    """Return the perspective lens of the homographies of pixels; of 1.2 widths where these say nothing."""
+    """Return the perspective lens from homographies, with a default focal length."""
     first = _tried(seen, _camera("pinhole", size[0], size[0], size))
     found = homographies(seen.coordinates, seen.listed(first.orders).xy)
     fx, fy, f = focal_lengths(found, (np.array(size) - 1) / 2)
@@ -167,7 +166,7 @@ def perspective(seen: Sightings, size: tuple[int, int]) -> Trial:
 
 
 def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
-    """Return the lens of a wide family that fits best: fields of 60 to 200 degrees, then halved."""
+    """Return the best lens of a wide family: fields of 60 to 200 degrees, then halved."""
 
     def tried(field: float) -> Trial:
         f = FAMILIES[family](math.radians(field)) * size[0]
@@ -183,7 +182,7 @@ def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
 
 
 def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
-    """Return the families that fit, the best first: those within a factor of it."""
+    """Return the families with small misfits, best first."""
     some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_TRIAL_PICTURES)))
     few = [perspective(some, size), *(wide(some, size, family) for family in FAMILIES)]
     found = [_tried(seen, trial.camera) for trial in few]
@@ -192,7 +191,7 @@ def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
 
 
 def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjusted | None]:
-    """Return the family whose adjustment ends lowest, by the views that fit; the best, if none can be."""
+    """Return the family with the smallest adjusted variance; else the first."""
     ended = []
     for trial in found:
         fit = trial.misfits <= MAX_VIEW_MISFIT * trial.angle
@@ -206,16 +205,16 @@ def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjuste
     return min(ended, key=lambda each: each[1].variance)
 
 
-MAX_PICTURES = 62  # of an adjustment of first values
-NARROW, WIDEST = math.radians(90.0), math.radians(88.0)  # field of `opencv5`, from the axis: `opencv8`
+MAX_PICTURES = 62  # in an adjustment of initial values
+NARROW, WIDEST = math.radians(90.0), math.radians(88.0)  # field of `opencv5`, axis angle of `opencv8`
 TOLERANCE = 1e-5  # convergence limit of the adjustment, in standard deviations
-MAX_VARIANCE_RATIO = 4.0  # variance of a lens over the variance of the simplest lens of its family
-MAX_MISFIT_GROWTH = 1.5  # by one more view
-RADIUS_MARGIN = 1.05  # radius of the fit over the radius of the farthest corner
+MAX_VARIANCE_RATIO = 4.0  # ratio of lens variance and the simplest lens of its family
+MAX_MISFIT_GROWTH = 1.5  # by one additional view
+RADIUS_MARGIN = 1.05  # ratio of fit radius and the farthest corner
 
 
 def picture_size(seen: Sightings, given: tuple[int, int] | None) -> tuple[int, int]:
-    """Return width and height of the pictures: given, or such that corners lie evenly about their middle."""
+    """Return image width and height: given, or centred on the corners."""
     if given is not None:
         return given
     low, high = np.nanmin(seen.xy, axis=(0, 1)), np.nanmax(seen.xy, axis=(0, 1))
@@ -226,11 +225,11 @@ def picture_size(seen: Sightings, given: tuple[int, int] | None) -> tuple[int, i
 def first_camera(
     seen: Sightings, size: tuple[int, int], name: str, model: str | None, knots: tuple[int, int] = KNOTS
 ) -> tuple[Camera, list[Message]]:
-    """Return a camera with the wanted model, free, and remarks.
+    """Return a camera of the requested model with free parameters, and warnings.
 
-    `seen` are its pictures, `size` width and height of them in pixels. The model is what is usual at its
-    field of view where None is wanted; the `knots` of a splined one, along columns and rows, are fitted to
-    the usual one: many of them are where no corner is.
+    `seen` contains its images, `size` is their width and height in pixels. Without a model, the usual one for
+    the field of view is used. The `knots` of a splined model, along columns and rows, are fitted to the usual
+    one, since many are outside the corners.
     """
     used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_PICTURES)))
     trial, adjusted = adjusted_family(used, trials(used, size))
@@ -270,10 +269,10 @@ def first_camera(
 
 
 def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> Adjusted | None:
-    """Return a camera adjusted by the views that fit the family, and by those that then fit it, too.
+    """Adjust a camera with the views that fit the family, and add further views.
 
-    A family of two parameters fits badly where a lens is unlike it, in the corners of the picture: a view
-    there belongs to the others if the lens, adjusted with it, fits it, and these no worse than before.
+    A two-parameter family may fit badly in the image corners. A view there is accepted if the lens, adjusted
+    with it, fits it, and the misfit of the others does not increase.
     """
     start = poses(ray_homographies(seen.coordinates, rays_of(family, seen.xy)))
     fits = trial.misfits <= MAX_VIEW_MISFIT * trial.angle
@@ -297,13 +296,13 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
 
 
 def usual_models(field: float, farthest: float) -> list[str]:
-    """Return the models that are usual, in order, at a horizontal field; `farthest` is off the axis (rad)."""
+    """Return the usual models for a horizontal field and largest axis angle (rad)."""
     if farthest >= WIDEST:
         return ["opencv_fisheye"]
     return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
 
 
 def from_axis(camera: Camera, xy: Floats) -> float:
-    """Return the largest angle (rad) of pixels from the axis of a camera; NaN are left out."""
+    """Return the largest angle (rad) of pixels from the camera axis, ignoring NaN."""
     rays = camera.rays(xy)
     return float(np.nanmax(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2])))

@@ -1,8 +1,8 @@
-"""Corners in groups: residuals summed up, and whether corners are as good as they are said to be.
+"""Corners in groups: residual statistics, and validity of the corner precision.
 
-Of a group with ~v = v / sd and redundancy numbers r the mean residual vector has, in each coordinate, the
-test value t = sum ~v / (sigma0 sqrt(sum r)): the variance of the sum is at most sum r where a common shift
-goes into the unknowns, so that the test finds less than it might.
+Let a group have ~v = v / sd and redundancy numbers r. In each coordinate, its mean residual vector has the
+test value t = sum ~v / (sigma0 sqrt(sum r)). The unknowns absorb part of a common shift, so the variance of
+the sum is at most sum r. The test is conservative.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ CRITICAL_TEST_VALUE = 3.3  # p = 0.001
 
 
 def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list[Quantity]:
-    """Return a table of residuals by groups: corners, rms, redundancy, sigma, mean vector and its test.
+    """Return residuals by group: corners, rms, redundancy, sigma, mean and test.
 
     Parameters
     ----------
     calibrated
         The adjusted calibration.
     by
-        `camera`; `level`, the standard deviation over that of level 0; `point`, of the board; `cell`, 12 x 8
-        of the picture of a camera; `radius`, ten rings about the middle of it.
+        `camera`; `level`, the standard deviation relative to level 0; `point` of the board. `cell`, 12 x 8
+        cells of a camera image; `radius`, ten rings about its centre.
     camera
-        Whose picture, of `cell` and `radius`.
+        Camera for `cell` and `radius`.
     """
     one_of("by", by, get_args(Groups))
     names, group = _grouped(calibrated, by, camera)
@@ -74,7 +74,7 @@ def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list
 
 
 def mean_residuals(calibrated: Calibrated, group: Indices, count: int) -> tuple[Floats, Floats]:
-    """Return (count, 2) mean residuals of groups in pixels, and their test values; group -1 is none."""
+    """Return (count, 2) mean group residuals (px) and test values, ignoring group -1."""
     result = calibrated.result
     own = group >= 0
     weighted = result.residuals / result.image_given_sd
@@ -89,7 +89,7 @@ def mean_residuals(calibrated: Calibrated, group: Indices, count: int) -> tuple[
 
 
 def _grouped(calibrated: Calibrated, by: Groups, camera: int) -> tuple[list[str], Indices]:
-    """Return names of groups, and (m,) the group of each image; -1 of those that are in none."""
+    """Return group names, and (m,) the group of each image, or -1."""
     corners, block = calibrated.calibration.corners, calibrated.result.block
     use = corners.use
     cameras = corners.cameras[corners.picture[use]]
@@ -139,24 +139,24 @@ def corner_components(
     threads: int | None = None,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> VarianceComponents:
-    """Estimate by which factors standard deviations of groups of corners are wrong (docs/weights.md).
+    """Estimate variance components of groups of corners (docs/weights.md).
 
     Parameters
     ----------
     result
-        The adjusted calibration. Weak priors of cameras, those of knots apart, do not take part.
+        Adjusted calibration. Weak camera priors are ignored, except for knots.
     by
-        What groups are made by: `camera`, `level` of the detector, both, or those of
-        :func:`photogram.variance_components`. Points of a board that have weights are a group.
+        Grouping: `camera`, `level` of the detector, both, or a basis of
+        :func:`photogram.variance_components`. Weighted board points are a group.
     threads, progress
-        As of :func:`photogram.variance_components`.
+        As in :func:`photogram.variance_components`.
 
     Raises
     ------
     InputError
-        Another word, or levels together with anything but cameras.
+        If the grouping is unknown, or combines levels with a basis other than cameras.
     RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-        As of :func:`photogram.variance_components`.
+        As in :func:`photogram.variance_components`.
     """
     start = result.restarted()
     if not any(each.knot_unknowns for each in start.cameras):

@@ -1,7 +1,7 @@
-"""Cameras in one housing as a calibration leaves them: values, cofactors, and what was seen of the board.
+"""Calibrated cameras of one housing: values, cofactors, and observed corners.
 
-Everything that is told of a calibration beyond its adjustment (maps of uncertainty, differences, new views,
-triangulation) is computed from these arrays; steps are R <- Exp(w) R, t <- t + dt.
+Uncertainty maps, differences, new views and triangulation are computed from these arrays. Steps are R <-
+Exp(w) R, t <- t + dt.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SeenCorners:
-    """The m corners that took part."""
+    """Adjusted corners (m) of the cameras in a housing."""
 
-    cameras: Indices  # (m,) which camera saw which point of the board in which view
+    cameras: Indices  # (m,) camera, board point and view of each corner
     views: Indices
     points: Indices
     xy: Floats  # (m, 2) pixels
     sd: Floats  # (m,) standard deviations a priori, pixels
-    # (m, 4, 4) board -> camera at the time of each corner; None: all cameras have the pose of the view
+    # (m, 4, 4) board -> camera at the time of each corner; None: all cameras use the pose of the view
     poses: Floats | None = None
 
     def __getitem__(self, which: Bools) -> SeenCorners:
@@ -46,28 +46,27 @@ class SeenCorners:
 
 @dataclass(frozen=True, eq=False)
 class Housing:
-    """K cameras that are fixed to one another, and what is known of them.
+    """K cameras fixed to one another, with values and cofactors.
 
-    The c common unknowns are, in this order: of each camera its parameters, and knots of its lens, with a
-    standard deviation that is not zero, of each but the first its sensor (dt, w), and what is unknown of the
-    board.
+    The c common unknowns start with the estimated parameters and knots of each camera. The sensor (dt, w) of
+    each but the first camera follows, then the unknowns of the board.
     """
 
     cameras: tuple[Camera, ...]  # adjusted; parameters with a standard deviation were unknown
     sensors: Floats  # (K, 4, 4) camera 0 -> camera k; the first is the identity
     poses: Floats  # (V, 4, 4) board -> camera 0, of each view
     points: Floats  # (n, 3) adjusted points of the board
-    points_by_board: Floats  # (n, 3, b) their partials by the unknowns of the board
+    points_by_board: Floats  # (n, 3, b) partials by the unknowns of the board
     seen: SeenCorners
-    # (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for
-    # a priori unit weight
+    # (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for a
+    # priori unit weight
     cofactors: Floats
     weights: Floats  # (c, c) prior weights of the common unknowns: inverse covariances, 0 without
     variance: float = 1.0  # of unit weight: covariances are cofactors times this
 
     @property
     def common(self) -> int:
-        """Number of unknowns that the views have in common."""
+        """Number of common unknowns of the views."""
         return len(self.weights)
 
     @property
@@ -77,7 +76,7 @@ class Housing:
 
     @property
     def board(self) -> slice:
-        """Rows of what is unknown of the board."""
+        """Rows of the unknowns of the board."""
         return slice(self.common - self.points_by_board.shape[2], self.common)
 
     def parameters(self, camera: int) -> slice:
@@ -87,19 +86,19 @@ class Housing:
         return slice(start, start + counts[camera])
 
     def sensor(self, camera: int) -> slice:
-        """Return the rows of a camera's sensor; those of the first are none."""
+        """Return the rows of a camera's sensor, empty for the first camera."""
         end = self.parameters(len(self.cameras) - 1).stop + 6 * camera
         return slice(end - 6 if camera else end, end)
 
     def noise_only(self) -> Housing:
-        """Return it with the cofactors that the errors of the corners alone cause: Q - Q P Q."""
+        """Return the housing with cofactors from corner errors only: Q - Q P Q."""
         to_common = self.cofactors[:, : self.common]
         return replace(self, cofactors=self.cofactors - to_common @ self.weights @ to_common.T)
 
     def linearized(self, camera: int, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return (n, 2) images by a camera of (n, 3) points in axes of camera 0, with their partials.
+        """Return (n, 2) projections by a camera of (n, 3) points in axes of camera 0.
 
-        By these points, (n, 2, 3), and by the common unknowns, (n, 2, c), of which those of the board are 0.
+        The partials are by these points, (n, 2, 3), and by the common unknowns, (n, 2, c), 0 for the board.
         """
         turn, shift = self.sensors[camera, :3, :3], self.sensors[camera, :3, 3]
         turned = points @ turn.T
@@ -111,33 +110,33 @@ class Housing:
         return images.xy, images.by_point @ turn, by_common
 
     def places(self, camera: int) -> tuple[Floats, Floats]:
-        """Return (m, 3) where the corners that a camera saw were in its axes, and (m,) their sd in pixels."""
+        """Return (m, 3) corners of a camera in its axes, and (m,) their sd in pixels."""
         seen = self.seen[self.seen.cameras == camera]
         poses = (self.sensors[camera] @ self.poses)[seen.views] if seen.poses is None else seen.poses
         return transformed(poses, self.points[seen.points]), seen.sd
 
     def board_distances(self, camera: int) -> Floats:
-        """Return (v,) distances of the middle of the board from a camera, in the views that it has seen."""
+        """Return (v,) distances of board centre and camera in its views."""
         views = np.unique(self.seen.views[self.seen.cameras == camera])
         places = (self.sensors[camera] @ self.poses[views] @ [*middle_of(self.points), 1.0])[:, :3]
         return np.asarray(np.linalg.norm(places, axis=1))
 
 
 def middle_of(points: Floats) -> Floats:
-    """Return (3,) the middle of (n, 3) points of a board."""
+    """Return the centre (3,) of (n, 3) points of a board."""
     return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
 
 
 def transformed(poses: Floats, points: Floats) -> Floats:
-    """Return (n, 3) points by a pose (4, 4), or each by its own (n, 4, 4)."""
+    """Transform (n, 3) points by one pose (4, 4), or by one each (n, 4, 4)."""
     return np.asarray(np.einsum("...ij,...j->...i", poses[..., :3, :3], points) + poses[..., :3, 3])
 
 
 def mean_motion(poses: Sequence[Floats] | Floats) -> Floats:
-    """Return (V, 6, 6) what the steps (dt_i, w_i) of each pose add to the mean motion of the boards.
+    """Return (V, 6, 6) partials of the mean board motion by pose steps (dt_i, w_i).
 
-    p at the place p - t_i of the board moves by dt_i + w_i x (p - t_i): the mean of these is the motion
-    (1/V) sum (dt_i + [t_i]x w_i, w_i) of all p.
+    A board point p at p - t_i moves by dt_i + w_i x (p - t_i). The mean over the views is the motion (1/V)
+    sum (dt_i + [t_i]x w_i, w_i) of all p.
     """
     moved = np.asarray(poses)
     found = np.tile(np.eye(6), (len(moved), 1, 1))
@@ -146,7 +145,10 @@ def mean_motion(poses: Sequence[Floats] | Floats) -> Floats:
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
-    """Return the number of a camera by its number or name; an InputError where there is no such one."""
+    """Return the number of a camera by number or name.
+
+    InputError: if it does not exist.
+    """
     names = [each.name for each in calibrated.cameras]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
@@ -156,7 +158,10 @@ def camera_number(calibrated: Calibrated, camera: int | str) -> int:
 
 
 def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
-    """Return width and height of the pictures of a camera; an InputError where nobody has said."""
+    """Return image width and height of a camera.
+
+    InputError: if they are unknown.
+    """
     size = calibrated.calibration.corners.sizes[camera]
     if size is None:
         name = calibrated.cameras[camera].name
@@ -168,7 +173,7 @@ _HOUSINGS: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary
 
 
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
-    """Return the housing of a camera, and the camera's number in it."""
+    """Return the housing of a camera, and the camera number in it."""
     cameras = housed_with(calibrated, camera)
     made = _HOUSINGS.setdefault(calibrated, {})
     if cameras[0] not in made:
@@ -190,7 +195,7 @@ def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
 
 
 def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
-    """Return the cameras that are tied to one, the reference first, with itself among them."""
+    """Return the cameras tied to one, including itself, reference first."""
     references = np.asarray(calibrated.calibration.references)
     reference = int(references[camera])
     others = np.flatnonzero((references == reference) & (np.arange(len(references)) != reference))
@@ -198,7 +203,6 @@ def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
 
 
 def _board_rows(calibrated: Calibrated) -> list[int]:
-    """Return the points of the board that are unknowns."""
     if calibrated.calibration.shape != "points":
         return []
     return np.flatnonzero(calibrated.result.used_points).tolist()
@@ -214,7 +218,6 @@ def _points_by_board(calibrated: Calibrated) -> Floats:
 
 
 def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCorners:
-    """Return the corners that took part; views and cameras are numbered within the housing."""
     result, corners = calibrated.result, calibrated.calibration.corners
     block = result.block
     used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
@@ -233,7 +236,6 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
 def _cofactors(
     calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats, board: int
 ) -> Floats:
-    """Return the cofactors of common unknowns, `board` of them of the board, and of its mean motion."""
     given = calibrated.result.block.cameras
     lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in given]
     starts = np.concatenate([[0], np.cumsum(lengths)])
@@ -252,7 +254,6 @@ def _cofactors(
 
 
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
-    """Return the inverse covariances of what was known before: of cameras, sensors, points and the bend."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
     blocks = []
     for number in cameras:

@@ -1,4 +1,4 @@
-"""A lens of another model that shows what a given camera shows: least squares over pixels of its image.
+"""Least-squares fit of another lens model to the projections of a camera, over pixels.
 
 The motion of its axes may be fitted with it.
 """
@@ -26,29 +26,29 @@ from photogram.words import phrase
 
 MAX_STEPS, TOLERANCE, SPLINE_TOLERANCE = 100, 1e-10, 1e-6  # relative decrease of the sum of squares
 MIN_DAMPING, FIRST_DAMPING, MAX_DAMPING = 1e-14, 1e-6, 1e8
-MAX_UNKNOWNS_WITH_RANK = 100  # of more unknowns the rank is not tested
+MAX_UNKNOWNS_WITH_RANK = 100  # the rank is not tested for more unknowns
 NO_MOTION = slice(0, 0)  # of the six parameters (dt, w)
 
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A lens, and (4, 4) the motion from the axes of another one to its own, in vision axes."""
+    """Lens, and (4, 4) motion from the axes of another one to its own, in vision axes."""
 
     camera: Camera
     motion: Floats = field(default_factory=lambda: np.eye(4))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The p parameters of the lens, its knots behind."""
+        """(p,) names of the lens parameters, followed by its knots."""
         return self.camera.names + self.camera.knot_names
 
     @property
     def values(self) -> Floats:
-        """(p,) their values."""
+        """(p,) values of parameters and knots."""
         return values_of(self.camera)
 
     def stepped(self, free: Sequence[int], moving: slice, step: Floats) -> Self:
-        """Return it after a step of free parameters and of the motion."""
+        """Return the lens after a step of free parameters and of the motion."""
         values = self.values.copy()
         values[free] += step[: len(free)]
         own = self.camera
@@ -64,7 +64,7 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points with the pixels where a lens is to image them."""
+    """Points with the target pixels of their projection."""
 
     points: Floats  # (m, 3) in axes of the other lens; directions if the points are not finite
     xy: Floats  # (m, 2) pixels
@@ -72,12 +72,12 @@ class Points:
     roots: Floats | None = None  # (m, 2, 2) W with W'W the weights of pixels; None: equal weights
 
     def least(self, start: Moved, free: Sequence[int], moving: slice = NO_MOTION) -> Moved:
-        """Return what has the least sum of squares (Levenberg-Marquardt), from where it begins.
+        """Return the least-squares lens from an initial one (Levenberg-Marquardt).
 
-        `free` are the numbers of free parameters; `moving` says which of the six steps (dt, w) of the motion
-        are: `slice(3, 6)` rotations.
+        `free` contains the numbers of free parameters, `moving` the free steps of the motion (dt, w), e.g.
+        `slice(3, 6)` for rotations.
         """
-        # Images are linear in knots: one step finds them.
+        # Projections are linear in knots: one step finds them.
         at, damping, close = start, FIRST_DAMPING, TOLERANCE
         if len(free) > MAX_UNKNOWNS_WITH_RANK:
             damping, close = MIN_DAMPING, SPLINE_TOLERANCE
@@ -98,7 +98,7 @@ class Points:
         return at
 
     def linearized(self, at: Moved, free: Sequence[int], moving: slice) -> tuple[float, Floats, Floats]:
-        """Return the sum of squares, infinite where an image is missing, partials and what is missed."""
+        """Return the sum of squares (infinite if undefined), partials and misfits."""
         images, by_point, by_values = self.imaged(at)
         by_motion = by_point @ motion_partials(transformed(at.motion, self.points), self.finite)[..., moving]
         partials = np.concatenate([by_values[..., free], by_motion], axis=2)
@@ -112,62 +112,61 @@ class Points:
         return cost, rows, apart
 
     def imaged(self, at: Moved) -> tuple[Floats, Floats, Floats]:
-        """Return (m, 2) images, (m, 2, 3) partials by points in axes of the lens, (m, 2, p) by its values."""
+        """Return (m, 2) projections, partials by points (m, 2, 3) and values (m, 2, p)."""
         images, by_u, by_values = at.camera.partials(transformed(at.motion, self.points) * TURNED)
         return images, by_u * TURNED, by_values
 
 
 def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
-    """Return the step of damped normal equations, scaled to a diagonal of ones."""
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0] = 1.0
     scaled = rows / scale
     normal = scaled.T @ scaled
     normal[np.diag_indices(len(normal))] += damping
     right = scaled.T @ misses
-    # Knots are many; damping keeps apart what the images of those at the edge do not.
+    # Damping separates the many knots at the edge, which the data do not.
     many = len(normal) > MAX_UNKNOWNS_WITH_RANK
     found = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
     return np.asarray(found / scale)
 
 
-# `opencv_pinhole` with so many free lens terms
+# `opencv_pinhole` with this number of free lens terms
 LENS_TERMS: Mapping[str, int] = MappingProxyType({"opencv4": 4, "opencv5": 5, "opencv8": 8, "opencv12": 12})
 GRID = (60, 40)  # columns and rows of pixels
 MIN_AXIS_COSINE = math.cos(math.radians(89.0))  # of rays with an image in a perspective camera
 _FIRST = frozenset({"f", "fx", "fy", "cx", "cy"})
-# Terms in the order in which they become free, after focal lengths and principal point
+# Terms in the order of release, after focal lengths and principal point
 _STAGES = (frozenset({"k", "k0", "k1", "r1"}), frozenset({"k2", "r2"}), frozenset({"p0", "p1", "p2"}))
 _FIXED_TERMS = frozenset({"r0"})  # fx and fy have the same effect
 _INITIAL_TERMS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))  # terms whose partials vanish at 0
 KNOTS, ORDER = (30, 20), 3.0  # along columns and rows, and the order of a spline
-FIELD_MARGIN = 1.1  # field of a splined lens over the field of the data
+FIELD_MARGIN = 1.1  # ratio of splined lens field and data field
 
 
 def grid_of_pixels(size: tuple[int, int], radius: float = math.inf) -> Floats:
-    """Return (m, 2) pixels over a picture, the outermost included, within a radius of its middle."""
+    """Return (m, 2) pixels over an image, to its edges, within a radius of its centre."""
     _, _, found = image_grid(size, GRID)
     return np.asarray(found[within(found, size, radius)])
 
 
 def within(pixels: Floats, size: tuple[int, int], radius: float) -> Bools:
-    """Return (m,) whether pixels lie within a radius of the middle of a picture."""
+    """Return (m,) whether pixels are within a radius of the image centre."""
     return np.asarray(np.hypot(*(pixels - (np.array(size) - 1) / 2).T) <= radius)
 
 
 def is_perspective(camera: Camera) -> bool:
-    """Return whether a camera sees nothing beside and behind the plane of its projection centre."""
-    # Through a perspective camera what is behind comes out on the other side, or not at all.
+    """Return whether a camera projects only points in front of its projection plane."""
+    # A perspective camera projects rear points to the other side, or not at all.
     column = camera.project(np.array([[1.0, 0.0, 0.01]]))[0, 0]
     return not column > camera.parameters["cx"]
 
 
 def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int, int] = KNOTS) -> Camera:
-    """Return a camera of a model with focal length and principal point of another, and no distortion.
+    """Return an undistorted camera with focal length and principal point of another.
 
-    The model is one of `docs/cameras.md`, or a name of `LENS_TERMS`; its terms are free, of a splined one its
-    `knots` in place of its parameters: its field holds all pixels of the source, and a tenth more. Name and
-    unit are those of the source, `size` is width and height of its pictures.
+    The model is one of `docs/cameras.md`, or a name of `LENS_TERMS`. Its terms are free; for a splined model,
+    the `knots` are free instead. The splined field covers all source pixels plus a tenth. Name and unit are
+    copied from the source, `size` is the image width and height.
     """
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
     models = dict(_photocore.camera_models())
@@ -204,13 +203,13 @@ def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str
         raise InputError(phrase("targets.no-focal", camera=source.title, model=source.model))
     fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
     start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
-    # cx and cy count from the first pixel, or in models with w and h from the middle of the picture
+    # cx and cy count from the first pixel, or in models with w and h from the image centre
     shifts = ("w" in source.names) - from_middle
     return start | {"cx": given["cx"] + shifts * size[0] / 2, "cy": given["cy"] + shifts * size[1] / 2}
 
 
 def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> float:
-    """Return the fov_x_deg (degrees) with which knots lie over (n, 3) rays in the axes of a photo."""
+    """Return the fov_x_deg (degrees) of knots that cover (n, 3) rays in photo axes."""
     places = 2 * rays[:, :2] / (1 - rays[:, 2:])
     inner = np.array(knots) - order
     reach = float(np.nanmax(np.nanmax(np.abs(places), axis=0) * inner[0] / inner))
@@ -226,13 +225,13 @@ def fitted(
     radius: float = math.inf,
     knots: tuple[int, int] = KNOTS,
 ) -> Camera:
-    """Return the camera of another model whose images agree best with the images of a camera.
+    """Return a camera of another model fitted to the projections of a camera.
 
-    The sum of squares of the differences over 60 x 40 pixels of the source, within `radius` of the middle of
-    the picture, is minimized: first by focal length and principal point, then with the terms of the lens in
-    the order k1, k2, p, all others. `model` and `knots` are those of :func:`lens_of`. Parameters in `held`
-    are fixed: focal length and principal point have the values of the source, terms of the lens are 0. The
-    others are free in the result.
+    The sum of squares of the differences is minimised over 60 x 40 source pixels, within `radius` of the
+    image centre. Focal length and principal point are fitted first, then the lens terms in the order k1, k2,
+    p, all others. `model` and `knots` are defined in :func:`lens_of`. Parameters in `held` are fixed: focal
+    length and principal point to the values of the source, lens terms to 0. The others are free in the
+    result.
     """
     start = lens_of(model, source, size, knots)
     if unknown := sorted({*held} - {*start.names}):
@@ -250,7 +249,7 @@ def fitted(
 
 
 def shows(camera: Camera, points: Floats) -> Bools:
-    """Return (m,) whether a camera can show (m, 3) directions in vision axes; NaN cannot be shown."""
+    """Return (m,) whether a camera can project (m, 3) directions in vision axes."""
     there = np.isfinite(points).all(axis=1)
     if is_perspective(camera):
         there = there & (points[:, 2] > MIN_AXIS_COSINE * np.linalg.norm(points, axis=1))
@@ -258,13 +257,13 @@ def shows(camera: Camera, points: Floats) -> Bools:
 
 
 def free_names(camera: Camera) -> list[str]:
-    """Return the free parameters of a camera, its free knots behind."""
+    """Return the free parameters of a camera, followed by its free knots."""
     own = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
     return own + list(camera.knot_names if np.any(camera.knot_sd) else ())
 
 
 def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: slice = NO_MOTION) -> Moved:
-    """Return a lens, and at last its motion, fitted with more and more of its parameters free."""
+    """Fit a lens with a growing set of free parameters, and finally its motion."""
     at = start
     numbers = {name: k for k, name in enumerate(at.names)}
     allowed, before = set(_FIRST), list[str]()

@@ -1,4 +1,4 @@
-"""Maps of the uncertainty of projection over a picture, curves of it against distance, parts of a picture."""
+"""Projection-uncertainty maps, uncertainty curves against distance, and image parts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from photogram.targets.projection import DatumName, worst
 
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
-    """Return (w,) columns, (h,) rows and (h w, 2) pixels of a grid over a picture, from edge to edge."""
+    """Return (w,) columns, (h,) rows and (h w, 2) pixels of a grid over an image."""
     across, down = (np.linspace(0.0, length - 1.0, count) for length, count in zip(size, grid, strict=True))
     return across, down, np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
 
@@ -29,24 +29,24 @@ def distance_text(distance: float, unit: str) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class UncertaintyMap(Brief):
-    """How far off a camera may image points that stay fixed to its housing.
+    """Projection uncertainty of points fixed to the camera housing.
 
     Attributes
     ----------
     camera, size
-        Its name, and width and height of its pictures, pixels.
+        Camera name, and image width and height, pixels.
     distance, unit
-        Of the points from the centre of the camera; infinite: directions.
+        Distance of the points from the camera centre; infinite: directions.
     datum, noise_only
-        What holds still, and whether the errors of the corners alone count.
+        Datum, and whether only corner errors are included.
     columns, rows
-        (w,) and (h,) of the grid, pixels from 0 at the centre of the first.
+        (w,) and (h,) grid coordinates, pixels from 0 at the centre of the first.
     covariances
-        (h, w, 2, 2) of image coordinates, square pixels; NaN where a pixel sees nothing that is known.
+        (h, w, 2, 2) covariances of image coordinates, square pixels; NaN for undefined pixels.
     corners
-        (m, 2) where the camera has seen the board.
+        (m, 2) observed board corners.
     model
-        What is known of the model of the lens, which the map takes for right.
+        Verdict on the lens model, which the map assumes to be correct.
     """
 
     camera: str
@@ -73,22 +73,25 @@ class UncertaintyMap(Brief):
 
     @property
     def coverage(self) -> Floats:
-        """(k, 2) the convex hull of the corners that were seen."""
+        """(k, 2) the convex hull of the observed corners."""
         return hull(self.corners)
 
     @property
     def inside(self) -> Bools:
-        """(h, w) which pixels of the grid lie within the area where the board was seen."""
+        """(h, w) whether pixels of the grid are within the hull of the observed corners."""
         return ~outside(self.pixels.reshape(-1, 2), self.coverage).reshape(self.covariances.shape[:2])
 
     @property
     def largest(self) -> float:
-        """Largest standard deviation where the board was seen, pixels; NaN where no pixel of the grid is."""
+        """Largest standard deviation in the observed board region, pixels.
+
+        NaN if no pixel of the grid is in the region.
+        """
         return float(np.fmax.reduce(self.sd[self.inside], initial=-np.inf)) if self.inside.any() else math.nan
 
     @property
     def title(self) -> str:
-        """What the map shows, with all that it depends on."""
+        """Title of the map with camera, distance and datum."""
         noise = ", noise alone" if self.noise_only else ""
         return (
             f"{self.camera}: standard deviation of projection {distance_text(self.distance, self.unit)}"
@@ -96,7 +99,7 @@ class UncertaintyMap(Brief):
         )
 
     def brief(self) -> tuple[str, Rows]:
-        """Return the map in a few lines."""
+        """Return a short summary of the map."""
         rows = [
             (
                 "largest",
@@ -108,7 +111,7 @@ class UncertaintyMap(Brief):
         return self.title, rows
 
     def to_npz(self) -> bytes:
-        """Return the arrays in the format of NumPy, by the names of the attributes, with `sd`."""
+        """Return the arrays and `sd` in the format of NumPy, named by attribute."""
         content = io.BytesIO()
         np.savez_compressed(
             content,
@@ -125,7 +128,7 @@ class UncertaintyMap(Brief):
         return content.getvalue()
 
     def to_csv(self) -> bytes:
-        """Return a row for each pixel of the grid: column, row, sd in the worst direction, the covariance."""
+        """Return one row per pixel: column, row, sd in the worst direction, covariance."""
         flat = self.covariances.reshape(-1, 2, 2)
         own = self.pixels.reshape(-1, 2)
         return csv_text(
@@ -141,21 +144,21 @@ class UncertaintyMap(Brief):
 
 
 def map_name(found: UncertaintyMap) -> str:
-    """Return what files and pictures call a map: `left-infinity`."""
+    """Return the map name in files: `left-infinity`."""
     away = "infinity" if math.isinf(found.distance) else f"{found.distance:g}"
     return f"{found.camera}-{away}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UncertaintyCurve:
-    """The uncertainty of projection of one pixel against the distance of the point.
+    """Projection uncertainty of one pixel against the distance of the point.
 
     Attributes
     ----------
     camera, pixel
-        Where.
+        Camera and pixel.
     unit, datum
-        Of distances, and what holds still.
+        Unit of distances, and datum.
     distances
         (n,) from the centre of the camera.
     sd
@@ -171,7 +174,7 @@ class UncertaintyCurve:
 
     @property
     def minimum(self) -> tuple[float, float]:
-        """Distance and standard deviation where the latter is smallest."""
+        """Distance of the smallest standard deviation, and its value."""
         best = int(np.nanargmin(self.sd))
         return float(self.distances[best]), float(self.sd[best])
 
@@ -183,7 +186,7 @@ DOWN = ("upper", "above the middle", "below the middle", "lower")
 
 @dataclass(frozen=True)
 class PicturePart:
-    """A part of a picture: its column and row, its middle in pixels, and what it is called."""
+    """Image part: column and row, centre in pixels, and name."""
 
     cell: tuple[int, int]
     middle: tuple[float, float]
@@ -191,7 +194,7 @@ class PicturePart:
 
 
 def parts_of(size: tuple[int, int]) -> Iterator[PicturePart]:
-    """Yield the parts of a picture of a width and a height, row by row."""
+    """Yield the parts of an image row by row."""
     for row in range(PARTS[1]):
         for column in range(PARTS[0]):
             x, y = (
@@ -202,7 +205,7 @@ def parts_of(size: tuple[int, int]) -> Iterator[PicturePart]:
 
 
 def _name(column: int, row: int) -> str:
-    """Return a part in words: `upper left corner`, `left edge, above the middle`, `below the middle`."""
+    """Return the name of a part: `upper left corner`, `left edge, above the middle`."""
     at_side, at_end = column in (0, PARTS[0] - 1), row in (0, PARTS[1] - 1)
     if at_side and at_end:
         return f"{DOWN[row]} {ACROSS[column]} corner"

@@ -1,10 +1,10 @@
-"""A board that moves while cameras of a rig look whose clocks are apart: its motion about each view.
+"""Motion of a board about each view, for a rig of cameras with clock offsets.
 
-About the time t0 of a view, that of its picture by the reference camera, photos of this camera move as
+About the time t0 of a view (the time of its image by the reference camera), photos of this camera move as
 
     C(t) = C0 + sum c_k (t - t0)^k,        A(t) = A0 Exp(sum r_k (t - t0)^k),        k = 1 .. 4
 
-through the views before and after. A picture of another camera, dated t, shows the board at t + tau.
+through the views before and after. An image of another camera with time t shows the board at t + tau.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ POWERS = 2 * EACH_SIDE  # of time
 
 
 def dated(corners: Corners, tied: Bools) -> Floats:
-    """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without."""
+    """Return (V,) view times from images of reference cameras; NaN without one."""
     if corners.times is None:
         raise InputError(phrase("targets.no-shown-times"))
     found = np.full(corners.view_count, np.nan)
@@ -39,10 +39,10 @@ def dated(corners: Corners, tied: Bools) -> Floats:
 
 
 def moving(poses: Floats, times: Floats, references: Indices) -> Floats:
-    """Return (V, 4, 6) c_k and r_k of views: through as many neighbours on each side, two at the most.
+    """Return (V, 4, 6) c_k and r_k of views from up to two neighbours on each side.
 
-    Poses are (V, 4, 4) board -> reference, times and references (V,) of views. NaN of views without a
-    neighbour within 0.2 s before and after, 0 for powers that these do not tell.
+    Poses are (V, 4, 4) board -> reference, times and references (V,) of views. NaN for views without
+    neighbours within 0.2 s before and after, 0 for undetermined powers.
     """
     found = np.full((len(poses), POWERS, 6), np.nan)
     places, attitudes = photo_poses(poses)
@@ -56,7 +56,7 @@ def moving(poses: Floats, times: Floats, references: Indices) -> Floats:
 
 
 def errors_of_speeds(times: Floats, references: Indices) -> Floats:
-    """Return (V,) the variance of c_1 and r_1 over that of the poses that they follow from; NaN without."""
+    """Return (V,) variances of c_1 and r_1 relative to the poses; NaN if undefined."""
     found = np.full(len(times), np.nan)
     for row, others in _neighbours(times, references):
         weights = _through(times[others] - times[row])[0]
@@ -65,7 +65,7 @@ def errors_of_speeds(times: Floats, references: Indices) -> Floats:
 
 
 def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indices]]:
-    """Go through views with the views about each: as many before as after, each near the next."""
+    """Yield views with equal numbers of neighbours before and after, without gaps."""
     for reference in np.unique(references):
         rows = np.flatnonzero((references == reference) & np.isfinite(times))
         rows = rows[np.argsort(times[rows], kind="stable")]
@@ -74,7 +74,7 @@ def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indic
             time = float(times[rows[int(np.argmin(gaps))]])
             raise InputError(phrase("targets.equal-times", time=time))
         for k, row in enumerate(rows.tolist()):
-            # gaps[k] is that behind the k-th view.
+            # gaps[k] follows the k-th view.
             sides = [
                 n
                 for n in range(1, min(EACH_SIDE, k, len(gaps) - k) + 1)
@@ -85,12 +85,12 @@ def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indic
 
 
 def _through(steps: Floats) -> Floats:
-    """Return (n, n) what makes the coefficients of (n,) powers of values at (n,) steps of time, 0 at 0."""
+    """Return (n, n) the map from values at (n,) time steps to coefficients of powers."""
     return np.asarray(np.linalg.inv(steps[:, np.newaxis] ** np.arange(1, len(steps) + 1)))
 
 
 def moved(poses: Floats, motion: Floats, steps: Floats) -> Floats:
-    """Return (n, 4, 4) poses, board -> reference, after (n,) steps of time with (n, 4, 6) motions."""
+    """Return (n, 4, 4) poses, board -> reference, after (n,) time steps of motions."""
     places, attitudes = photo_poses(poses)
     own = np.einsum("nk,nkc->nc", steps[:, np.newaxis] ** np.arange(1, POWERS + 1), motion)
     turned = attitudes.matrices @ _photocore.vector_rotations(own[:, 3:])
@@ -106,7 +106,7 @@ def pictures_in_motion(
     sensors: Sequence[Sensor],
     clocks: Sequence[Clock | None],
 ) -> list[Timed]:
-    """Return the pictures: each view is a trajectory whose pose is unknown, and whose motion is known."""
+    """Return the images as trajectories with unknown view poses and known motion."""
     assert corners.times is not None
     places, attitudes = photo_poses(poses)
     flights = []
@@ -134,7 +134,7 @@ def pictures_in_motion(
 
 
 def _known(time: float, motion: Floats) -> Polynomial:
-    """Return a polynomial about a time whose constant is free, and everything else known."""
+    """Return a polynomial about a time with a free constant and fixed coefficients."""
     told = np.nan_to_num(motion)
     told = told[: int(np.flatnonzero(told.any(axis=1)).max(initial=-1)) + 1]
     value = np.vstack([np.zeros(3), told])
@@ -144,7 +144,7 @@ def _known(time: float, motion: Floats) -> Polynomial:
 
 
 def motion_of(flight: Trajectory) -> Floats | None:
-    """Return (4, 6) the motion of a view that is such a trajectory; None of another."""
+    """Return (4, 6) the motion of a view trajectory; None for other trajectories."""
     found = np.zeros((POWERS, 6))
     for part, basis in ((slice(3), flight.position), (slice(3, 6), flight.rotation)):
         if not isinstance(basis, Polynomial) or basis.degree > POWERS or basis.scale != 1.0:

@@ -1,4 +1,4 @@
-"""Difference of two calibrations: where each images the same points, once the motion between them is out.
+"""Motion between two calibrated cameras, and the remaining image differences.
 
 With the rays r_a of camera a at pixels q and the motion T of the axes,  d(q) = f_b(T d r_a(q)) - q.
 """
@@ -22,14 +22,14 @@ from photogram.words import phrase
 Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
 
 STEPS = 200
-TOLERANCE = 1e-11  # radians, and parts of the shortest distance
+TOLERANCE = 1e-11  # relative to radians and the shortest distance
 MIN_PIXELS = 10
 HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases more slowly beyond
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The motion between the axes of two cameras."""
+    """Fitted motion between the axes of two cameras."""
 
     motion: Floats  # (4, 4) axes of camera a -> axes of camera b
     finite: bool  # whether the translation was fitted: all distances are finite
@@ -37,13 +37,13 @@ class Fitted:
 
 
 def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
-    """Return (D n, 3) where pixels look, in axes of a camera, at each distance; directions at infinity."""
+    """Return (D n, 3) points on pixel rays at each distance; directions at infinity."""
     towards = rays(camera, pixels)
     return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
 
 
 def differences_at(a: Camera, b: Camera, fitted: Fitted, pixels: Floats, distance: float) -> Floats:
-    """Return (n, 2) d(q) at (n, 2) pixels of camera a; NaN where one of the two sees nothing."""
+    """Return (n, 2) d(q) at (n, 2) pixels of camera a; NaN if not visible in both."""
     points = points_at(a, pixels, [distance])
     moved = transformed(fitted.motion, points) if np.isfinite(distance) else points @ fitted.motion[:3, :3].T
     return np.asarray(imaged(b, moved).xy - pixels)
@@ -57,12 +57,11 @@ def fitted_motion(
     criterion: Criterion = "pixels",
     weights: Floats | None = None,
 ) -> Fitted:
-    """Return the motion by which two cameras differ least at (n, 2) pixels of camera a.
+    """Return the motion that minimises the differences at (n, 2) pixels of camera a.
 
-    Pixels that one of the two does not see do not count. A translation is fitted where all distances are
-    finite, and arbitrary along the rays with one. Weights are of each pixel at each distance, one after the
-    other: (D n, 2, 2) W of differences in pixels, (D n,) w of mrcal's criterion; NaN where a pixel does not
-    count, None for equal ones.
+    Pixels that are not visible in both are ignored. A translation is fitted if all distances are finite; with
+    one distance it is arbitrary along the rays. Weights of each pixel are ordered by distance: (D n, 2, 2) W
+    of pixel differences, or (D n,) w of the mrcal criterion. NaN excludes a pixel, None means equal weights.
     """
     finite = bool(np.isfinite(distances).all())
     towards = points_at(a, pixels, distances)
@@ -98,10 +97,11 @@ def fitted_motion(
 
 
 def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:
-    """Return Newton's equations of sum w^2 rho(theta^4), theta^2 = |u - v|^2 of unit vectors u, v.
+    """Return Newton's equations of sum w^2 rho(theta^4), theta^2 = |u - v|^2.
 
-    With e = theta^2 and D = du: the gradient of e^2 is 4 e D' (u - v), its second derivatives
-    8 (D' (u - v))^2 + 4 e D' D, without the curvature of u. Huber beyond k: 2 k |e| - k^2 in place of e^2.
+    For unit vectors u, v with e = theta^2 and D = du, the gradient of e^2 is 4 e D' (u - v). Its second
+    derivatives are 8 (D' (u - v))^2 + 4 e D' D, without the curvature of u. Huber: beyond k, e^2 becomes 2 k
+    |e| - k^2.
     """
     length = np.linalg.norm(moved, axis=1)
     unit = moved / length[:, np.newaxis]

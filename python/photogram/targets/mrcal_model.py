@@ -1,7 +1,8 @@
-"""`.cameramodel` of mrcal: text of a Python dictionary that may hold a whole calibration.
+"""`.cameramodel` files of mrcal: a Python dictionary as text, with an optional calibration.
 
-`optimization_inputs` is base 85 (RFC 1924) of an archive of NumPy arrays: corners with weights, indices of
-views, cameras and sensors, poses, lenses, the bend of the board. Nothing is unpickled or evaluated.
+`optimization_inputs` is a base 85 (RFC 1924) archive of NumPy arrays. They contain corners with weights,
+indices of views, cameras and sensors, poses, lenses, and the board deflection. Nothing is unpickled or
+evaluated.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from photogram.words import Phrase, phrase
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")
-# Models by the names of mrcal, with the number of their parameters
+# Models by mrcal name, with the number of their parameters
 LENSES = {
     "PINHOLE": ("pinhole", 4),
     "STEREOGRAPHIC": ("stereographic", 4),
@@ -44,7 +45,7 @@ SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x
 
 
 def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
-    """Return a camera, held, of its name and numbers in mrcal."""
+    """Return a fixed camera from its mrcal name and numbers."""
     said = model.removeprefix(PREFIX)
     if splined := SPLINED.fullmatch(said):
         order, nx, ny, fov = map(float, splined.groups())
@@ -71,7 +72,7 @@ def _count(model: str, values: Sequence[float], needed: int) -> None:
 
 
 def freed(camera: Camera, model: str, core: bool, lens: bool) -> Camera:
-    """Return a camera of mrcal with what mrcal had free: the core, and the terms of the lens or its knots."""
+    """Return an mrcal camera with its core, lens terms or knots free as in mrcal."""
     own = CORE if core else ()
     if camera.knots is not None:
         return camera.replace(sd=dict.fromkeys(own, math.inf), knot_sd=math.inf if lens else 0.0)
@@ -83,7 +84,7 @@ INDICES = "indices_frame_camintrinsics_camextrinsics"
 
 
 def read_model(path: Path) -> Calibration:
-    """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start."""
+    """Read the calibration of a `.cameramodel`: corners, board and initial values."""
     packed = _content(path).get(KEY)
     if not isinstance(packed, bytes):
         raise InputError(phrase("targets.mrcal-no-corners", key=KEY), file=path)
@@ -101,7 +102,7 @@ def read_model(path: Path) -> Calibration:
     observed = arrays.numbers("observations_board", None, None, None, 3)
     if INDICES not in arrays:
         raise InputError(phrase("error.missing", name=INDICES), file=path)
-    # View, camera and sensor of each picture; sensor -1 is at the reference
+    # View, camera and sensor of each image; sensor -1 is at the reference
     indices = arrays.numbers(INDICES, len(observed), 3).astype(np.int64)
     if (indices[:, :2] < 0).any() or (indices[:, 2] < -1).any():
         raise arrays.refusal("targets.mrcal-counts", INDICES)
@@ -130,7 +131,7 @@ def read_model(path: Path) -> Calibration:
 
 
 def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
-    """Read the camera of a `.cameramodel`, held, and width and height of its pictures."""
+    """Read the fixed camera of a `.cameramodel`, and its image width and height."""
     content = _content(path)
     try:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
@@ -146,7 +147,7 @@ def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
 def _content(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:
-        # Literals only: names, calls and operations are refused.
+        # Literals only: names, calls and operations are rejected.
         content: Any = ast.literal_eval(text.lstrip())
     except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
         reason: str | Phrase = phrase("targets.mrcal-code")
@@ -171,7 +172,7 @@ def _cameras(arrays: Arrays) -> list[Camera]:
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
-    """Return (K, 4, 4) sensors, camera 0 -> camera k, and (V, 4, 4) views, board -> camera 0."""
+    """Return (K, 4, 4) sensors, camera 0 -> camera k, and (V, 4, 4) view poses."""
     views = of_vectors(arrays.numbers(arrays.first("frames_rt_toref", "rt_ref_frame"), None, 6))
     mounted = [each for each in ("extrinsics_rt_fromref", "rt_cam_ref") if each in arrays]
     to_camera = of_vectors(arrays.numbers(mounted[0], None, 6)) if mounted else np.zeros((0, 4, 4))

@@ -1,12 +1,13 @@
-"""What a further view of the board would add to the knowledge of a calibration.
+"""Effect of an additional view of the board on the cofactors of a calibration.
 
-A view with the whitened rows A_v of its pose and A_c of the common unknowns adds M = A_c' A_c - A_c' A_v
-(A_v' A_v)^-1 A_v' A_c to the inverse of their cofactors Q. As observations, with the pose wholly unknown,
+Let A_v be the whitened rows of the pose of a view and A_c the rows of the common unknowns. The view adds M =
+A_c' A_c - A_c' A_v (A_v' A_v)^-1 A_v' A_c to the inverse of the cofactors Q of the latter. As observations,
+with a free pose,
 
     (Q^-1 + M)^-1 = Q - G' W G,   W = S^-1 - S^-1 A_v (A_v' S^-1 A_v)^-1 A_v' S^-1,
     G = A_c Q,   S = I + A_c Q A_c'.
 
-Q is that of cameras and sensors, and of the places of all points of the board, of which a row touches one.
+Q contains cameras, sensors, and the positions of all board points, of which a row depends on one.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from photogram.targets.projection import of_functions, worst
 from photogram.targets.vision import TURNED, motion_partials, rays
 
 MIN_CORNERS_PER_PICTURE = 12
-CORNER_MARGIN_PX = 5.0  # about a corner, for its detection
-EXACT_VIEWS = 24  # the likely best views, whose gain is computed exactly
-MAX_RAY_ERROR = 1e-6  # of an image that is projected back; beyond it the distortion is not invertible
+CORNER_MARGIN_PX = 5.0  # around a corner, for its detection
+EXACT_VIEWS = 24  # the most promising views, whose gain is computed exactly
+MAX_RAY_ERROR = 1e-6  # of a reprojected image; beyond it the distortion is not invertible
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A view that may be taken.
+    """Candidate view of the board.
 
     Attributes
     ----------
     name
-        Where the board is to be held, in words.
+        Board position and orientation, in words.
     pose
         (4, 4) board -> camera 0.
     """
@@ -46,18 +47,18 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Added:
-    """The m images of a view that may be taken, over their standard deviation."""
+    """Image points (m) of a candidate view, over their standard deviation."""
 
-    # (t,) unknowns of cameras and sensors that they touch, and (2 m, t) their partials by these
+    # (t,) unknowns of cameras and sensors that affect them, and (2 m, t) partials
     touched: Indices
     by_cameras: Floats
-    places: Indices  # (m, 3) rows of the places of their points, and (m, 2, 3) partials by these
+    places: Indices  # (m, 3) rows of the coordinates of their points, and (m, 2, 3) partials
     by_place: Floats
     by_pose: Floats  # (2 m, 6)
-    corners: Indices  # (K,) how many are in the picture of each camera
+    corners: Indices  # (K,) number of corners in the image of each camera
 
     def gain(self, cofactors: Floats, rows: Indices | slice) -> Floats:
-        """Return (k, k) what the cofactors of :func:`placed_cofactors` lose in some rows: G' W G."""
+        """Return (k, k) the reduction of :func:`placed_cofactors` by the view: G' W G."""
         if not cofactors[self.places].any():
             return self.likely_gain(cofactors, np.arange(len(cofactors))[rows])
         whole = self._times(cofactors)
@@ -71,7 +72,7 @@ class Added:
         return np.asarray((gained + gained.T) / 2)
 
     def likely_gain(self, cofactors: Floats, rows: Indices) -> Floats:
-        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q."""
+        """Return a fast approximation with independent points: Q M (I + Q M)^-1 Q."""
         of_points = cofactors[self.places[:, :, np.newaxis], self.places[:, np.newaxis]]
         noise = np.eye(2) + self.by_place @ of_points @ self.by_place.transpose(0, 2, 1)
         both, count = np.hstack([self.by_cameras, self.by_pose]), len(self.touched)
@@ -91,14 +92,14 @@ class Added:
 
 @dataclass(frozen=True, eq=False)
 class NewView:
-    """A view that is worth taking, and the map of uncertainty with it.
+    """Suggested view, and the uncertainty map after adding it.
 
     Attributes
     ----------
     candidate
-        The view.
+        Suggested view.
     corners
-        (K,) corners in the picture of each camera.
+        (K,) number of corners in the image of each camera.
     sd
         (n,) standard deviations of the map in the worst direction, pixels.
     """
@@ -109,29 +110,29 @@ class NewView:
 
     @property
     def largest(self) -> float:
-        """Of the map."""
+        """Largest standard deviation of the map, pixels."""
         return float(self.sd.max())
 
     @property
     def rms(self) -> float:
-        """Root mean square over the map."""
+        """Root mean square over the map, pixels."""
         return float(np.sqrt(np.mean(self.sd**2)))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Suggestions(Brief):
-    """Views of the board that would help most, each with those before it.
+    """Suggested views of the board, each chosen in addition to the previous ones.
 
     Attributes
     ----------
     camera, distance, unit
-        Of the map of uncertainty in the datum `corners`, which is to become better.
+        Camera, distance and unit of the uncertainty map to improve, in the datum `corners`.
     pixels
-        (n, 2) of the map.
+        (n, 2) pixels of the map.
     before
-        (n,) standard deviations in the worst direction as they are, pixels.
+        (n,) current standard deviations in the worst direction, pixels.
     views
-        The views, in the order in which to take them.
+        Suggested views in order.
     """
 
     camera: str
@@ -143,7 +144,7 @@ class Suggestions(Brief):
 
     @property
     def sentences(self) -> list[str]:
-        """What to do, and what comes of it, a line for each view."""
+        """Suggested views and their effect, one line per view."""
         largest, said = float(self.before.max()), []
         for each in self.views:
             said.append(f"{each.candidate.name}: largest {largest:.3g} -> {each.largest:.3g} px")
@@ -151,14 +152,14 @@ class Suggestions(Brief):
         return said
 
     def brief(self) -> tuple[str, Rows]:
-        """Return them in a few lines."""
+        """Return a short summary of the suggested views."""
         at = distance_text(self.distance, self.unit)
         title = f"Views to take next, for the uncertainty of {self.camera} {at}"
         return title, [(f"{number}", said) for number, said in enumerate(self.sentences, 1)]
 
 
 def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Floats]:
-    """Return which of (n, 3) points in its axes a picture would show, and their images; none below 12."""
+    """Return the visible ones of (n, 3) points with images; none if fewer than 12."""
     xy = camera.project(places * TURNED)
     with np.errstate(invalid="ignore"):
         inside: Bools = np.asarray(
@@ -172,7 +173,7 @@ def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Flo
 
 
 def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added | None:
-    """Return what a view adds, with corners of a standard deviation in pixels; None where nothing is seen."""
+    """Return the effect of a view with corners of given sd (px); None if not visible."""
     places = [transformed(each @ pose, housing.points) for each in housing.sensors]
     shown = [shown_of(*own)[0] for own in zip(housing.cameras, sizes, places, strict=True)]
     cameras, points = np.repeat(np.arange(len(shown)), [len(own) for own in shown]), np.concatenate(shown)
@@ -193,7 +194,7 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
 
 
 def placed_cofactors(housing: Housing) -> Floats:
-    """Return the cofactors of cameras and sensors, and of the places (x, y, z) of all points of the board."""
+    """Return the cofactors of cameras, sensors and coordinates of all board points."""
     before, own = housing.board.start, housing.cofactors[: housing.common, : housing.common]
     points = len(housing.points) if housing.points_by_board.shape[2] else 1
     by_board = housing.points_by_board[:points].reshape(3 * points, housing.common - before)
@@ -206,12 +207,11 @@ def placed_cofactors(housing: Housing) -> Floats:
 def best_views(
     housing: Housing, functions: Floats, candidates: list[Candidate], sizes: Floats, sd: float, count: int
 ) -> list[NewView]:
-    """Return views that make the largest standard deviation of a map smallest, each with those before it.
+    """Return views that minimise the largest standard deviation of a map, one by one.
 
-    Of splined lenses the root mean square counts: a view says something of the knots that it touches alone,
-    and hardly any makes the largest smaller. Functions are (n, 2, c) J of the map by the common unknowns, in
-    a datum that stays as it is; by none of the board. Candidates may be taken once each; sizes are (K, 2) of
-    pictures, `sd` that of a corner in pixels.
+    For splined lenses the root mean square is minimised, since a view affects only some knots and hardly
+    reduces the largest value. Functions are (n, 2, c) J of the map by the common unknowns in a fixed datum, 0
+    for the board. Candidates are used once each; sizes are (K, 2) of images, `sd` is the corner sd in pixels.
     """
     seen = [(each, added_by(housing, each.pose, sizes, sd)) for each in candidates]
     left = [(each, added) for each, added in seen if added is not None]
@@ -240,17 +240,17 @@ def best_views(
 
 
 def _rounded(value: float) -> float:
-    """Return a number in six figures: of views that are mirrored images, as good, the first is taken."""
+    """Round to six digits, so that the first of two mirrored views is chosen."""
     return float(f"{value:.6g}")
 
 
 def view_rows(
     housing: Housing, pose: Floats, cameras: Indices, points: Indices
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return (n, 2) images of points of the board, each in one of the cameras, and their partials.
+    """Return (n, 2) projections of board points by assigned cameras, and partials.
 
-    By the c common unknowns, (n, 2, c), by the step (dt, w) of the pose, (n, 2, 6), and by the place of the
-    point on the board, (n, 2, 3). The pose is (4, 4) board -> camera 0; cameras and points are (n,) of each.
+    Partials are by the c common unknowns, (n, 2, c), by the pose step (dt, w), (n, 2, 6), and by point
+    coordinates, (n, 2, 3). The pose is (4, 4) board -> camera 0; cameras and points are (n,).
     """
     xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
     by_common = np.zeros((len(points), 2, housing.common))

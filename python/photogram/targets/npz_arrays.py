@@ -1,4 +1,4 @@
-"""Archives of NumPy arrays (`.npz`) that others wrote: read as numbers and text, never unpickled."""
+"""Archives of NumPy arrays (`.npz`) from other programs, read as numbers and text without unpickling."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.r
 
 
 class Arrays:
-    """The arrays of an archive by their names, with the file for errors."""
+    """Named arrays of an archive, with its file for errors."""
 
     def __init__(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
 
     def __contains__(self, name: str) -> bool:
-        # Empty text stands for None, as mrcal writes it.
+        # In mrcal files, empty text means None.
         return name in self.arrays and not (self.arrays[name].dtype.kind == "U" and self.text(name) == "")
 
     def refusal(self, code: str, name: str, **fields: object) -> InputError:
-        """Return an error of an array, which the sentence names."""
+        """Return an error that names an array."""
         return InputError(phrase(code, name=name, **fields), file=self.path)
 
     def _wrong(self, name: str, code: str, **fields: object) -> InputError:
@@ -46,7 +46,7 @@ class Arrays:
         return existing
 
     def text(self, name: str) -> str:
-        """Return an array of one text."""
+        """Return an array of a single text."""
         array = self.arrays[name]
         if array.dtype.kind not in "US" or array.ndim:
             raise self._wrong(name, "error.text", value=str(array.dtype))
@@ -99,13 +99,13 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
 
 
 def _array(path: Path, name: str, content: bytes) -> NDArray[Any]:
-    """Return the array of a member, whose header must announce as many bytes as there are."""
+    """Return the array of a member, after a check of its header against its size."""
     stream = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(stream)
         shape, by_columns, kind = _HEADERS[version](stream)
         announced = math.prod(shape) * kind.itemsize
-    except Exception as error:  # whatever a damaged header makes the parser raise
+    except Exception as error:  # any error of the parser for a damaged header
         reason = f"{type(error).__name__}: {error}"
         raise InputError(phrase("targets.array-header", name=name, reason=reason), file=path) from None
     if kind.hasobject:

@@ -1,4 +1,4 @@
-"""Corners in files of OpenCV: `image_points` in YAML, XML or JSON; arrays of `objpoints` and `imgpoints`."""
+"""OpenCV corner files: `image_points` in YAML, XML or JSON, or arrays `objpoints` and `imgpoints`."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from photogram.targets.npz_arrays import read_arrays
 from photogram.words import phrase
 
 POINTS = "image_points"
-BEGIN_BYTES = 1 << 20  # of a file, with a name that identifies the format
+BEGIN_BYTES = 1 << 20  # of a file, which contain a name that identifies the format
 MAX_GRID_ERROR = 1e-6  # of points of a grid, in spacings
 
 
 def is_storage(path: Path) -> bool:
-    """Return whether a file of OpenCV holds corners: by the name of their matrix."""
+    """Return whether an OpenCV file contains a corner matrix."""
     if path.suffix.lower() not in (".yml", ".yaml", ".xml", ".json"):
         return False
     return POINTS in read_beginning(path, BEGIN_BYTES)
 
 
 def is_npz(path: Path) -> bool:
-    """Return whether a file is an archive of arrays by its name."""
+    """Return whether a file name has the suffix of an array archive."""
     return path.suffix.lower() == ".npz"
 
 
 def read_storage(path: Path, board: Board | None) -> Measured:
-    """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ..."""
+    """Read `image_points` (views x corners x 2) and the board (`board_width` ...)."""
     suffix = path.suffix.lower()
     if suffix == ".json":
         content = read_json(path)
@@ -91,7 +91,7 @@ def _measured(
 
 
 def _matrix(tree: Tree) -> Floats:
-    """Return a matrix of OpenCV: rows x cols x channels, the last axis left out where it is 1."""
+    """Return an OpenCV matrix: rows x cols x channels, without a single channel axis."""
     rows, cols = tree["rows"].whole(), tree["cols"].whole()
     kind = tree["dt"].text() if isinstance(tree["dt"].value, str) else str(tree["dt"].value)
     match = re.fullmatch(r"\"?(\d*)([fd])\"?", kind.strip())
@@ -107,14 +107,14 @@ def _matrix(tree: Tree) -> Floats:
 
 
 def _coordinate(tree: Tree) -> float:
-    """Return a finite number, or NaN, as OpenCV spells it in YAML, for a corner without a place."""
+    """Return a finite number, or NaN in OpenCV spelling for a missing corner."""
     value = tree.value
     missing = value.lower() in (".nan", "nan") if isinstance(value, str) else value != value
     return np.nan if missing else tree.number()
 
 
 def _xml(path: Path) -> dict[str, Any]:
-    """Return what a storage in XML holds: matrices with their numbers, plain values as text or numbers."""
+    """Return the content of an XML storage: matrices, and plain values."""
     try:
         root = ElementTree.fromstring(read_bytes(path))
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -136,7 +136,7 @@ def _element(element: ElementTree.Element) -> Any:
 
 
 def read_npz(path: Path, board: Board | None) -> Measured:
-    """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given."""
+    """Read `imgpoints` (views x corners x 2), and the grid `objpoints` if needed."""
     arrays = read_arrays(path, read_bytes(path))
     name = arrays.first("imgpoints", "image_points")
     shape = arrays.arrays[name].shape
@@ -158,7 +158,6 @@ def read_npz(path: Path, board: Board | None) -> Measured:
 
 
 def _gridded(path: Path, places: Floats) -> Board:
-    """Return the chessboard whose points are given once for each view."""
     first = places[0]
     columns = int(np.argmax(first[:, 1] != first[0, 1])) or len(first)
     spacing = (float(first[1, 0] - first[0, 0]), float(first[min(columns, len(first) - 1), 1] - first[0, 1]))

@@ -1,4 +1,4 @@
-"""In which order the corners of each picture are listed, by how they fit the board and from which side."""
+"""Order of the corners of each image, from the fit to the board and its visible side."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ from photogram.targets.sightings import (
 from photogram.words import phrase
 
 MIN_MISFIT_RAD = 1e-6
-EQUAL_MISFIT_RATIO = 1.5  # misfit over the best misfit of an order that is as good
+EQUAL_MISFIT_RATIO = 1.5  # largest misfit ratio of an order equivalent to the best
 
 
 def rays_shown(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Indices:
-    """Return (P,) how many corners of each picture have rays in its camera, which is one of `cameras`."""
+    """Return (P,) numbers of corners of each image with rays in its camera."""
     there = np.isfinite(_rays(seen, of_cameras, cameras)).all(axis=2)
     return np.asarray(np.count_nonzero(there, axis=1))
 
 
 def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats:
-    """Return (P, n, 3) rays of pictures, those of each by its camera."""
     found = np.full((*seen.xy.shape[:2], 3), np.nan)
     for k, camera in enumerate(cameras):
         own = of_cameras == k
@@ -40,16 +39,16 @@ def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """P pictures with the cameras that took them."""
+    """P images with their cameras."""
 
-    seen: Sightings  # What they show
+    seen: Sightings  # Board observations in the images
     names: list[str]  # P names
-    of_cameras: Indices  # (P,) which camera took each
-    cameras: list[Camera]  # The cameras, with their first values
-    usable: Bools  # (P,) whether a picture has corners enough; others have no rays
+    of_cameras: Indices  # (P,) camera of each image
+    cameras: list[Camera]  # The cameras, with their initial values
+    usable: Bools  # (P,) whether an image has enough corners; rays are computed only for these
 
     def poses(self, orders: Indices) -> Floats:
-        """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""
+        """Return (P, 4, 4) poses board -> camera for corner orders (P,); NaN if unknown."""
         rows = np.flatnonzero(self.usable)
         seen = self.seen.of(rows).listed(orders[rows])
         found = np.full((len(orders), 4, 4), np.nan)
@@ -58,7 +57,7 @@ class Pictures:
         return found
 
     def adjusted(self, orders: Indices, fits: Bools) -> Floats:
-        """Return these poses adjusted with the cameras held, of (P,) pictures that fit."""
+        """Return poses of images that fit (P,), adjusted with fixed cameras."""
         found, seen = self.poses(orders), self.seen.listed(orders)
         for k, camera in enumerate(self.cameras):
             own = (self.of_cameras == k) & fits
@@ -69,11 +68,11 @@ class Pictures:
         return found
 
     def ordered(self) -> tuple[Indices, Bools, list[Message]]:
-        """Return (P,) in which order the corners of each picture are listed, whether they fit, and remarks.
+        """Return (P,) corner order of each image, whether it fits, and warnings.
 
-        That of their numbers is kept where a picture fits as well as most do, and sees the board from the
-        side that most see: the front, x to the right and y down, where none says it. Else the first order
-        is taken of which both is true.
+        The numbered order is used if an image fits as well as most images do, and shows the same side as
+        most. By default this is the front, x to the right and y down. Otherwise, the first order with both
+        properties is used.
         """
         misfit, front = self._tried()
         best = misfit.min(axis=1, keepdims=True)
@@ -89,7 +88,7 @@ class Pictures:
         return orders, fit, self._told(orders, fits, right)
 
     def _tried(self) -> tuple[Floats, Floats]:
-        """Return how usable pictures fit in each order, radians, and then the sign of z of its camera."""
+        """Return misfits (rad) of usable images by order, and z signs of their cameras."""
         rows, listings = np.flatnonzero(self.usable), self.seen.listings
         misfit = np.full((len(rows), len(listings.points)), np.inf)
         front = np.full(misfit.shape, -1.0)
@@ -103,7 +102,6 @@ class Pictures:
         return misfit, front
 
     def _in_order(self, order: int, rows: Indices) -> tuple[Floats, Floats]:
-        """Return the same of some pictures in one order."""
         seen = self.seen.of(rows).listed(np.full(len(rows), order))
         rays = _rays(seen, self.of_cameras[rows], self.cameras)
         found = ray_homographies(seen.coordinates, rays)
@@ -117,7 +115,6 @@ class Pictures:
         return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
-        """Return remarks on pictures whose corners are not listed in the order of the board."""
         names = np.array(self.names)[self.usable]
         own = orders[self.usable]
         mirrored = fits.any(axis=1) & (~right.any(axis=1) | (fits[:, 0] & (own > 0)))

@@ -1,6 +1,6 @@
-"""The document of a calibration, its JSON members (`docs/json.md`), and its maps as files.
+"""Document of a calibration, its JSON members (`docs/json.md`), and its map files.
 
-They are those of the block, with the board, the views and the uncertainty of projection.
+It extends the document of the block by board, views and projection uncertainty.
 """
 
 from __future__ import annotations
@@ -71,7 +71,6 @@ def calibration_page(calibrated: Calibrated) -> Document:
 
 
 def _residuals(calibrated: Calibrated) -> list[Part]:
-    """Return tables of residuals by groups, and pictures of them over the board and in the poorest views."""
     drawings = [
         Drawing(
             "board-residuals",
@@ -110,7 +109,7 @@ APART = "Where both calibrations image the same points, once the motion between 
 
 
 def worth_facts(worth: Worth) -> list[Fact]:
-    """Return the largest standard deviation of each map where the board was seen."""
+    """Return the largest standard deviation of each map in the observed board region."""
     return [
         Fact(
             f"{each.camera}, {distance_text(each.distance, each.unit)}",
@@ -123,7 +122,7 @@ def worth_facts(worth: Worth) -> list[Fact]:
 
 
 def worth_section(worth: Worth | None) -> Section:
-    """Return the section; it has no parts where nothing was asked."""
+    """Return the uncertainty section, without parts if nothing was requested."""
     parts: list[Part] = []
     if worth is not None:
         parts += [Remarks(worth.sentences)] if worth.sentences else []
@@ -134,7 +133,7 @@ def worth_section(worth: Worth | None) -> Section:
 
 
 def drawings(worth: Worth) -> list[Drawing]:
-    """Return all pictures, still to be drawn."""
+    """Return all plots for later drawing."""
     found = [
         Drawing(f"map-{map_name(each)}", _title(each), CAPTION, partial(plot_uncertainty, each))
         for each in worth.maps
@@ -168,7 +167,7 @@ def _title(found: UncertaintyMap) -> str:
 
 
 def calibration_members(calibrated: Calibrated) -> dict[str, Any]:
-    """Return the members of the document."""
+    """Return the JSON members of the calibration."""
     sensors = [
         {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row].tolist()}
         for row in calibrated.sensors_adjusted()
@@ -213,7 +212,7 @@ def _board(calibrated: Calibrated) -> dict[str, Any]:
 
 
 def worth_files(worth: Worth) -> dict[str, bytes]:
-    """Return the maps as tables and arrays, by their names: `map-left-infinity.csv`."""
+    """Return the maps as named tables and arrays: `map-left-infinity.csv`."""
     files = {}
     for each in worth.maps:
         name = f"map-{map_name(each)}"
@@ -222,7 +221,7 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
 
 
 def worth_members(worth: Worth) -> dict[str, Any]:
-    """Return what the JSON document has of it."""
+    """Return the JSON members of the assessment."""
     return {
         "maps": [_map(each) for each in worth.maps],
         "cross_validation": [_cross(each) for each in worth.cross],

@@ -1,9 +1,8 @@
-"""How far off the image of a point may be that stays fixed to the housing of a camera.
+"""Projection uncertainty of points fixed to the housing of a camera.
 
-With K and Pi the partials of the image by the camera's parameters k and by the point p = d r(q), and
-G = (I, -[p]x):  dq = K dk + Pi G tau,  Q_q = J Q J'.  A calibration moves its own axes: what stays with the
-housing is said by the datum, a matrix T by which a change db of the unknowns goes with the motion tau = T db,
-(dt, w), of the axes of a camera.
+Let K and Pi be the partials of the image point by the camera parameters k and by the point p = d r(q). With G
+= (I, -[p]x),  dq = K dk + Pi G tau,  Q_q = J Q J'.  A calibration moves its own axes. The datum is a matrix
+T. It defines the motion tau = T db, (dt, w), of the camera axes for a change db of the unknowns.
 """
 
 from __future__ import annotations
@@ -38,8 +37,8 @@ def datum_rows(
 ) -> Floats:
     """Return (6, c + 6) T of a camera by the name of a datum.
 
-    Of `image`, `fixed` are (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) weights
-    W, and whether they are at finite distances.
+    For `image`, `fixed` contains (n, 3) fixed points in camera axes, their (n, 2, 2) weights W, and whether
+    they are at finite distances.
     """
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
@@ -62,7 +61,7 @@ _FIXED_CORNERS: WeakKeyDictionary[Housing, dict[int, Floats]] = WeakKeyDictionar
 
 
 def _fixed_corners(housing: Housing, camera: int) -> Floats:
-    """Return (6, p) T by which the corners that a camera saw stand still: the same for any map."""
+    """Return (6, p) T that fixes the observed corners of a camera, cached."""
     made = _FIXED_CORNERS.setdefault(housing, {})
     if camera not in made:
         places, sd = housing.places(camera)
@@ -73,10 +72,10 @@ def _fixed_corners(housing: Housing, camera: int) -> Floats:
 
 
 def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
-    """Return (6, p) T by which the images of points move least when the camera's parameters change.
+    """Return (6, p) T that minimises image shifts of points for parameter changes.
 
-    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K of (n, 3) points in its axes with (n, 2, 2) weights W of their
-    images. At infinity, not `finite`, there is no translation to find.
+    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K. The (n, 3) points are in camera axes, W are their (n, 2, 2)
+    image weights. The translation is omitted for points at infinity, if not `finite`.
     """
     normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
     for start in range(0, len(points), POINTS_PER_BATCH):
@@ -96,7 +95,7 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
 
 
 def housing_rows(housing: Housing) -> Floats:
-    """Return (6, c + 6) T_rig: motion of axes of camera 0 by which the corners of all cameras move least."""
+    """Return (6, c + 6) T_rig: the motion of camera 0 that fixes the corners of all."""
     normal, right = np.zeros((6, 6)), np.zeros((6, housing.common + 6))
     for number, camera in enumerate(housing.cameras):
         places, sd = housing.places(number)
@@ -117,7 +116,7 @@ def housing_rows(housing: Housing) -> Floats:
 
 
 def _moved_back(normal: Floats, right: Floats, finite: bool) -> Floats:
-    """Return -N^-1 B; without translation where points are at infinity."""
+    """Return -N^-1 B, without translation for points at infinity."""
     found = np.zeros_like(right)
     free = slice(0 if finite else 3, 6)
     found[free] = -np.linalg.solve(normal[free, free], right[free])
@@ -130,13 +129,13 @@ PIXELS_PER_BATCH = 2048
 def projection_cofactors(
     housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats
 ) -> Floats:
-    """Return (n, 2, 2) cofactors of the images of points at (n, 2) pixels; NaN where a pixel sees nothing.
+    """Return (n, 2, 2) cofactors of projections at (n, 2) pixels; NaN if undefined.
 
-    The distance is from the centre of this camera, infinite of directions; `rows` are (6, c + 6) the datum
-    (:func:`datum_rows`).
+    The distance is from the centre of this camera, infinite for directions; `rows` are (6, c + 6) of the
+    datum (:func:`datum_rows`).
     """
     own, unknowns, moved = housing.cameras[camera], housing.parameters(camera), rows @ housing.cofactors
-    across = moved[:, unknowns]  # of the motion of the axes and of the parameters of the camera
+    across = moved[:, unknowns]  # of the axis motion and the camera parameters
     cofactors = np.block([[housing.cofactors[unknowns, unknowns], across.T], [across, moved @ rows.T]])
     found = np.empty((len(pixels), 2, 2))
     for start in range(0, len(pixels), PIXELS_PER_BATCH):
@@ -150,7 +149,7 @@ def projection_cofactors(
 
 
 def _of_touched(camera: Camera, pixels: Floats, distance: float, cofactors: Floats) -> Floats:
-    """Return (n, 2, 2) cofactors of images by a lens of knots: J Q J' over what each of them steps with."""
+    """Return (n, 2, 2) cofactors J Q J' of projections by a splined lens."""
     finite = bool(np.isfinite(distance))
     points = rays(camera, pixels) * (distance if finite else 1.0)
     images = touched(camera, points)
@@ -163,7 +162,7 @@ def _of_touched(camera: Camera, pixels: Floats, distance: float, cofactors: Floa
 
 
 def common_partials(housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats) -> Floats:
-    """Return (n, 2, c) J by the common unknowns, in a datum that says nothing of the single views."""
+    """Return (n, 2, c) J by the common unknowns, in a datum independent of views."""
     partials = image_partials(housing.cameras[camera], pixels, distance)
     found = partials[:, :, -6:] @ rows[:, : housing.common]
     found[:, :, housing.parameters(camera)] += partials[:, :, :-6]
@@ -177,7 +176,7 @@ def image_partials(camera: Camera, pixels: Floats, distance: float) -> Floats:
 
 
 def point_partials(camera: Camera, points: Floats, finite: bool) -> Floats:
-    """Return (n, 2, p + 6) J = (K, Pi G) of (n, 3) points, or directions, in the axes of a camera."""
+    """Return (n, 2, p + 6) J = (K, Pi G) of (n, 3) points or directions."""
     images = imaged(camera, points)
     return np.concatenate([images.by_parameters, images.by_point @ motion_partials(points, finite)], axis=2)
 
@@ -189,7 +188,7 @@ def of_functions(partials: Floats, cofactors: Floats) -> Floats:
 
 
 def worst(covariances: Floats) -> Floats:
-    """Return (n,) the standard deviations in the worst direction of (n, 2, 2) covariances.
+    """Return (n,) worst-direction standard deviations of (n, 2, 2) covariances.
 
     sqrt((a + c)/2 + sqrt(((a - c)/2)^2 + b^2)) of [a b; b c].
     """

@@ -1,4 +1,4 @@
-"""Calibrations from what lies at a path: corners in files of any format, a board, values to start from."""
+"""Reading of calibrations: corner files of any format, a board, initial values."""
 
 from __future__ import annotations
 
@@ -48,41 +48,41 @@ def read(
     regularise: Regularisation | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Read corners of a board, or find them in photographs, and find values to start from.
+    """Read board corners or detect them in photographs, and compute initial values.
 
     Parameters
     ----------
     path
-        A file of corners (`.vnl` and `.cameramodel` of mrcal, tables, YAML, XML, JSON or `.npz` of OpenCV),
-        or a folder with such files, or else with photographs (needs `pip install 'photogram[targets]'`),
-        and the description of a board.
+        A corner file (`.vnl` and `.cameramodel` of mrcal, tables, YAML, XML, JSON or `.npz` of OpenCV), or a
+        folder. The folder contains such files, or photographs (requires `pip install 'photogram[targets]'`),
+        and a board description.
     board
-        The board, or a file that describes it. None: that in the folder, or in the file of corners.
+        The board, or a file that describes it. None: the board in the folder or in the corner file.
     shape, unit
-        In the place of those of the board.
+        Override the values of the board.
     model
-        The lens, as of :func:`first_values`.
+        Lens model as in :func:`first_values`.
     knots, knot_sd
-        Of a splined lens: how many along columns and rows (30, 20), and the standard deviations with which
-        they are zero, radial and tangential, in units of the stereographic image (1, 0.1).
+        For a splined lens: number of knots along columns and rows (30, 20). Standard deviations of the zero
+        priors, radial and tangential, in units of the stereographic image (1, 0.1).
     cameras, views, within, pixel_origin, size
-        How images are grouped, and how pixels count: see docs/targets.md.
+        Grouping of images and pixel convention: see docs/targets.md.
     sync
-        `known`: images of one view were taken at one time; `none`: each has a pose of its own; `offset`: at
-        their times by the clock of their camera, whose offset is unknown.
+        `known`: images of one view are simultaneous. `none`: each has its own pose. `offset`: images have
+        times by camera clocks with unknown offsets.
     offsets
-        What is known of these by the names of cameras: seconds, and their standard deviations, 0 where one is
-        held, infinite where it is free (the default, from 0).
+        Prior clock offsets by camera name: seconds, and their standard deviations. 0 is fixed, infinite is
+        free (the default, from 0).
     sd0, regularise
-        As of :class:`Calibration`.
+        As in :class:`Calibration`.
     progress
-        Is told which photograph is searched for the board.
+        Called with the photograph that is searched for the board.
 
     Raises
     ------
     InputError
-        Nothing that is known, corners without a board, several formats at once, or whatever a format refuses:
-        names the file and the record.
+        If no known format is found, if corners lack a board, if there are several formats, or if a file is
+        invalid. The message names file and record.
     """
     path = Path(path)
     models, boards, corners = sorted_files(path)
@@ -154,7 +154,6 @@ def _only_board(boards: Sequence[Path]) -> Board | None:
 def _of_models(
     path: Path, models: Sequence[Path], corners: dict[Form, list[Path]], board: Board | None
 ) -> Calibration:
-    """Return the calibration of models of mrcal; the models of one solution have equal calibrations."""
     if corners or board is not None:
         raise InputError(phrase("targets.own-corners", name=models[0].name), file=path)
     calibration = read_model(models[0])
@@ -179,7 +178,7 @@ def _measured(path: Path, corners: dict[Form, list[Path]], board: Board | None) 
 
 
 def _together(path: Path, files: Sequence[Path], parts: Sequence[Measured]) -> Measured:
-    """Return the corners of several files: a camera each, which its file or folder is named for."""
+    """Return the corners of several files, each a camera named by its file or folder."""
     apart = len({each.stem for each in files}) == len(files)
     names = [each.stem if apart else f"{each.parent.name}" for each in files]
     if len(set(names)) < len(names):

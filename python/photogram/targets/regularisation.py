@@ -1,16 +1,16 @@
-"""Priors of cameras: standard deviations of knots about zero, and the weak observations of mrcal 2.2.
+"""Camera priors: standard deviations of knots about zero, and weak observations of mrcal 2.2.
 
-These say that lens terms are 0 and the centre is central. With n = 2 (corners of the board) (pictures),
-whatever is missing, and n_d lens terms of all cameras:
+The latter observe lens terms as 0 and the principal point as central. Let n = 2 (corners of the board)
+(images), including missing corners, and n_d the number of lens terms of all cameras:
 
     lambda p = 0,  lambda^2 = 0.0025 n / (4 n_d)         every lens term; 5 lambda for k4, k5, k6
     mu (cx - (w - 1)/2) = 0,  mu^2 = 0.0025 n / (2 K 500^2)       likewise cy; K cameras
 
 and, of splined lenses, with n_d displacements of knots, lambda^2 = 0.0025 n / (0.04 n_d):
 
-    lambda (e . d) = 0,  10 lambda (e x d) = 0        e: away from the middle; in it (1, 0), lambda for both
+    lambda (e . d) = 0,  10 lambda (e x d) = 0        e: radial; (1, 0) at the centre, lambda for both
 
-as rows of unit weight in pixels, whatever the standard deviation of corners.
+These are rows of unit weight in pixels, independent of the corner standard deviation.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ ROUGH_KNOTS, ACROSS = 0.04, 10.0
 def regularised(
     cameras: Sequence[Camera], sizes: Sequence[tuple[int, int] | None], observed: int
 ) -> list[Camera]:
-    """Return cameras with the priors of mrcal on what is free in them."""
+    """Return cameras with mrcal priors on their free parameters."""
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
     mu = math.sqrt(SHARE * observed / (2 * len(cameras) * FAR**2))
@@ -65,7 +65,7 @@ def regularised(
             firm = math.sqrt(SHARE * observed / (ROUGH_KNOTS * knots))
             rows, columns, _ = camera.knots.shape
             knot_sd = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
-            if rows % 2 and columns % 2:  # the knot in the middle has no radial direction
+            if rows % 2 and columns % 2:  # the central knot has an undefined radial direction
                 knot_sd[rows // 2, columns // 2] = 1 / firm
         found.append(
             camera.replace(parameters={**camera.parameters, **values}, sd={**given, **sd}, knot_sd=knot_sd)
@@ -93,8 +93,7 @@ def with_knot_sd(
 ) -> list[Camera]:
     """Return cameras whose free knots are observed as zero, radially and tangentially.
 
-    Along the radius and across with `knot_sd`, by default `WEAK_KNOT_SD`, unless `regularise` names whose
-    priors cameras have.
+    `knot_sd` is by default `WEAK_KNOT_SD`, unless `regularise` names other priors.
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):

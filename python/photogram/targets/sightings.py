@@ -1,8 +1,8 @@
-"""A board as pictures show it: arrays of pictures by points, their orders, homographies, and what these say.
+"""Board observations in images: arrays, corner orders, homographies, focal lengths and poses.
 
-Arrays stand as pictures by points of the board: (P, n, 2) pixels or (P, n, 3) rays, NaN where a point was
-not seen. Places of points have two coordinates, in the plane of a flat board, or three: m. Axes are those of
-vision: x right, y down, z forward. Homographies of pixels and rays say focal lengths and poses.
+Arrays are images by board points: (P, n, 2) pixels or (P, n, 3) rays, NaN for unobserved points. Point
+coordinates have m = 2 components in the plane of a flat board, or m = 3. Axes are vision axes: x right, y
+down, z forward. Homographies of pixels and rays give focal lengths and poses.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
 from photogram.words import phrase
 
-_MIN_COLUMN_RATIO = 1e-9  # of a homography of corners that are not on one line
+_MIN_COLUMN_RATIO = 1e-9  # of a homography of non-collinear corners
 
 
 def homographies(places: Floats, xy: Floats) -> Floats:
-    """Return (P, 3, m + 1) the homography of the board to each picture, by direct linear transformation.
+    """Return (P, 3, m + 1) board homographies by direct linear transformation.
 
-    Both sides are counted from their centroids and scaled to a mean distance of sqrt 2, in space of sqrt 3;
-    in these each has norm 1, and no sign. Places are (n, m), pixels (P, n, 2), NaN where not seen: each
-    picture has four points of a plane at least, no three of them on a line; else six, not in a plane.
+    Both sides are centred and scaled to a mean distance of sqrt 2, in space of sqrt 3. There, each has norm 1
+    and an arbitrary sign. Board points are (n, m), pixels (P, n, 2), NaN if unobserved. Each image needs four
+    points of a plane, no three of them collinear, or six points not in a plane.
     """
     seen = np.isfinite(xy[..., 0])
     board, of_board = _scaled(np.broadcast_to(places, (len(xy), *places.shape)), seen)
@@ -38,10 +38,10 @@ def homographies(places: Floats, xy: Floats) -> Floats:
 
 
 def ray_homographies(places: Floats, rays: Floats) -> Floats:
-    """Return (P, 3, m + 1) homographies of the board to rays: ray x H (x, y, 1) = 0, or (x, y, z, 1).
+    """Return (P, 3, m + 1) ray homographies: ray x H (x, y, 1) = 0, or (x, y, z, 1).
 
-    Places are (n, m), rays (P, n, 3) of length 1, NaN where not seen. The sign is that by which most points
-    lie on the side of their rays.
+    Board points are (n, m), rays (P, n, 3) of length 1, NaN if unobserved. The sign puts most points on the
+    side of their rays.
     """
     seen = np.isfinite(rays[..., 0])
     board, of_board = _scaled(np.broadcast_to(places, (len(rays), *places.shape)), seen)
@@ -52,22 +52,22 @@ def ray_homographies(places: Floats, rays: Floats) -> Floats:
 
 
 def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:
-    """Return (P, n) the angles (rad) between rays and what H makes of places; NaN where not seen."""
+    """Return (P, n) angles (rad) of rays and transformed points; NaN if unobserved."""
     there = np.einsum("pij,nj->pni", found, _with_one(places))
     across = np.linalg.norm(np.cross(rays, there), axis=-1)
     return np.asarray(np.arctan2(across, np.einsum("pni,pni->pn", rays, there)))
 
 
 def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
-    """Return fx, fy, and a single f, of a perspective camera by its homographies; NaN where they say none.
+    """Return fx, fy, and a single f, of a perspective camera; NaN if undetermined.
 
-    With g = T(-middle) H and its first columns a, b, whose directions in space are at right angles and of one
-    length: two equations of each picture in X = 1/fx^2, Y = 1/fy^2,
+    Let g = T(-middle) H with the first columns a, b, whose directions in space are orthogonal and of equal
+    length. Each image gives two equations in X = 1/fx^2, Y = 1/fy^2,
 
         a1 b1 X + a2 b2 Y = -a3 b3,    (a1^2 - b1^2) X + (a2^2 - b2^2) Y = -(a3^2 - b3^2).
 
-    Homographies are (P, 3, m + 1) to pixels; of points that lie in no plane each has a camera matrix, with a
-    principal point of its own, else it is the (2,) middle.
+    Homographies are (P, 3, m + 1) to pixels. For points that are not coplanar each is a camera matrix with
+    its own principal point, otherwise the principal point is `middle` (2,).
     """
     own = found.copy()
     own[:, :2] -= middle[:, np.newaxis] * found[:, 2:]
@@ -80,7 +80,7 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
         fx, fy = np.sqrt(np.median(squares - (centre[..., 0] / norms) ** 2, axis=0)).tolist()
         return fx, fy, (fx + fy) / 2
     lengths = np.linalg.norm(own[:, :, :2], axis=1)
-    # Corners on one line determine one of both columns alone.
+    # Collinear corners determine only one of both columns.
     own = own[lengths.min(axis=1) > _MIN_COLUMN_RATIO * lengths.max(axis=1)]
     a, b = own[:, :, 0], own[:, :, 1]
     weight = 1 / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))[:, np.newaxis]
@@ -92,9 +92,9 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
 
 
 def poses(found: Floats) -> Floats:
-    """Return (P, 4, 4) poses board -> camera of (P, 3, m + 1) homographies to rays, whose sign says the side.
+    """Return (P, 4, 4) poses board -> camera of signed ray homographies (P, 3, m + 1).
 
-    The scale is the mean length of the columns before the last, the third axis of a plane their cross
+    The scale is the mean length of the columns before the last. The third axis of a plane is their cross
     product, the attitude the nearest rotation.
     """
     scale = np.linalg.norm(found[:, :, :-1], axis=1).mean(axis=1)
@@ -113,12 +113,12 @@ def nearest_rotations(matrices: Floats) -> Floats:
 
 
 def centres(of_boards: Floats) -> Floats:
-    """Return (P, 3) where the cameras are in the axes of the board, C = -R't."""
+    """Return (P, 3) camera positions in the axes of the board, C = -R't."""
     return np.asarray(-np.einsum("pji,pj->pi", of_boards[:, :3, :3], of_boards[:, :3, 3]))
 
 
 def frontal_tilts(of_boards: Floats) -> Floats:
-    """Return (P,) the angles (rad) by which boards are tilted out of parallel with the image."""
+    """Return (P,) the angles (rad) between boards and the image plane."""
     third = of_boards[:, :3, 2]
     return np.arctan2(np.hypot(third[:, 0], third[:, 1]), np.abs(third[:, 2]))
 
@@ -128,7 +128,7 @@ def _with_one(points: Floats) -> Floats:
 
 
 def _scaled(points: Floats, seen: Bools) -> tuple[Floats, Floats]:
-    """Return (P, n, m) points scaled to a mean distance of sqrt m from their centroids, and matrices: how."""
+    """Return (P, n, m) centred points scaled to distance sqrt m, and the matrices."""
     m = points.shape[2]
     kept = np.where(seen[..., np.newaxis], points, np.nan)
     middle = np.nanmean(kept, axis=1)
@@ -142,7 +142,7 @@ def _scaled(points: Floats, seen: Bools) -> tuple[Floats, Floats]:
 
 
 def _equations(board: Floats, rays: Floats) -> Floats:
-    """Return (P, n, 3, 3 (m + 1)) the rows of ray x H b = 0 in the elements of H; b is a place and 1."""
+    """Return (P, n, 3, 3 (m + 1)) rows of ray x H b = 0; b is a point and 1."""
     x, y, z = (rays[..., k, np.newaxis] for k in range(3))
     b = _with_one(board)
     zero = np.zeros_like(b)
@@ -155,7 +155,7 @@ def _equations(board: Floats, rays: Floats) -> Floats:
 
 
 def _smallest(rows: Floats, seen: Bools) -> Floats:
-    """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least."""
+    """Return (P, 3, m + 1) least-squares H of norm 1 for rows (P, n, k, 3 (m + 1))."""
     used = np.where(seen[..., np.newaxis, np.newaxis], rows, 0.0).reshape(len(rows), -1, rows.shape[-1])
     squares = used.transpose(0, 2, 1) @ used
     finite = np.isfinite(squares).all(axis=(1, 2))[:, np.newaxis, np.newaxis]
@@ -173,26 +173,25 @@ CORNER_ORDERS = (
     "column by column, from the last column",
     "column by column, from the last corner",
 )
-MAX_DEPTH_OF_PLANE = 0.05  # of a plane board, in extents of the board
-WEIGHT_OF_FIXED_AXIS = 1e3  # relative to axes that turn
-_MIN_ORDER_DIFFERENCE = 1e-6  # in extents of the board
+MAX_DEPTH_OF_PLANE = 0.05  # of a planar board, relative to its extent
+WEIGHT_OF_FIXED_AXIS = 1e3  # relative to other axes
+_MIN_ORDER_DIFFERENCE = 1e-6  # relative to the extent of the board
 
 
 @dataclass(frozen=True, eq=False)
 class Listings:
-    """Orders in which the corners of a board may be listed, that of their numbers first."""
+    """Possible corner orders of a board, the numbered one first."""
 
-    points: Indices  # (g, n) of which point of the board the k-th corner of a list is
-    # Of the orders that differ by more than a symmetry of the board, the first ones: homographies tell
-    # these apart, and no others
+    points: Indices  # (g, n) board point of the k-th corner of a list
+    # First of the orders that differ by more than a board symmetry: homographies separate only these
     shapes: tuple[int, ...]
-    # Symmetries that turn the board in its plane, by their orders: (4, 4) places as listed -> places
+    # Symmetries that rotate the board in its plane, by order: (4, 4) listed -> actual coordinates
     turns: dict[int, Floats]
-    one_sided: bool  # Whether the board is seen from one side alone, as what is printed is
+    one_sided: bool  # Whether the board is visible from one side only, as a printed board is
 
     @classmethod
     def of(cls, board: Board) -> Self:
-        """Return those of a board; targets that say their numbers have one."""
+        """Return the orders of a board; coded targets have one."""
         columns, rows = board.grid
         k = np.arange(len(board.places))
         points = [k]
@@ -205,7 +204,7 @@ class Listings:
         shapes: list[int] = []
         turns: dict[int, Floats] = {}
         for own, listed in enumerate(points):
-            # The motion that takes places nearest to the listed ones, with z kept upright
+            # The motion that fits board points to the listed ones, with fixed z direction
             middles = places.mean(axis=0), places[listed].mean(axis=0)
             products = (places[listed] - middles[1]).T @ (places - middles[0])
             products[2, 2] += WEIGHT_OF_FIXED_AXIS * np.abs(products).max()
@@ -229,17 +228,20 @@ def _listed(i: Indices, j: Indices, columns: int, rows: int) -> list[Indices]:
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """A board in P pictures."""
+    """Board observations in P images."""
 
-    places: Floats  # (n, 3) points of the board, in axes whose x and y lie in its plane where it has one
-    axes: Floats  # (4, 4) board -> these axes; other ones only for points that lie anywhere
-    listings: Listings  # The orders in which its corners may be listed
-    xy: Floats  # (P, n, 2) pixels, NaN where a point was not seen
-    sd: Floats  # (P, n) their standard deviations
+    places: Floats  # (n, 3) board points, in axes whose x and y are in its plane, if it is flat
+    axes: Floats  # (4, 4) board -> these axes; the identity except for arbitrary points
+    listings: Listings  # Possible orders of its corners
+    xy: Floats  # (P, n, 2) pixels, NaN if unobserved
+    sd: Floats  # (P, n) standard deviations
 
     @classmethod
     def of_corners(cls, board: Board, corners: Corners) -> Self:
-        """Return the corners that count; InputError of points that the board does not have."""
+        """Return the used corners.
+
+        InputError: if points are missing on the board.
+        """
         places = board.places
         beyond = corners.point >= len(places)
         if beyond.any():
@@ -259,17 +261,17 @@ class Sightings:
 
     @property
     def is_flat(self) -> bool:
-        """Whether the board is about a plane."""
+        """Whether the board is approximately planar."""
         low, _, high = np.sort(np.ptp(self.places, axis=0))
         return bool(low <= MAX_DEPTH_OF_PLANE * high)
 
     @property
     def coordinates(self) -> Floats:
-        """(n, 2) places in the plane of the board, or (n, 3) where it has none."""
+        """(n, 2) coordinates in the plane of a flat board, or (n, 3) in space."""
         return self.places[:, :2] if self.is_flat else self.places
 
     def in_a_plane(self) -> Bools:
-        """Return (P,) whether a picture shows points of one plane alone, of a board that is not flat."""
+        """Return (P,) whether an image of a non-flat board shows only coplanar points."""
         seen = np.isfinite(self.xy[..., 0])
         if self.is_flat:
             return np.zeros(len(seen), dtype=bool)
@@ -280,11 +282,11 @@ class Sightings:
         return found
 
     def of(self, rows: Indices | Bools) -> Self:
-        """Return some pictures alone."""
+        """Return a subset of the images."""
         return replace(self, xy=self.xy[rows], sd=self.sd[rows])
 
     def listed(self, orders: Indices) -> Self:
-        """Return the pictures with their corners taken for listed in (P,) orders."""
+        """Return the images with corners reordered from (P,) listed orders."""
         taken = np.argsort(self.listings.points, axis=1)[orders]
         xy = np.take_along_axis(self.xy, taken[..., np.newaxis], axis=1)
         return replace(self, xy=xy, sd=np.take_along_axis(self.sd, taken, axis=1))

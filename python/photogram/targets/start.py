@@ -1,4 +1,4 @@
-"""What is adjusted of cameras that see a board: photos of a block whose object space is the board."""
+"""Adjustment input of board images: a block of photos with the board as object space."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
 
 BOARD = "board"  # name of the bend among the common unknowns
-CLOCK = "of "  # before the camera in the name of its clock offset
+CLOCK = "of "  # prefix of the camera in the name of its clock offset
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Start(Valued, Brief):
-    """What :class:`photogram.targets.Calibration` has, which says what its fields are; without adjustment."""
+    """Fields of :class:`photogram.targets.Calibration`, without adjustment methods."""
 
     board: Board
     corners: Corners
@@ -100,7 +100,7 @@ class Start(Valued, Brief):
         object.__setattr__(self, name, value)
 
     def _set_motion(self) -> None:
-        """Find how the board moves about each view; leave out pictures of others where nothing tells."""
+        """Compute the board motion about each view; omit images with unknown motion."""
         corners, tied = self.corners, self.tied[self.corners.cameras]
         times = dated(corners, self.tied)
         if self.motion is None:
@@ -124,7 +124,6 @@ class Start(Valued, Brief):
         self._set("corners", self.corners.of_pictures(pictures))
 
     def _leave_out(self, poses: Floats) -> None:
-        """Leave out pictures without enough corners or without a pose, and name them."""
         poor = self.corners.poor(self.board.places)
         keep = np.array([name not in poor for name in self.corners.pictures], dtype=bool)
         unposed = keep & ~np.isfinite(poses[self.corners.views]).all(axis=(1, 2))
@@ -140,7 +139,7 @@ class Start(Valued, Brief):
         self._set("messages", (*self.messages, *map(Message, remarks)))
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what is adjusted in a few lines."""
+        """Return a short summary of the input."""
         return "Calibration", [
             ("board", self.board.described),
             ("shape", self.shape),
@@ -150,22 +149,22 @@ class Start(Valued, Brief):
         ]
 
     def replace(self, **changes: Any) -> Self:
-        """Return the calibration with some fields replaced, checked anew."""
+        """Return the calibration with some fields replaced and validated."""
         return replace(self, **changes)
 
     def with_offsets(self, known: Mapping[str, tuple[float, float]]) -> Self:
-        """Return the calibration with what is known of the offsets of some cameras' clocks.
+        """Return the calibration with prior clock offsets of some cameras.
 
         Parameters
         ----------
         known
-            Offsets and their standard deviations by the names of cameras, seconds: 0 where one is held,
-            infinite where it is free.
+            Offsets and their standard deviations by camera name, seconds: 0 fixes an offset, infinite frees
+            it.
 
         Raises
         ------
         InputError
-            A camera without an offset: none of that name, a reference, or pictures that are synchronised.
+            If a camera is unknown, is a reference, or has synchronised images.
         """
         places = {each.name: row for row, each in enumerate(self.cameras)}
         there = [name for name, row in places.items() if self.tied[row] and self.sync == "offset"]
@@ -184,7 +183,7 @@ class Start(Valued, Brief):
         return np.asarray(np.asarray(self.references) != np.arange(len(self.cameras)))
 
     def picture_poses(self) -> Floats:
-        """Return (P, 4, 4) the pose of each picture: board -> its camera."""
+        """Return (P, 4, 4) the pose of each image: board -> its camera."""
         corners, sensors = self.corners, np.asarray(self.sensors)
         poses = np.asarray(self.poses)[corners.views]
         if self.sync == "offset" and corners.times is not None:
@@ -196,18 +195,18 @@ class Start(Valued, Brief):
 
     @property
     def shape(self) -> Shape:
-        """What of the board is unknown."""
+        """Estimated shape of the board."""
         return self.board.shape_of(self.corners.view_count)
 
     def places(self) -> Floats:
-        """Return (n, 3) the points of the board where an adjustment begins with them."""
+        """Return (n, 3) the initial board points."""
         bent = any(self.bend) and self.shape != "points"
         return self.board.bent(*self.bend) if bent else self.board.places
 
     def frames(self) -> tuple[list[str], Indices]:
-        """Return the names of views without a picture of their reference, and (V,) the photo of each view.
+        """Return names of views without a reference image, and (V,) photos of views.
 
-        Photos are the pictures, and behind them one without images for each of these views: its frame.
+        Photos are the images, followed by one without image observations for each of these views: its frame.
         """
         corners = self.corners
         photo = np.full(corners.view_count, -1)
@@ -219,12 +218,12 @@ class Start(Valued, Brief):
         return [f"frame of {names[view]}" for view in alone.tolist()], photo
 
     def block(self, cameras: Sequence[Camera] | None = None) -> Block:
-        """Return the block: pictures are photos, points of the board are control, held or weighted.
+        """Return the block with images as photos and fixed or weighted board points.
 
         Parameters
         ----------
         cameras
-            In the place of those that are given.
+            Cameras that replace the given ones.
         """
         corners, poses = self.corners, np.asarray(self.poses)
         frames, photo = self.frames()
@@ -260,7 +259,7 @@ class Start(Valued, Brief):
         )
 
     def references_of_views(self) -> Indices:
-        """Return (V,) the camera that the pose of each view is of."""
+        """Return (V,) the camera to which the pose of each view refers."""
         corners = self.corners
         reference = np.empty(corners.view_count, dtype=np.int64)
         reference[corners.views] = np.asarray(self.references)[corners.cameras]
@@ -274,7 +273,6 @@ class Start(Valued, Brief):
         ]
 
     def _timed(self) -> list[Timed]:
-        """Return the pictures of moving views, with a clock for each camera that is tied."""
         offsets, sd = np.asarray(self.offsets).tolist(), np.asarray(self.sd_offsets).tolist()
         clocks = [
             Clock(CLOCK + name, offsets[k], sd[k]) if tied else None
@@ -286,7 +284,7 @@ class Start(Valued, Brief):
         )
 
     def residuals(self) -> Floats:
-        """Return (n, 2) observed less computed with the values that are given, pixels; no adjustment."""
+        """Return (n, 2) observed minus computed corners with the given values, pixels."""
         corners, poses = self.corners, self.picture_poses()
         places = self.places()[corners.point]
         own = poses[corners.picture]
@@ -301,7 +299,7 @@ class Start(Valued, Brief):
         return self.replace(corners=self.corners.replace(use=use), messages=(*self.messages, remark))
 
     def with_images_of(self, block: Block) -> Self:
-        """Return the calibration with the corners that a block still has."""
+        """Return the calibration with the remaining corners of a block."""
         corners, points = self.corners, len(self.board.places)
         kept = np.isin(
             corners.picture * points + corners.point, block.image_photos * points + block.image_points

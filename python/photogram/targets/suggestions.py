@@ -1,4 +1,4 @@
-"""Which view of the board to take next: candidates in words, ranked by the map that they would leave."""
+"""Suggestions for the next view of the board, ranked by the predicted uncertainty map."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TILTS = {
     f"tilted {-TILT_DEG:g} degrees about y": (0.0, -TILT_DEG),
 }
 TURNS = {"": 0.0, f"turned by {TURN_DEG:g} degrees": TURN_DEG}
-STEPS_TO_MIDDLE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # parts of the way to the middle of the picture
+STEPS_TO_MIDDLE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # relative distances from the image part to the image centre
 GRID = (12, 8)  # pixels across and down
 
 
@@ -52,26 +52,26 @@ def suggest_views(
     camera: int | str = 0,
     views: int = 1,
 ) -> Suggestions:
-    """Return the views of the board that would make the largest uncertainty over a picture smallest.
+    """Suggest views of the board that minimise the largest image uncertainty.
 
     Parameters
     ----------
     result
-        The adjusted calibration. The board stays as large as it is, and corners as good as the best.
+        The adjusted calibration. The board has the same size, and corners have the best observed precision.
     distance
-        At which the map of uncertainty counts, in the unit of the board; infinite: directions.
+        Distance of the uncertainty map, in the unit of the board; infinite: directions.
     candidates
-        Views that may be taken; None: the board in 5 x 4 places of the picture, at three distances as it was
-        seen, frontal and tilted by 30 degrees, upright and turned; whole where it is only found so.
+        Possible views. None: the board at 5 x 4 image positions and three observed distances, frontal and
+        tilted by 30 degrees, upright and rotated. It is completely visible if detection requires it.
     camera
-        Whose map counts: number or name. On a rig all cameras see the board.
+        Camera of the map: number or name. On a rig, all cameras observe the board.
     views
-        How many, each chosen with those before it.
+        Number of views, each chosen in addition to the previous ones.
 
     Raises
     ------
     InputError
-        A camera that there is not, pictures whose size nobody knows, no candidate that shows the board.
+        If the camera does not exist, if the image size is unknown, or if no candidate shows the board.
     """
     number = camera_number(result, camera)
     checked_distance(distance)
@@ -100,7 +100,7 @@ def suggest_views(
 
 
 def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board: Board) -> list[Candidate]:
-    """Return views of the board all over the picture of a camera, at three distances, tilted and turned."""
+    """Return views at all image parts, three distances, tilts and rotations."""
     away = np.quantile(housing.board_distances(camera), DISTANCE_QUANTILES).tolist()
     to_first = inverted(housing.sensors[camera])
     counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
@@ -112,10 +112,10 @@ def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board:
 def views_over_picture(
     camera: Camera, size: tuple[int, int], board: Board, distances: Sequence[float], *, whole: bool
 ) -> list[Candidate]:
-    """Return views, board -> camera, with the middle of the board in each part of the picture.
+    """Return views, board -> camera, with the board centre in each part of the image.
 
-    `distances` are between the middle of the board and the camera. A board that detectors find only as a
-    `whole` is moved towards the middle of the picture until the picture shows all of it.
+    `distances` are between board centre and camera. A board that must be detected as a `whole` is moved
+    towards the image centre until it is completely visible.
     """
     found = []
     steps = STEPS_TO_MIDDLE if whole else STEPS_TO_MIDDLE[:1]
@@ -141,9 +141,9 @@ def views_towards(
     tilts: Collection[str] = TILTS,
     turns: Collection[str] = TURNS,
 ) -> list[Candidate]:
-    """Return views, board -> camera, with the middle of the board in a direction (3,), called `place`."""
+    """Return views, board -> camera, with the board centre in a direction (3,)."""
     found, middle = [], middle_of(board.places)
-    # The shortest rotation that turns z, the normal of the board, to the direction
+    # The shortest rotation from z, the board normal, to the direction
     axis = np.cross([0.0, 0.0, 1.0], towards)
     sine = float(np.linalg.norm(axis))
     vector = axis * np.arctan2(sine, towards[2]) / sine if sine > 0 else axis

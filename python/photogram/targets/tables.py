@@ -1,6 +1,6 @@
-"""Tables of a calibration, quantity by quantity: what text, page, JSON and CSV are written from.
+"""Tables of a calibration for text, page, JSON and CSV.
 
-Of splined lenses what is to be said of knots that hang on their priors, and of pixels beyond the knots.
+For splined lenses, they include knots determined by priors, and pixels beyond the knots.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _PIXELS = (Axis.of("px", "px"),)
 
 
 def views(calibrated: Calibrated) -> list[Quantity]:
-    """Return the views: pictures, corners used and left out, rms, redundancy, chi2, largest standardized."""
+    """Return the views with images, corners, rms, redundancy, chi2, largest residual."""
     corners, result = calibrated.calibration.corners, calibrated.result
     count, of_picture = corners.view_count, corners.views
     use = corners.use
@@ -57,13 +57,12 @@ def views(calibrated: Calibrated) -> list[Quantity]:
 
 
 def outlying_images(calibrated: Calibrated) -> Bools:
-    """Return (m,) which images are outliers of the verdict."""
+    """Return (m,) the images that are outliers of the verdict."""
     codes = {"test.images", "test.image_coordinates"}
     return _outlying(calibrated, codes, len(calibrated.result.residuals))
 
 
 def _outlying(calibrated: Calibrated, codes: Collection[str], count: int) -> Bools:
-    """Return (count,) which rows of kinds of observations are outliers of the verdict."""
     outliers = np.zeros(count, dtype=bool)
     for kind, places in calibrated.verdict.outlying.items():
         if isinstance(kind, Phrase) and kind.code in codes:
@@ -76,7 +75,7 @@ def _of_views(name: str, values: Floats | Indices, head: str, **how: Any) -> Qua
 
 
 def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
-    """Return the root mean squares of (m, 2) residuals over the corners of each view, or picture."""
+    """Return the root mean squares of (m, 2) residuals of each view or image."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.sqrt(_sums(view, residuals**2, count) / (2 * np.bincount(view, minlength=count)))
 
@@ -86,7 +85,7 @@ def _sums(view: Indices, values: Floats, count: int) -> Floats:
 
 
 def board_facts(calibrated: Calibrated) -> list[Fact]:
-    """Return what is to be said of the board, figure by figure."""
+    """Return facts on the board."""
     calibration = calibrated.calibration
     board, unit = calibration.board, calibration.board.unit
     found = [
@@ -120,7 +119,7 @@ _SHAPES = {
 
 
 def worst_points(calibrated: Calibrated) -> list[str]:
-    """Return the points of the board that are outliers of the verdict, in sentences, largest first."""
+    """Return the board points that are outliers of the verdict, largest first."""
     result = calibrated.result
     if calibrated.calibration.shape != "points":
         return []
@@ -141,21 +140,21 @@ STRETCHES = ("scale x", "scale y", "shear")
 
 @dataclass(frozen=True, eq=False)
 class BoardFit:
-    """The adjusted points of a board against their nominal places."""
+    """Adjusted points of a board relative to their nominal coordinates."""
 
     plane: Floats  # (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points
-    rms_out_of_plane: float  # Of z about it, in the unit of the board
-    # (3,) in ppm, with standard deviations: by how much the spacing along x and along y is longer than
-    # it should be, and the sine of what the angle between columns and rows lacks of 90 degrees
+    rms_out_of_plane: float  # Root mean square of z about the plane, in the unit of the board
+    # (3,) in ppm, with standard deviations: relative excess of the spacing along x and y. The third is the
+    # sine of the angle deficit of columns and rows to 90 degrees
     stretch: Floats
     sd: Floats
 
 
 def board_fit(calibrated: Calibrated) -> BoardFit | None:
-    """Return what was found of the board; None where its points were held, or fewer than four were seen.
+    """Return the fit of a board with at least four estimated points, or None.
 
-    The adjusted places are fitted to the nominal ones, (x, y) = t + M (X, Y), all points alike. With columns
-    m, n of M the stretches are |m| - 1, |n| - 1 and m'n.
+    The adjusted coordinates are fitted to the nominal ones, (x, y) = t + M (X, Y), with equal weights. With
+    columns m, n of M the stretches are |m| - 1, |n| - 1 and m'n.
     """
     result, board = calibrated.result, calibrated.calibration.board
     seen = np.flatnonzero(result.used_points)
@@ -182,7 +181,7 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
 
 
 def prior_shift(calibrated: Calibrated) -> list[Quantity]:
-    """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors."""
+    """Return parameter changes by priors, absolute and relative to the sd."""
     before = calibrated.unregularised
     if before is None:
         return []
@@ -203,23 +202,23 @@ def prior_shift(calibrated: Calibrated) -> list[Quantity]:
     ]
 
 
-MIN_PRIOR_REDUNDANCY = 0.05  # the value of a knot with less comes from its prior
+MIN_PRIOR_REDUNDANCY = 0.05  # a knot with less redundancy is determined by its prior
 
 
 @dataclass(frozen=True)
 class Spline:
-    """What is to be said of the knots of a splined lens."""
+    """Statistics of the knots of a splined lens."""
 
     camera: str
     knots: int  # number of unknown knots
-    from_prior: int  # number of unknown knots whose values come from their priors
+    from_prior: int  # number of unknown knots whose values are determined by their priors
     untouched: int  # number of unknown knots without an image
-    beyond: float | None  # the share of the picture beyond the knots; None if its size is unknown
-    fov_x_deg: int | None  # the field with which no pixel is beyond; None if no pixel is
+    beyond: float | None  # fraction of the image beyond the knots; None if the image size is unknown
+    fov_x_deg: int | None  # the field with all pixels within the knots; None if this already holds
 
     @property
     def lines(self) -> list[str]:
-        """The same in sentences."""
+        """The statistics as sentences."""
         found = [
             f"{self.camera}: {self.from_prior} of {self.knots} knots are from their prior (redundancy below"
             f" {MIN_PRIOR_REDUNDANCY:g}); {self.untouched} of them no image touches"
@@ -237,7 +236,7 @@ class Spline:
 
 
 def splines(calibrated: Calibrated) -> list[Spline]:
-    """Return what is to be said of each splined lens."""
+    """Return the knot statistics of each splined lens."""
     found = []
     for number, each in enumerate(calibrated.cameras):
         if each.camera.knots is None:
@@ -269,7 +268,6 @@ def _from_prior(calibrated: Calibrated, number: int) -> int:
 
 
 def _touched(calibrated: Calibrated, number: int) -> int:
-    """Return how many knots of a camera the image of a corner touches."""
     camera = calibrated.cameras[number].camera
     corners = calibrated.calibration.corners
     poses = calibrated.picture_poses[corners.picture]
@@ -281,7 +279,7 @@ def _touched(calibrated: Calibrated, number: int) -> int:
 
 
 def _beyond(calibrated: Calibrated, number: int) -> tuple[float | None, int | None]:
-    """Return which share of the picture lies beyond the knots, and the field that would do."""
+    """Return the image fraction beyond the knots, and a sufficient field."""
     size = calibrated.calibration.corners.sizes[number]
     if size is None:
         return None, None

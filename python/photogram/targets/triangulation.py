@@ -1,12 +1,12 @@
-"""Points from the images of several cameras in one housing, with the errors of their calibration.
+"""Triangulation by several cameras of one housing, with calibration errors.
 
-The point X of axes of camera 0 has the least squares of the residuals of its images q. With J and C the
-partials of the images by X and by the common unknowns b, it depends on both by
+The point X in axes of camera 0 minimises the sum of squares of the residuals of its image points q. With J
+and C the partials of the image points by X and by the common unknowns b,
 
     dX = (J'J)^-1 J' dq + E db,      E = -(J'J)^-1 J' C.
 
-Errors of pixels are those of each point alone, sigma^2 (J'J)^-1; those of the calibration, E Q E', all points
-have in common: no mean of many points is free of them.
+Pixel errors are independent between points, sigma^2 (J'J)^-1. Calibration errors, E Q E', are common to all
+points: averaging many points does not reduce them.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ from photogram.targets.vision import imaged, motion_partials, rays
 from photogram.words import phrase
 
 STEPS = 30
-TOLERANCE = 1e-12  # in distances of the point
+TOLERANCE = 1e-12  # relative to the distance of the point
 
 
 @dataclass(frozen=True, eq=False)
 class Triangulated:
-    """Points with the two parts of their covariance.
+    """Triangulated points with both parts of their covariance.
 
     Attributes
     ----------
     points
-        (n, 3) in the axes of camera 0, in the unit of the board; NaN where rays do not meet in front.
+        (n, 3) in the axes of camera 0, in the unit of the board; NaN if rays do not intersect in front.
     residuals
-        (n, k, 2) measured less computed images, pixels.
+        (n, k, 2) measured minus computed image points, pixels.
     by_pixels
-        (n, 3, 3) covariances that errors of the pixels cause.
+        (n, 3, 3) covariances due to pixel errors.
     by_calibration
-        (3 n, 3 n) covariance of all points together that errors of the calibration cause.
+        (3 n, 3 n) joint covariance of all points due to calibration errors.
     """
 
     points: Floats
@@ -56,12 +56,12 @@ class Triangulated:
 
     @property
     def distances(self) -> Floats:
-        """(n,) from the centre of camera 0."""
+        """(n,) distances from the centre of camera 0."""
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
     @property
     def sd_of_distances(self) -> Floats:
-        """(n, 2) along the rays of camera 0: by pixels, and by the calibration."""
+        """(n, 2) sd along the rays of camera 0, from pixel and calibration errors."""
         count = len(self.points)
         along = self.points / self.distances[:, np.newaxis]
         own = self.by_calibration.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
@@ -70,7 +70,7 @@ class Triangulated:
 
     @property
     def covariance(self) -> Floats:
-        """(3 n, 3 n) of all points together, both parts."""
+        """(3 n, 3 n) joint covariance of all points, both parts."""
         found, count = self.by_calibration.copy(), len(self.points)
         blocks = found.reshape(count, 3, count, 3)
         blocks[np.arange(count), :, np.arange(count)] += self.by_pixels
@@ -80,11 +80,11 @@ class Triangulated:
 def triangulated(
     housing: Housing, cameras: Sequence[int], pixels: Floats, pixel_sd: float, still: Floats | None = None
 ) -> Triangulated:
-    """Return points by their (n, k, 2) images in k cameras of a housing, 2 or more, by their numbers.
+    """Return points from image points (n, k, 2) in k cameras of a housing, k >= 2.
 
-    `pixel_sd` is that of an image coordinate. Where points are fixed to the housing, `still` is (6, c + 6)
-    the motion of the axes of camera 0 that goes with the unknowns
-    (:func:`~photogram.targets.projection.housing_rows`); None: they are in the axes of camera 0 themselves.
+    `pixel_sd` is the sd of an image coordinate. `still` (6, c + 6) is the motion of the axes of camera 0 with
+    the unknowns (:func:`~photogram.targets.projection.housing_rows`) for points fixed to the housing. None:
+    points are fixed to the axes of camera 0.
     """
     points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
     residuals, by_point, by_common = _rows(housing, cameras, pixels, points)
@@ -101,7 +101,7 @@ def triangulated(
 
 
 def _met(housing: Housing, cameras: Sequence[int], pixels: Floats) -> Floats:
-    """Return (n, 3) the points that are nearest to all rays: sum (I - r r') (X - O) = 0."""
+    """Return (n, 3) points nearest to all rays: sum (I - r r') (X - O) = 0."""
     normal, right = np.zeros((len(pixels), 3, 3)), np.zeros((len(pixels), 3))
     for number, camera in enumerate(cameras):
         turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
@@ -113,7 +113,7 @@ def _met(housing: Housing, cameras: Sequence[int], pixels: Floats) -> Floats:
 
 
 def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats) -> Floats:
-    """Return the points of least squares; NaN where steps do not end."""
+    """Return the least-squares points; NaN without convergence."""
     moved = np.full(len(points), np.inf)
     for _ in range(STEPS):
         residuals, by_point, _ = _rows(housing, cameras, pixels, points)
@@ -131,7 +131,7 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
 def _rows(
     housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return (n, 2 k) observed less computed, and partials by points (n, 2 k, 3) and unknowns (n, 2 k, c)."""
+    """Return (n, 2 k) misfits, partials (n, 2 k, 3) by points, (n, 2 k, c) by unknown."""
     parts = [housing.linearized(camera, points) for camera in cameras]
     xy, by_point, by_common = (np.stack(each, axis=1) for each in zip(*parts, strict=True))
     shape = len(points), 2 * len(cameras)
@@ -143,7 +143,6 @@ def _rows(
 
 
 def _inverted(matrices: Floats) -> Floats:
-    """Return inverses; NaN of what has none."""
     rows = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
     rows = rows[np.linalg.cond(matrices[rows]) < 1 / np.finfo(float).eps]
     found = np.full_like(matrices, np.nan)
@@ -157,24 +156,24 @@ Axes = Literal["axes", "corners"]
 def triangulate(
     result: Calibrated, cameras: Sequence[int | str], pixels: ArrayLike, pixel_sd: float, datum: Axes = "axes"
 ) -> Triangulated:
-    """Return points by their images in cameras of a rig, with both parts of their covariance.
+    """Triangulate points from image points of a rig, with both covariance parts.
 
     Parameters
     ----------
     result, cameras
-        The adjusted calibration of a rig, and k of its cameras: numbers or names.
+        Adjusted calibration of a rig, and k of its cameras: numbers or names.
     pixels
-        (n, k, 2) images of n points, from 0 at the centre of the first pixel.
+        (n, k, 2) image points of n points, from 0 at the centre of the first pixel.
     pixel_sd
         Standard deviation of an image coordinate, pixels.
     datum
-        `axes`: points are in the axes of camera 0 of the rig, which distances do not depend on. `corners`:
-        they are fixed to the housing, as the corners of all cameras hold it.
+        `axes`: points refer to the axes of camera 0, which does not affect distances. `corners`: points refer
+        to the housing, defined by the corners of all cameras.
 
     Raises
     ------
     InputError
-        Cameras that are not on a rig, fewer than two, one twice; other shapes.
+        If cameras are not on one rig, are fewer than two, or repeat, or if arrays have other shapes.
     """
     housing, numbers = _of_rig(result, cameras)
     where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
@@ -191,25 +190,25 @@ def distance_uncertainty(
     pixel_sd: float,
     grid: tuple[int, int] = (30, 20),
 ) -> tuple[Floats, Triangulated]:
-    """Return how uncertain distances are over the picture of the first camera, at a depth along its axis.
+    """Compute distance uncertainties over the image of the first camera at a depth.
 
     Parameters
     ----------
     result, cameras, pixel_sd
-        As of :func:`triangulate`.
+        As in :func:`triangulate`.
     depth
-        Of the points along the axis of the first camera, in the unit of the board.
+        Depth of the points along the axis of the first camera, in the unit of the board.
     grid
-        Pixels across and down.
+        Number of pixels across and down.
 
     Returns
     -------
-    (n, 2) pixels of the first camera that all others see, too, and the points.
+    (n, 2) pixels of the first camera whose points are visible in all others, and the points.
 
     Raises
     ------
     InputError
-        As of :func:`triangulate`; pictures whose size nobody knows, a depth that is not positive.
+        As in :func:`triangulate`, or if an image size is unknown, or if the depth is not positive.
     """
     if not 0 < depth < np.inf:
         raise argument_error("depth", "positive", value=depth)

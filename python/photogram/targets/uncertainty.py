@@ -1,4 +1,4 @@
-"""How uncertain a calibrated camera is: at pixels, over its picture, against distance; how two differ."""
+"""Uncertainty of a calibrated camera at pixels, over its image and with distance; differences."""
 
 from __future__ import annotations
 
@@ -32,32 +32,33 @@ def projection_uncertainty(
     datum: DatumName = "corners",
     noise_only: bool = False,
 ) -> Floats:
-    """Return how far off a camera images points that stay fixed to its housing (docs/targets.md).
+    """Compute the projection uncertainty of points fixed to the camera housing.
+
+    See docs/targets.md.
 
     Parameters
     ----------
     result, camera
         The adjusted calibration, and one of its cameras: number or name.
     pixels
-        (n, 2) where, from 0 at the centre of the first pixel.
+        (n, 2) pixels, from 0 at the centre of the first pixel.
     distance
-        Of the points from the centre of this camera, in the unit of the board; infinite: directions.
+        Distance of the points from the camera centre, in the unit of the board; infinite: directions.
     datum
-        What holds still: `corners`, where the camera has seen them; `mean-frames`, the mean of the boards, as
-        mrcal has it; `image`, rays of the whole picture at this distance; `axes`, those of the camera.
+        Fixed reference: `corners`, the observed corners of the camera; `mean-frames`, the mean of the boards,
+        as in mrcal. `image`, rays of the whole image at this distance; `axes`, the camera axes.
     noise_only
-        Whether the errors of the corners alone count, and not those of priors, as mrcal has it. It falls
-        where only priors hold the lens.
+        Whether to include only corner errors and no prior errors, as in mrcal. The result is too small for
+        lens parts determined only by priors.
 
     Returns
     -------
-    (n, 2, 2) covariances, square pixels, scaled by the variance of unit weight; NaN where a pixel sees
-    nothing.
+    (n, 2, 2) covariances, square pixels, scaled by the variance of unit weight; NaN for undefined pixels.
 
     Raises
     ------
     InputError
-        A camera that there is not, a distance that is not positive, other shapes.
+        If the camera does not exist, if the distance is not positive, or if arrays have other shapes.
     """
     where = shaped("pixels", pixels, (length("pixels", pixels), 2))
     number = camera_number(result, camera)
@@ -73,7 +74,7 @@ def projection_uncertainty(
     found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
     seen = result.cameras[number].camera
     if seen.knots is not None:
-        # Beyond the knots the polynomials at the edge go on, and nobody knows them.
+        # Beyond the knots the edge polynomials are extrapolated with unknown errors.
         found[beyond_knots(seen.parameters, seen.rays(where))] = np.nan
     return found
 
@@ -88,21 +89,21 @@ def uncertainty_map(
     noise_only: bool = False,
     model: str = "not tested against other views",
 ) -> UncertaintyMap:
-    """Return the uncertainty of projection over the picture of a camera.
+    """Compute the projection uncertainty over the image of a camera.
 
     Parameters
     ----------
     result, camera, distance, datum, noise_only
-        As of :func:`projection_uncertainty`.
+        As in :func:`projection_uncertainty`.
     grid
-        Pixels across and down, from edge to edge.
+        Number of pixels across and down, from edge to edge.
     model
-        What is known of the model of the lens: the verdict of :func:`cross_validate`.
+        Verdict of :func:`cross_validate` on the lens model.
 
     Raises
     ------
     InputError
-        As of :func:`projection_uncertainty`; pictures whose size nobody knows.
+        As in :func:`projection_uncertainty`, or if the image size is unknown.
     """
     number = camera_number(result, camera)
     size = size_of(result, number)
@@ -133,21 +134,21 @@ def uncertainty_against_distance(
     datum: DatumName = "corners",
     noise_only: bool = False,
 ) -> UncertaintyCurve:
-    """Return the uncertainty of projection of a pixel at several distances.
+    """Compute the projection uncertainty of a pixel at several distances.
 
     Parameters
     ----------
     result, camera, datum, noise_only
-        As of :func:`projection_uncertainty`.
+        As in :func:`projection_uncertainty`.
     pixel
         Column and row.
     distances
-        (n,) from the centre of the camera; infinite: directions.
+        (n,) distances from the camera centre; infinite: directions.
 
     Raises
     ------
     InputError
-        As of :func:`projection_uncertainty`.
+        As in :func:`projection_uncertainty`.
     """
     number = camera_number(result, camera)
     place = shaped("pixel", pixel, (2,))
@@ -167,7 +168,10 @@ def uncertainty_against_distance(
 
 
 def checked_distance(distance: float) -> float:
-    """Return a distance; an InputError where it is not positive."""
+    """Return a distance.
+
+    InputError: if it is not positive.
+    """
     if not distance > 0:
         raise argument_error("distance", "positive", value=distance)
     return float(distance)
@@ -184,33 +188,33 @@ def difference(
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
 ) -> CameraDifference:
-    """Compare two calibrations: where they image the same points, the motion of their axes out.
+    """Compare the projections of two calibrations without the motion of their axes.
 
     Parameters
     ----------
     a, b
-        Adjusted calibrations, or cameras alone, of which no uncertainty is known.
+        Adjusted calibrations, or cameras without uncertainty.
     distance
-        At which they are compared, one or several, from the centre of camera a in the unit of its board.
-        Infinite: only a rotation lies between them. One finite distance leaves the translation arbitrary.
+        Distances of comparison, one or several, from the centre of camera a in the unit of its board. At
+        infinity, only a rotation is fitted. One finite distance leaves the translation arbitrary.
     camera
-        Which camera of calibrations: number or name.
+        Camera of calibrations: number or name.
     size
-        Width and height of the pictures of a; None: as its calibration says.
+        Image width and height of a; None: from its calibration.
     criterion
-        `pixels`: least squares of the differences, weighted by the uncertainties where both are known.
-        `mrcal`: least fourth powers of angles between rays.
+        `pixels`: least squares of the differences, weighted by the uncertainties if both are known. `mrcal`:
+        least fourth powers of angles between rays.
     radius
-        Pixels about the middle of the picture that the motion is fitted to; None: all, weighted, or a sixth
-        of the shorter side where uncertainties are not known.
+        Radius about the image centre of the pixels for the motion fit. None: all, weighted, or a sixth of the
+        shorter side if uncertainties are unknown.
     grid
-        Pixels across and down.
+        Number of pixels across and down.
 
     Raises
     ------
     InputError
-        Neither a calibration nor a camera, a size that nobody knows, a distance that is not positive,
-        cameras that see too little in common.
+        If an argument is neither a calibration nor a camera, or if the image size is unknown. If a distance
+        is not positive, or if the cameras have too few common pixels.
     """
     distances = [distance] if isinstance(distance, float | int) else list(distance)
     if not distances:

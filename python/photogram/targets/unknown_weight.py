@@ -1,4 +1,4 @@
-"""Results whose standard deviations of corners are ratios alone."""
+"""Results whose corner standard deviations are only ratios."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from photogram.words import phrase
 
 
 class UnknownWeight(Result):
-    """A result without a global test."""
+    """Result without a global test."""
 
     KNOWN: ClassVar[bool] = False
 
@@ -29,12 +29,12 @@ class UnknownWeight(Result):
 
 
 def with_unknown_weight(result: Result) -> Result:
-    """Return a result as one whose unit weight is unknown."""
+    """Return a copy of a result with unknown unit weight."""
     return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
 
 
 def deviation_of_corners(result: Result) -> float:
-    """Return the ratio of the standard deviation of corners by their residuals to the given one."""
+    """Return the ratio of the corner sd from residuals to the given one."""
     used = result.used_images
     weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
     return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))

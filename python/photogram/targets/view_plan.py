@@ -1,4 +1,4 @@
-"""Which views of a board to take before there is a picture: by what each adds to a nominal camera."""
+"""Planning of board views before images exist, by their effect on a nominal camera."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from photogram.words import phrase
 
 __all__ = ["plan_views"]
 
-BOARD_OF_PICTURE = (0.9, 0.6, 0.4)  # longer side of the board over the shorter side of the picture
+BOARD_OF_PICTURE = (0.9, 0.6, 0.4)  # ratio of the longer side of the board and the shorter side of the image
 FIRST_TILTS = tuple(name for name in TILTS if name)
 MODEL = "planned: the lens is taken for one of this model"  # in titles of maps
 
@@ -48,37 +48,37 @@ def plan_views(
     away: Sequence[float] = (),
     progress: Callable[[str], None] | None = None,
 ) -> ViewPlan:
-    """Plan the views of a board that calibrate a camera, and predict its uncertainty; without any picture.
+    """Plan views of a board that calibrate a camera, and predict its uncertainty.
 
-    The first four show the board in the middle of the picture, tilted to all sides. Each further one is that
-    of which the largest standard deviation over the picture becomes smallest, in the datum `corners`.
+    Images are not needed. The first four views show the board in the image centre, tilted to all sides. Each
+    further view minimises the largest standard deviation over the image, in the datum `corners`.
 
     Parameters
     ----------
     camera
-        The nominal one (:func:`nominal_camera`, or one like it that has been calibrated): what is free in it
-        is what the calibration would find.
+        Nominal camera (:func:`nominal_camera`, or a similar calibrated one). Its free parameters are the
+        unknowns of the calibration.
     board, size
-        The board, and width and height of the pictures.
+        The board, and image width and height.
     distances
-        Of maps, in the unit of the board; views are chosen for the first. None: infinity, and the median
-        distance of the views.
+        Distances of maps, in the unit of the board; views are chosen for the first. None: infinity, and the
+        median distance of the views.
     sd0
         Standard deviation of a corner, pixels.
     views
-        How many there are at the most.
+        Maximum number of views.
     need
-        The largest standard deviation over the picture, pixels, with which no further view is planned.
+        Required standard deviation over the image, pixels, at which planning stops.
     away
-        Distances at which the board may be held, in its unit. None: those at which its longer side takes 0.9,
-        0.6 and 0.4 of the shorter side of the picture.
+        Possible board distances, in its unit. None: its longer side covers 0.9, 0.6 and 0.4 of the shorter
+        image side.
     progress
-        Is told what is computed.
+        Called with the current step.
 
     Raises
     ------
     InputError
-        Fewer than four views, values that are none, a board that the picture cannot show.
+        If there are fewer than four views, if values are invalid, or if the board is not visible in an image.
     """
     if whole_number("views", views) < len(FIRST_TILTS):
         raise argument_error("views", "least", low=len(FIRST_TILTS), value=views)
@@ -118,7 +118,6 @@ def plan_views(
 def _predicted(
     camera: Camera, board: Board, size: tuple[int, int], sd0: float, views: Sequence[Candidate]
 ) -> Calibrated:
-    """Return what views would give: the calibration by their corners, which have no errors."""
     shown = [shown_of(camera, np.array(size), transformed(each.pose, board.places)) for each in views]
     for each, (points, _) in zip(views, shown, strict=True):
         if not len(points):

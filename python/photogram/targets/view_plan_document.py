@@ -1,4 +1,4 @@
-"""The document of a plan of views."""
+"""Document of a plan of views."""
 
 from __future__ import annotations
 
@@ -96,12 +96,12 @@ PANELS_PER_ROW, PANEL_INCHES = 4, 2.2
 
 
 def plot_planned_views(plan: ViewPlan) -> Plot:
-    """Plot where the corners of the board are in each picture; the point 0 is red where it is shown.
+    """Plot the corners of the planned board views in the image, with point 0 in red.
 
     Parameters
     ----------
     plan
-        The plan.
+        Plan of views.
     """
     corners = plan.calibrated.calibration.corners
     (size,) = corners.sizes

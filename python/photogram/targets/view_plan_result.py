@@ -1,4 +1,4 @@
-"""A plan of views of a board: which to take, and the uncertainty of the camera that they promise."""
+"""Plan of board views, with the predicted uncertainty of the camera."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PlannedView:
-    """A view to take.
+    """Planned view of the board.
 
     Attributes
     ----------
     candidate
-        Where the board is to be held, in words, and its pose: board -> camera.
+        Board position in words, and its pose: board -> camera.
     corners
-        How many the picture shows.
+        Number of corners in the image.
     largest
-        Largest standard deviation over the picture with this view and those before it, pixels; NaN of the
+        Largest standard deviation over the image with this view and the previous ones, pixels; NaN for the
         first three.
     """
 
@@ -38,19 +38,19 @@ class PlannedView:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ViewPlan(Brief, Documented):
-    """Views of a board that are to calibrate a camera, none of which has been taken.
+    """Planned views of a board for the calibration of a camera.
 
     Attributes
     ----------
     calibrated
-        The calibration as it would be adjusted, by corners without errors; its `calibration` has the corners
-        and poses, its `worth` the maps. Covariances are those a priori, residuals mean nothing.
+        Predicted calibration with error-free corners. Its `calibration` has the corners and poses, its
+        `worth` the maps. Covariances are a priori, residuals are meaningless.
     views
-        In the order in which they help most.
+        Views in order of benefit.
     distance
-        Of the map for which they were chosen, in the unit of the board; infinite: directions.
+        Distance of the map used for the choice, in the unit of the board; infinite: directions.
     need
-        Largest standard deviation over the picture that was asked for, pixels; 0: none was.
+        Required standard deviation over the image, pixels; 0: no requirement.
     """
 
     calibrated: Calibrated
@@ -60,23 +60,23 @@ class ViewPlan(Brief, Documented):
 
     @property
     def maps(self) -> tuple[UncertaintyMap, ...]:
-        """Predicted maps of uncertainty."""
+        """Predicted uncertainty maps."""
         worth = self.calibrated.worth
         return () if worth is None else worth.maps
 
     @property
     def largest(self) -> float:
-        """Largest standard deviation over the picture after all views, pixels."""
+        """Largest standard deviation over the image after all views, pixels."""
         return self.views[-1].largest
 
     @property
     def enough(self) -> bool:
-        """Whether the views do what was asked for."""
+        """Whether the views meet the requirement."""
         return not self.need or self.largest <= self.need
 
     @property
     def headline(self) -> str:
-        """What the plan promises, in a sentence."""
+        """Predicted accuracy in one sentence."""
         at = distance_text(self.distance, self.calibrated.calibration.board.unit)
         said = f"{counted(len(self.views), 'view')}: largest standard deviation {self.largest:.2g} px {at}"
         if not self.need:
@@ -85,7 +85,7 @@ class ViewPlan(Brief, Documented):
 
     @property
     def sentences(self) -> list[str]:
-        """The views, in the order in which to take them, and what each of them brings."""
+        """Views in order, with the effect of each."""
         said, before = [], math.nan
         for each in self.views:
             brings = (
@@ -99,7 +99,7 @@ class ViewPlan(Brief, Documented):
 
     @property
     def assumed(self) -> list[str]:
-        """What the plan rests on, in sentences."""
+        """Assumptions of the plan, in sentences."""
         given = self.calibrated.calibration
         lens = given.cameras[0]
         (size,) = given.corners.sizes
@@ -112,7 +112,7 @@ class ViewPlan(Brief, Documented):
 
     @property
     def next(self) -> list[str]:
-        """What to do, in sentences."""
+        """Next steps, in sentences."""
         given = self.calibrated.calibration
         board, own = given.board, "--board board.toml"
         if board.kind == "chessboard":
@@ -131,13 +131,13 @@ class ViewPlan(Brief, Documented):
         ]
 
     def brief(self) -> tuple[str, Rows]:
-        """Return the plan in a few lines."""
+        """Return a short summary of the plan."""
         return f"Plan of {self.headline}", [
             (f"{number}", said) for number, said in enumerate(self.sentences, 1)
         ]
 
     def document(self) -> Document:
-        """Return the plan as a document; `docs/json.md` lists the members of its JSON form."""
+        """Return the plan as a document (JSON members: `docs/json.md`)."""
         from photogram.targets.view_plan_document import document
 
         return document(self)

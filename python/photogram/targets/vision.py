@@ -1,6 +1,6 @@
-"""Axes of computer vision (x right, y down, z forward): poses as photos of a block have them, and images.
+"""Vision axes (x right, y down, z forward): conversion of poses to photos of a block, and images.
 
-A pose is a (4, 4) matrix [R t; 0 1]: of a view, board -> camera 0; of a sensor, camera 0 -> camera k. Photos
+A pose is a (4, 4) matrix [R t; 0 1]: board -> camera 0 for a view, camera 0 -> camera k for a sensor. Photos
 have A = R'F and C = -R't, with F = diag(1, -1, -1). Steps of a pose are R <- Exp(w) R, t <- t + dt.
 """
 
@@ -31,30 +31,30 @@ def photo_poses(poses: Floats) -> tuple[Floats, Attitudes]:
 
 
 def vision_poses(positions: Floats, attitudes: Attitudes) -> Floats:
-    """Return (n, 4, 4) the poses of photos with the positions C and the attitudes A."""
+    """Return (n, 4, 4) the poses of photos with positions C and attitudes A."""
     return composed(attitudes.values("matrix_to_vision"), attitudes.translations(positions))
 
 
 def of_vectors(vectors: Floats) -> Floats:
-    """Return (n, 4, 4) poses of (n, 6) rotation vectors and translations, as OpenCV and mrcal have them."""
+    """Return (n, 4, 4) poses of (n, 6) rotation vectors and translations."""
     attitudes = Attitudes.of("rotation_vector_to_vision", vectors[:, :3])
     return composed(attitudes.values("matrix_to_vision"), vectors[:, 3:])
 
 
 def inverted(pose: Floats) -> Floats:
-    """Return (4, 4) the way back: [R' -R't; 0 1]."""
+    """Return the inverse (4, 4) of a pose: [R' -R't; 0 1]."""
     turned = pose[:3, :3].T
     return composed(turned, -turned @ pose[:3, 3])
 
 
 def sensor_pose(position: Floats, attitude: Floats) -> Floats:
-    """Return (4, 4) the pose frame -> sensor of one with the position c and the attitude A on its frame."""
+    """Return (4, 4) the pose frame -> sensor from position c and attitude A."""
     rotation = FLIP @ attitude.T @ FLIP
     return composed(rotation, -rotation @ FLIP @ position)
 
 
 def moved_by(pose: Floats, step: Floats) -> Floats:
-    """Return (4, 4) a pose after a small motion (dt, w) of all that it leads to: p <- Exp(w) p + dt."""
+    """Return (4, 4) a pose after a small motion (dt, w): p <- Exp(w) p + dt."""
     turn = _photocore.vector_rotations(step[np.newaxis, 3:])[0]
     return composed(turn @ pose[:3, :3], turn @ pose[:3, 3] + step[:3])
 
@@ -70,13 +70,13 @@ def cross_matrices(vectors: Floats) -> Floats:
 def view_steps(pose: Floats) -> Floats:
     """Return (6, 6) partials of dt, w by steps of the photo: C, and rho of A Exp(rho).
 
-    R Exp(-F rho) is what A Exp(rho) makes of R; t = -R C.
+    A Exp(rho) corresponds to R Exp(-F rho); t = -R C.
     """
     return _steps(pose, pose[:3, :3])
 
 
 def sensor_steps(pose: Floats) -> Floats:
-    """Return (6, 6) partials of dt, w by steps of a sensor on a frame: c, and rho of A Exp(rho).
+    """Return (6, 6) partials of dt, w by steps of a sensor: c, and rho of A Exp(rho).
 
     A = F R'F and c = -F R't, so that t = -R F c.
     """
@@ -96,33 +96,32 @@ TURNED: Floats = np.diag(FLIP)  # vision axes to photo axes (x right, y up, z ba
 
 @dataclass(frozen=True, eq=False)
 class Imaged:
-    """Images of n points with their partials; NaN where a point has none."""
+    """Projections of n points with their partials; NaN if undefined."""
 
     xy: Floats  # (n, 2) image coordinates
     by_point: Floats  # (n, 2, 3) by the point: Pi
-    # (n, 2, p) by the parameters of the camera that are unknown, in their order, then by its unknown
-    # knots: K
+    # (n, 2, p) by the unknown parameters of the camera, then by its unknown knots: K
     by_parameters: Floats
 
 
 def imaged(camera: Camera, points: Floats) -> Imaged:
-    """Return the images of (n, 3) points, or directions, in the axes of a camera, with their partials."""
+    """Return projections of (n, 3) points or directions in camera axes, with partials."""
     xy, by_u, by_parameters = camera.partials(points * TURNED)
     return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown_of(camera)])
 
 
 @dataclass(frozen=True, eq=False)
 class Touched:
-    """Images of n points by a lens of knots, with their partials by the k unknowns that each steps with."""
+    """Projections of n points by a splined lens, with partials by k unknowns each."""
 
-    xy: Floats  # As of :class:`Imaged`
+    xy: Floats  # As in :class:`Imaged`
     by_point: Floats
-    columns: Indices  # (n, k) which of the p parameters and knots that are unknown
-    by_columns: Floats  # (n, 2, k) by these
+    columns: Indices  # (n, k) indices among the p unknown parameters and knots
+    by_columns: Floats  # (n, 2, k) partials
 
 
 def touched(camera: Camera, points: Floats) -> Touched:
-    """Return what :func:`imaged` does of a lens of knots, without the zeros: an image has 16 or 9 knots."""
+    """Return :func:`imaged` of a splined lens without zeros (16 or 9 knots per point)."""
     assert camera.knots is not None
     unknown, count = unknown_of(camera), len(camera.names)
     u = points * TURNED
@@ -142,12 +141,12 @@ def touched(camera: Camera, points: Floats) -> Touched:
 
 
 def has_unknown_knots(camera: Camera) -> bool:
-    """Whether there are knots among what is unknown of a camera."""
+    """Return whether a camera has unknown knots."""
     return bool(unknown_of(camera)[len(camera.names) :].any())
 
 
 def unknown_of(camera: Camera) -> Bools:
-    """Return which parameters of a camera are unknown, and behind them which of its knots."""
+    """Return which parameters of a camera, followed by its knots, are unknown."""
     unknown = camera.deviations > 0
     if camera.knots is None:
         return unknown
@@ -158,19 +157,19 @@ def unknown_of(camera: Camera) -> Bools:
 
 
 def values_of(camera: Camera) -> Floats:
-    """Return the parameters of a camera, and behind them its knots."""
+    """Return the parameters of a camera, followed by its knots."""
     return camera.values if camera.knots is None else np.append(camera.values, camera.knots)
 
 
 def rays(camera: Camera, pixels: Floats) -> Floats:
-    """Return (n, 3) unit vectors, in the axes of a camera, to where (n, 2) pixels look; NaN without."""
+    """Return (n, 3) unit rays of (n, 2) pixels in camera axes; NaN if undefined."""
     return np.asarray(camera.rays(pixels) * TURNED)
 
 
 def motion_partials(points: Floats, finite: bool = True) -> Floats:
-    """Return (n, 3, 6) G = (I, -[p]x): what a motion (dt, w) of all points does to each of (n, 3).
+    """Return (n, 3, 6) G = (I, -[p]x), the effect of a motion (dt, w) on points.
 
-    Points at infinity, which are directions, do not feel the translation.
+    Points at infinity, which are directions, are not affected by the translation.
     """
     by_translation = np.broadcast_to(np.eye(3) if finite else np.zeros((3, 3)), (len(points), 3, 3))
     return np.concatenate([by_translation, -cross_matrices(points)], axis=2)

@@ -1,4 +1,4 @@
-"""Uncertainty of a calibration: maps, cross-validation, views to take next."""
+"""Assessment of a calibration: uncertainty maps, cross-validation, suggested views."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from photogram.words import Phrase
 
 @dataclass(frozen=True)
 class WorthOptions:
-    """What is asked of a calibration.
+    """Options of the assessment of a calibration.
 
     Attributes
     ----------
     distances
-        At which maps are drawn, in the unit of the board; none: infinity, and the boards' median distance.
+        Distances of the maps, in the unit of the board; empty: infinity, and the median distance of the
+        boards.
     datum, noise_only
-        Of maps.
+        Options of the maps.
     cross_validate
-        How views are split; None: they are not.
+        Type of split; None: without cross-validation.
     suggest
-        How many views to take next are looked for.
+        Number of suggested views.
     grid
-        Of maps, pixels across and down.
+        Grid of the maps, pixels across and down.
     """
 
     distances: Sequence[float] = ()
@@ -42,20 +43,20 @@ class WorthOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Worth:
-    """What a calibration is worth.
+    """Assessment of a calibration.
 
     Attributes
     ----------
     maps
-        Of each camera at each distance.
+        Uncertainty maps of each camera at each distance.
     cross
         Cross-validations, one for each housing.
     suggestions
-        Views to take next, for the first camera.
+        Suggested views for the first camera.
     differences
-        From another calibration, camera by camera.
+        Differences from another calibration, by camera.
     remarks
-        What could not be computed, and why.
+        Results that could not be computed, and reasons.
     """
 
     maps: tuple[UncertaintyMap, ...] = ()
@@ -66,12 +67,15 @@ class Worth:
 
     @property
     def largest(self) -> float:
-        """Largest standard deviation of all maps where the board was seen, pixels; NaN without maps."""
+        """Largest standard deviation of all maps in the observed board region, pixels.
+
+        NaN without maps.
+        """
         return max((each.largest for each in self.maps), default=math.nan)
 
     @property
     def sentences(self) -> list[str]:
-        """What a reader wants first, a line for each thing."""
+        """Summary of the assessment, one line per topic."""
         lines = []
         for camera in dict.fromkeys(each.camera for each in self.maps):
             maps = [each for each in self.maps if each.camera == camera]

@@ -1,4 +1,4 @@
-"""The text listing, page by page as the program of 1971 printed it."""
+"""Text listing with the page layout of the 1971 program."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ STAGES = {
 
 
 def listing(calibration: Calibration, run_date: str = "") -> str:
-    """Return the listing of a calibration; pages begin with a form feed, but for the first.
+    """Return the listing of a calibration, with form feeds between pages.
 
-    Where the options ask for the pages of the program, what goes beyond these is left out.
+    If the options request only the pages of the program, additional results are omitted.
 
     Parameters
     ----------
     calibration
         The calibration.
     run_date
-        What the title page says of the day of the run; nothing else depends on it.
+        Text for the run date on the title page; not used elsewhere.
     """
     pages = [title_page(calibration, run_date)]
     pages += [input_page(case) for case in calibration.cases]
@@ -70,7 +70,6 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
 
 
 def _case_pages(calibration: Calibration, case: CaseResult) -> list[list[str]]:
-    """Free, linear and polynomial adjustment of one case."""
     pages = [
         residual_page(
             f"CASE NUMBER {case.number} FREE ADJUSTMENT (ROTATION AND TRANSLATION)", case, case.free.residuals

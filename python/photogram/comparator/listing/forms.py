@@ -1,4 +1,4 @@
-"""Forms that several pages share, and the residuals of one case (subroutine VSPRINT; figures 16 to 25)."""
+"""Common forms of several pages, and the residuals of one case (subroutine VSPRINT; figures 16 to 25)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def centred(title: str) -> list[str]:
 
 
 def nearest(case: CaseResult) -> str:
-    """Return the line on the orientation of a case."""
+    """Return the orientation line of a case."""
     point = case.placed.orientation.nearest_point
     return f"GRID POINT {point} IS NEAREST THE COMPARATOR ORIGIN"
 

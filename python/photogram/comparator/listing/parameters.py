@@ -1,4 +1,4 @@
-"""Parameters of one case and of all, corrections, summary (figures 17 to 23 and 30), and what goes beyond."""
+"""Listing pages of parameters, corrections and summary (figures 17 to 23, 30), and additional pages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STAGES = 4  # lines of the analysis of variance with values of both axes
 
 
 def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[str]:
-    """Return scales and lack of orthogonality with their standard deviations and covariances."""
+    """Return scales and lack of orthogonality with their covariances."""
     (x, y, ratio, lean), sd, less_one = (column.values for column in linear(found, covariance).columns[1:])
     of_x, of_y, of_ratio = (f"{value:10.4f} MICRONS/METER" for value in less_one[:3])
     return [
@@ -42,7 +42,7 @@ def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[
 
 
 def polynomial_lines(polynomial: Polynomial, covariance: Floats) -> list[str]:
-    """Return the coefficients in metre units with standard deviations (one covariance for both axes)."""
+    """Return the coefficients in metre units with standard deviations."""
     (x, y), sd = polynomial.coefficients, np.sqrt(np.diag(covariance))
     lines = [
         "  CORRECTION = A X**4 + B Y**4 + C X**3 + D Y**3 + E X**2 + F Y**2 + G X + H Y + J   (METERS)",
@@ -55,7 +55,7 @@ def polynomial_lines(polynomial: Polynomial, covariance: Floats) -> list[str]:
 
 
 def case_linear_page(case: CaseResult) -> list[str]:
-    """Return the linear adjustment of one case."""
+    """Return the page of the linear adjustment of one case."""
     fit = case.linear
     own = fit.parameters
     return [
@@ -70,7 +70,7 @@ def case_linear_page(case: CaseResult) -> list[str]:
 
 
 def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str]:
-    """Return the polynomials of one case."""
+    """Return the page of the polynomials of one case."""
     return [
         *centred(f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"),
         nearest(case),
@@ -84,7 +84,7 @@ def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str
 
 
 def combined_linear_page(calibration: Calibration) -> list[str]:
-    """Return the combined linear adjustment."""
+    """Return the page of the combined linear adjustment."""
     combined = calibration.linear
     placements = [
         f"  CASE {case.number:3d}  ROTATION {angle(fit.rotation_rad)}   TRANSLATION"
@@ -103,7 +103,7 @@ def combined_linear_page(calibration: Calibration) -> list[str]:
 
 
 def combined_polynomial_page(calibration: Calibration) -> list[str]:
-    """Return the combined polynomials; without polynomials an empty page."""
+    """Return the page of the combined polynomials, empty without polynomials."""
     nonlinear = calibration.nonlinear
     if nonlinear is None:
         return []
@@ -125,9 +125,10 @@ ROWS = 9
 
 
 def table_nodes(centre_um: float) -> list[Floats]:
-    """Return the nodes of the program's table: nine rows of falling x, each (9, 2) or (5, 2) with falling y.
+    """Return the nodes of the program's table: nine rows of decreasing x.
 
-    The middle of the range of the comparator (TRANS) is theirs; they reach 0.1 m to either side.
+    Each row is (9, 2) or (5, 2) with decreasing y. The nodes are centred on the comparator range (TRANS) and
+    extend 0.1 m to either side.
     """
     steps = STEP_UM * np.arange(ROWS // 2, -(ROWS // 2) - 1, -1)
     rows = []
@@ -138,7 +139,7 @@ def table_nodes(centre_um: float) -> list[Floats]:
 
 
 def correction_table(calibration: Calibration, case: CaseResult | None = None) -> list[str]:
-    """Return the corrections at fixed places: of a case alone, else of the combined adjustment."""
+    """Return the corrections at fixed nodes, of a case or of the combined adjustment."""
     source = case.polynomial if case else calibration.nonlinear
     if source is None:
         return []
@@ -163,7 +164,7 @@ def correction_table(calibration: Calibration, case: CaseResult | None = None) -
 
 
 def summary_page(calibration: Calibration) -> list[str]:
-    """Return the summary: analysis of variance, linear parameters, polynomials."""
+    """Return the summary page: analysis of variance, linear parameters, polynomials."""
     session, combined, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
     operators = ", ".join(str(operator) for operator in calibration.pointing.operators)
     plates = ", ".join(str(plate) for plate in calibration.plates)
@@ -204,7 +205,7 @@ def variance_lines(calibration: Calibration) -> list[str]:
 
 
 def tests_page(calibration: Calibration) -> list[str]:
-    """Return the tests of polynomials and of case variances."""
+    """Return the page of tests of polynomials and of case variances."""
     lines = centred("TESTS OF SIGNIFICANCE")
     if calibration.polynomial_tests:
         lines += [*_polynomial(calibration.polynomial_tests), ""]
@@ -248,7 +249,7 @@ def _probability(value: float | None) -> str:
 
 
 def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
-    """Return the joint adjustment."""
+    """Return the page of the joint adjustment."""
     correction = joint.correction
     lines = [
         *centred("JOINT ADJUSTMENT OF CASES, COMPARATOR, POLYNOMIALS AND GRID"),

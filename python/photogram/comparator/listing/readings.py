@@ -1,4 +1,4 @@
-"""Title page, readings, close-outs, pointing precision, average residuals (figures 5 to 8, 13, 26 to 29)."""
+"""Listing pages of title, readings, pointing precision and averages (figures 5 to 8, 13, 26 to 29)."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from photogram.comparator.pointing import Precision
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, CaseResult, PlateResult
 
-COLUMNS = 3  # Readings in a line of the input listing
+COLUMNS = 3  # Readings per line of the input listing
 
 
-# Remarks of the program of 1971
+# Warnings of the program of 1971
 PRINTED = frozenset(f"comparators.{name}" for name in ("special-grid", "legs", "identical", "no-closeout"))
 
 
 def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
-    """Return the title page: plates, options, and problems where not only published pages are wanted."""
+    """Return the title page with plates, options and optional problems."""
     session = calibration.session
     left_handed = calibration.cases[0].placed.orientation.left_handed
     lines = centred(f"COMPARATOR CALIBRATION - photogram {_photocore.__version__}")
@@ -55,13 +55,13 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
 
 
 def _printed(calibration: Calibration) -> list[str]:
-    """Return the remarks of the program itself, which are in capitals; that on placements has its page."""
+    """Return the warnings of the 1971 program in capitals."""
     remarks = [str(message.text).upper() for message in calibration.messages if message.code in PRINTED]
     return ["", *(f"  {text}" for text in remarks)] if remarks else []
 
 
 def _grid(grid: Grid, left_handed: bool) -> list[str]:
-    """Return the coordinates of a plate in the handedness of the comparator, as the program printed them."""
+    """Return the printed plate coordinates in the handedness of the comparator."""
     sigma = "-" if grid.sigma_um is None else f"{grid.sigma_um:.3f} MICRONS"
     head = f"MASTER GRID NUMBER {grid.number}   VALUES ADOPTED {grid.adopted or '-'}   STANDARD ERROR {sigma}"
     lines = [head, f"  {'POINT':>5}{'X MICRONS':>14}{'Y MICRONS':>14}"]
@@ -70,7 +70,7 @@ def _grid(grid: Grid, left_handed: bool) -> list[str]:
 
 
 def input_page(case: CaseResult) -> list[str]:
-    """Return the readings of a case as they were made, and the close-out."""
+    """Return the original readings of a case, and the close-out."""
     own = case.placed.case
     lines = [f"INPUT DATA CASE ORDER NUMBER {own.number}   PLATE {own.plate}   OPERATOR {own.operator}"]
     lines.append("  " + f"{'LEG':>3}{'POINT':>6}{'X':>12}{'Y':>12}    " * COLUMNS)
@@ -84,7 +84,6 @@ def input_page(case: CaseResult) -> list[str]:
 
 
 def _reading(value: float) -> str:
-    """Return a reading in micrometres, with the decimals that it has."""
     return f"{value:12.0f}" if value == round(value) else f"{value:12.2f}"
 
 
@@ -164,7 +163,7 @@ def _page(
 
 
 def _row(name: str, own: Precision, mean_x: float | None = None, mean_y: float | None = None) -> str:
-    """Return a line of eleven numbers, in the order of figure 7."""
+    """Return a line of eleven numbers in the order of figure 7."""
     single = "".join(number(value, 9, 3) for value in (*own.sd_um, own.sd_point_um))
     means = "".join(number(value, 13, 2) for value in (mean_x, mean_y))
     of_means = "".join(number(value, 9, 3) for value in (*own.mean_sd_um, own.mean_sd_point_um))
@@ -226,7 +225,7 @@ def averages_page(title: str, result: PlateResult) -> list[str]:
 
 
 def _elsewhere(place: LocationAverages) -> list[str]:
-    """Return the averages by location of the cases whose plate lay at another place."""
+    """Return the averages by location of cases with another plate position."""
     cases = " ".join(str(case) for case in place.cases)
     rows = zip(place.locations.tolist(), place.xy_um.tolist(), place.residuals_um.tolist(), strict=True)
     return [

@@ -1,4 +1,4 @@
-"""The correction over the range of the comparator: surfaces, and a grid distorted by it."""
+"""Plots of the correction: surfaces and a distorted grid."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from photogram.comparator.polynomial import Polynomial
 
 FINE = 121
-MAGNIFICATION = 10_000  # Of the net: a micrometre is drawn as 10 mm
+MAGNIFICATION = 10_000  # of the net: a micrometre is drawn as 10 mm
 
 
 def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
-    """Draw the corrections in x and in y as contour maps on one scale, with the places measured."""
+    """Draw contour maps of the corrections in x and y with the measured points."""
     centre, half = np.array(polynomial.frame.centre_um), np.array(polynomial.frame.half_range_um)
     x, y = np.linspace(centre - half, centre + half, FINE).T
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -50,9 +50,9 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: 
 
 
 def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
-    """Draw the program's net: lines through its 5 x 5 nodes, displaced 10,000 times the correction.
+    """Draw the program's 5 x 5 net, displaced by 10,000 times the correction.
 
-    Nodes and magnification are always the same, so that calibrations can be compared over the years.
+    Nodes and magnification are constant, for comparisons over the years.
     """
     nodes = np.array(table_nodes(calibration.session.centre_um)[::2])[:, ::2]
     corners = nodes[0, 0], nodes[-1, -1]

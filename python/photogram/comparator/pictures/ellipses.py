@@ -1,4 +1,4 @@
-"""Error ellipses of pointings (subroutine ELIPS, figures 9 to 12): of cases, operators, all, and pooled."""
+"""Error ellipses of pointings (subroutine ELIPS, figures 9 to 12)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from photogram.comparator.pointing import Ellipse, Precision
 
 LEVELS = " / ".join(str(percent) for percent in CONFIDENCE_FACTORS)
-STANDARD_PERCENT = 39  # Of the standard ellipse, which the program draws
+STANDARD_PERCENT = 39  # Confidence of the standard ellipse, which the program draws
 
 
 def pointing_ellipses(calibration: Calibration) -> Plot:
-    """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
+    """Draw the 39 percent ellipses of pointings at the measured points of each case."""
     places = [case.placed.means_um / MM for case in calibration.cases]
     ellipses = [
         [readings.precision.ellipse for readings in case.placed.readings] for case in calibration.cases
@@ -55,7 +55,7 @@ def pointing_ellipses(calibration: Calibration) -> Plot:
 
 
 def operator_ellipses(calibration: Calibration, operator: int) -> Plot:
-    """Draw the ellipses of the pointings of an operator, point by point over his cases, on the grid."""
+    """Draw the pointing ellipses of an operator, by point, on the grid."""
     points, total = calibration.pointing.operators[operator]
     own = [case for case in calibration.cases if case.placed.case.operator == operator]
     title = f"Pointings of operator {operator}, {len(own)} cases"
@@ -63,7 +63,7 @@ def operator_ellipses(calibration: Calibration, operator: int) -> Plot:
 
 
 def total_ellipses(calibration: Calibration) -> Plot:
-    """Draw the ellipses of all pointings, point by point, on the grid of the first plate."""
+    """Draw the ellipses of all pointings, by point, on the grid of the first plate."""
     pointing = calibration.pointing
     title = f"All pointings, {len(calibration.cases)} cases, {len(pointing.operators)} operators"
     plate = calibration.cases[0].placed.case.plate
@@ -91,7 +91,7 @@ def _on_grid(
 
 
 def pooled_ellipses(calibration: Calibration) -> Plot:
-    """Draw the pooled ellipses of every case, every operator and all, each at all levels, on one scale."""
+    """Draw the pooled ellipses of cases, operators and all pointings at all levels."""
     pointing = calibration.pointing
     pooled = [
         *((f"case {case.number}", case.placed.precision) for case in calibration.cases),
@@ -118,12 +118,12 @@ def pooled_ellipses(calibration: Calibration) -> Plot:
 
 
 def _scale(places_mm: Floats, largest_um: float) -> float:
-    """Return millimetres of the picture a micrometre: the largest ellipse fills half the spacing."""
+    """Return plot millimetres per micrometre for ellipses within half the spacing."""
     return 0.5 * spacing(places_mm) / largest_um if largest_um > 0 else 1.0
 
 
 def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, float]) -> list[Mark]:
-    """Return ellipses of each of some percents, and a star where a point has none."""
+    """Return ellipses of several percentages, and a star for each missing one."""
     semi_axes = np.array([[each.major_um, each.minor_um] for each in ellipses])
     turns = np.degrees([each.angle_rad for each in ellipses])
     marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]

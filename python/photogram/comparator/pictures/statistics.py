@@ -1,4 +1,4 @@
-"""Distribution of the residuals, components of the error."""
+"""Plots of the residual distribution and the error components."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def residual_histogram(calibration: Calibration) -> Plot:
-    """Draw histograms of the final residuals against the normal curve of their standard deviation."""
+    """Draw histograms of the final residuals with normal curves."""
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     limit = float(np.abs(residuals).max()) * 1.1 or 1.0
     edges = np.linspace(-limit, limit, _bins(len(residuals)) + 1)
@@ -44,7 +44,7 @@ def residual_histogram(calibration: Calibration) -> Plot:
 
 
 def _bins(count: int) -> int:
-    """Return an odd number of bins (so that one is about zero), growing with the root of the count."""
+    """Return an odd number of bins that grows with the root of the count."""
     return 2 * round(math.sqrt(count) * 0.75) + 1
 
 

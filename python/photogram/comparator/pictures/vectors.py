@@ -1,4 +1,4 @@
-"""Vector plots: residuals of each case in both systems, their averages, corrections of the grid."""
+"""Vector plots: residuals of each case in both systems, averages, grid corrections."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def comparator_vectors(calibration: Calibration) -> Plot:
-    """Draw the residuals of each case, after all corrections, in the system of the comparator."""
+    """Draw the final residuals of each case in the comparator system."""
     residuals = [fit.residuals for fit in calibration.last_fits]
     return _by_case(
         calibration,
@@ -34,7 +34,7 @@ def comparator_vectors(calibration: Calibration) -> Plot:
 
 
 def grid_vectors(calibration: Calibration) -> Plot:
-    """Draw the residuals of each case, after all corrections, in the system of its plate."""
+    """Draw the final residuals of each case in the plate system."""
     hands = [case.placed.orientation.left_handed for case in calibration.cases]
     return _by_case(
         calibration,
@@ -57,7 +57,7 @@ def _by_case(
 ) -> Plot:
     every = np.vstack(vectors)
     scale = magnification(places[0] / MM, every)
-    # The longest residual of all sets one scale for all panels.
+    # The longest residual of all panels defines their common scale.
     key = scale, round_length(float(np.hypot(*every.T).max()))
     limits = limits_of(np.vstack(places), every, scale)
     panels = [
@@ -101,7 +101,7 @@ def average_vectors(calibration: Calibration, plate: int) -> Plot:
 
 
 def joint_grid(calibration: Calibration, plate: int) -> Plot:
-    """Draw the corrections of the grid by the joint adjustment, with their standard ellipses."""
+    """Draw the grid corrections of the joint adjustment with standard ellipses."""
     joint = calibration.joint
     if joint is None:
         raise InputError(phrase("comparators.no-joint"))
@@ -110,7 +110,7 @@ def joint_grid(calibration: Calibration, plate: int) -> Plot:
     places = grid.xy_um[grid.rows_of(own.points)]
     ellipses = [Ellipse.of(c[0, 0], c[1, 1], c[0, 1]) for c in own.covariance_um2]
     largest = max(ellipse.major_um for ellipse in ellipses)
-    # Room for an arrow and the ellipse about its end.
+    # Space for an arrow and the ellipse at its end.
     scale = magnification(places / MM, own.corrections_um * (1 + largest / np.abs(own.corrections_um).max()))
     ends = places / MM + own.corrections_um * scale
     semi_axes = scale * np.array([[each.major_um, each.minor_um] for each in ellipses])
@@ -141,25 +141,25 @@ def plan(
     axes: tuple[str, str],
     key: tuple[float, float] | None = None,
 ) -> Panel:
-    """Return a map of equal scales; `key`: mm for a micrometre, and micrometres that are shown."""
+    """Return a map of equal scales; `key`: mm per micrometre, micrometres of the bar."""
     bars = [(key[0] * key[1], ACCENT, f"{key[1]:g} µm")] if key else []
     return Panel(limits, marks, title, *axes, equal=True, bars=bars)
 
 
 def magnification(places_mm: Floats, vectors_um: Floats) -> float:
-    """Return millimetres of the picture a micrometre: the longest vector almost spans the spacing."""
+    """Return plot millimetres per micrometre for vectors within 0.9 times the spacing."""
     longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
     return 0.9 * spacing(places_mm) / longest if longest > 0 else 1.0
 
 
 def spacing(places: Floats) -> float:
-    """Return how far places are apart, which fill a square."""
+    """Return the mean spacing of points that fill a square."""
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     return extent / max(math.sqrt(len(places)) - 1, 1)
 
 
 def arrows(places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> list[Mark]:
-    """Return vectors from places, `scale` millimetres of the picture for each micrometre."""
+    """Return vectors at points, `scale` plot millimetres per micrometre."""
     places = places_um / MM
     dots = Markers(places, ".", 5.0, FAINT, layer=1.0)
     return [dots, Arrows(places, vectors_um * scale, colour, 0.006)]

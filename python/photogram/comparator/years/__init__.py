@@ -1,4 +1,4 @@
-"""Calibrations over years: what changed, and the grids that all of them measured."""
+"""Comparison of calibrations over years, and of their common grids."""
 
 from photogram.comparator.years.comparison import Comparison, compare
 from photogram.comparator.years.record import RecordedCalibration, RecordedCase

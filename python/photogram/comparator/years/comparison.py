@@ -1,10 +1,10 @@
-"""Calibrations compared: histories of comparators, and the grids that all of them measured.
+"""Comparison of calibrations: histories of comparators, and common grids.
 
-What of a comparator is compared does not depend on where polynomials are counted. Scales and cubic terms
-share what they explain, and the frames of two calibrations differ: coefficients cannot be compared. In the
-range that all calibrations measured, the whole correction is taken apart into Legendre polynomials of x and
-of y, which are orthogonal there: those of first degree are the scales and the lack of orthogonality, those of
-degrees two to four the shape that is left (docs/comparator.md, Calibrations over years).
+The compared values do not depend on the origin of the polynomials. Coefficients cannot be compared because
+scales and cubic terms are correlated, and the frames of two calibrations differ. The whole correction is
+decomposed into Legendre polynomials of x and of y, which are orthogonal in the range of all calibrations. The
+first degree gives the scales and the lack of orthogonality, degrees two to four the remaining shape
+(docs/comparator.md, Calibrations over years).
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from photogram.statistics.history import History, dates_of, history
 from photogram.words import phrase
 
 DEGREE = 4
-NODES = 7  # In each direction: what is taken apart is a polynomial of fourth degree
+NODES = 7  # per direction; a polynomial of fourth degree is decomposed
 PPM = 1e6
 ARCSEC = math.radians(1 / 3600)
 PERCENT = 100.0
-# A comparator that is estimated to be better than this is without error: its logarithm says nothing
+# The error of a comparator with a smaller estimate is insignificant, and its logarithm meaningless
 LEAST_UM = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """Values (k, m) of k calibrations with their covariance (k, m, k, m), names and units."""
+    """Values (k, m) of k calibrations, covariance (k, m, k, m), names and units."""
 
     values: Floats
     covariance: Floats
@@ -52,7 +52,7 @@ class Quantities:
 
 
 def common_range(records: Sequence[RecordedCalibration]) -> Frame:
-    """Return the range of readings that all calibrations measured."""
+    """Return the range of readings of all calibrations."""
     identities = [each.correction.identity for each in records]
     low = np.max([each.low_um for each in identities if each], axis=0)
     high = np.min([each.high_um for each in identities if each], axis=0)
@@ -67,7 +67,7 @@ def quantities_of(
     covariance: Floats,
     frame: Frame,
 ) -> Quantities:
-    """Return what is compared of one comparator, over the range that its calibrations have in common."""
+    """Return comparable values of one comparator over its common range."""
     bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
     taken, names, units = _figures(frame, bent)
     nodes, apart = _apart(frame)
@@ -93,7 +93,7 @@ def quantities_of(
 
 
 def _apart(frame: Frame) -> tuple[Floats, Floats]:
-    """Return nodes (n, 2) and what takes displacements there apart: (9, n) for 1, P1..P4 of x, of y."""
+    """Return nodes (n, 2) and their decomposition (9, n) into 1, P1..P4 of x, of y."""
     one = np.polynomial.legendre.leggauss(NODES)[0]
     x, y = (each.ravel() for each in np.meshgrid(one, one))
     of_x, of_y = (np.polynomial.legendre.legvander(each, DEGREE) for each in (x, y))
@@ -103,13 +103,13 @@ def _apart(frame: Frame) -> tuple[Floats, Floats]:
 
 
 def _figures(frame: Frame, bent: bool) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
-    """Return the figures as linear forms of coefficients (9 of x, y: 18), with their names and units."""
+    """Return the values as linear forms of 18 coefficients, with names and units."""
     half_x, half_y = frame.half_range_um
 
     def at(term: int, axis: int) -> int:
         return 2 * term + axis
 
-    # Terms: 0 is 1, 1 to 4 are P1 to P4 of x, 5 to 8 those of y.
+    # Terms: 0 is 1, 1 to 4 are P1 to P4 of x, 5 to 8 are P1 to P4 of y.
     rows = np.zeros((3, 18))
     rows[0, at(1, 0)] = PPM / half_x
     rows[1, at(5, 1)] = PPM / half_y
@@ -127,10 +127,10 @@ def _figures(frame: Frame, bent: bool) -> tuple[Floats, tuple[str, ...], tuple[s
 
 
 def _precision(records: Sequence[RecordedCalibration]) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Return logarithms of standard deviations less their mean, in percent, and their variances.
+    """Return centred logarithms of standard deviations, percent, and variances.
 
-    A standard deviation from f degrees of freedom has a logarithm of variance 1 / (2 f). That of the
-    comparator itself is what pointings leave of the means, with the variance of both.
+    The logarithm of a standard deviation with f degrees of freedom has the variance 1 / (2 f). The comparator
+    variance is the variance of means minus the pointing part, and has the variances of both.
     """
     rows: dict[str, list[tuple[float, float]]] = {}
     if all(record.pointing_freedom > 0 and min(record.pointing_um) > 0 for record in records):
@@ -146,7 +146,6 @@ def _precision(records: Sequence[RecordedCalibration]) -> tuple[Floats, Floats, 
 
 
 def _variance(record: RecordedCalibration) -> float:
-    """Return the variance of the logarithm of the standard deviation of the comparator."""
     counts = np.concatenate([case.counts for case in record.cases])
     pointing = float(np.mean(np.square(record.pointing_um)) * (1 / counts).mean())
     return 0.5 / record.freedom * (1 + pointing / record.random_um**2) ** 2
@@ -154,22 +153,22 @@ def _variance(record: RecordedCalibration) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Documented, Judged, Brief):
-    """Calibrations over years.
+    """Comparison of calibrations over years.
 
     Attributes
     ----------
     calibrations
-        In the order of their days.
+        Calibrations in order of date.
     histories
-        Of every comparator with two calibrations or more, by its name.
+        History of every comparator with at least two calibrations, by name.
     ranges
-        The range of readings over which each was compared.
+        Compared range of readings of each comparator.
     together
-        The adjustment of all readings.
+        Joint adjustment of all readings.
     grids
-        The plates by their numbers, with the coordinates of all calibrations and their standard deviation.
+        Plates by number, with coordinates and standard deviation from all calibrations.
     operators
-        For each operator standard deviations of a pointing in x and y (um), and degrees of freedom.
+        For each operator: standard deviations of a pointing in x and y (um), and degrees of freedom.
     """
 
     calibrations: tuple[RecordedCalibration, ...]
@@ -181,15 +180,15 @@ class Comparison(Documented, Judged, Brief):
 
     @property
     def usable_grids(self) -> bool:
-        """Whether the readings agree with the grids: otherwise these are withheld."""
+        """Whether the readings agree with the grids; otherwise the grids are withheld."""
         return self.together.test.problem() is None
 
     def corrections(self) -> list[Correction]:
-        """Return the corrections of all calibrations as adjusted together, with their covariances."""
+        """Return the jointly adjusted corrections of all calibrations with covariances."""
         return _corrections(self.calibrations, self.together)
 
     def document(self) -> Document:
-        """Return the document of the comparison: changes, control charts, grids, all values."""
+        """Return the document with changes, control charts, grids and all values."""
         from photogram.comparator.years.document import comparison_document
 
         return comparison_document(self)
@@ -203,23 +202,23 @@ class Comparison(Documented, Judged, Brief):
 def compare(
     calibrations: Sequence[Calibration | RecordedCalibration | Path | str], *, level: float = LEVEL
 ) -> Comparison:
-    """Compare calibrations of one comparator or of several over time, and adjust their plates together.
+    """Compare comparator calibrations over time, and adjust their plates jointly.
 
     Parameters
     ----------
     calibrations
-        Calibrations, or JSON documents of them (`photogram comparator --json`), in any order; each has a date
-        and a joint adjustment.
+        Calibrations, or their JSON documents (`photogram comparator --json`), in any order. Each requires a
+        date and a joint adjustment.
     level
-        Probability that a change is found in a comparator where there is none.
+        Probability of a false detection of a change per comparator.
 
     Raises
     ------
     InputError
-        Fewer than two calibrations, one without date or joint adjustment, or the same twice; plates of one
-        number with other coordinates; ranges of readings that have nothing in common.
+        If there are fewer than two calibrations, one without date or joint adjustment, or the same one twice.
+        If plates of one number have other coordinates, or if ranges of readings do not overlap.
     AdjustmentError
-        The measurements do not determine the unknowns.
+        If the measurements do not determine the unknowns.
     """
     records: list[RecordedCalibration] = []
     for number, each in enumerate(calibrations, 1):
@@ -262,7 +261,7 @@ def _corrections(records: Sequence[RecordedCalibration], together: Together) -> 
         values, covariance = together.parameters[k], together.covariance[k, :, k, :]
         own = record.correction.polynomial
         polynomial = own and Polynomial(own.frame, values[3:].reshape(2, -1), own.scaled_cofactors)
-        # Symmetric but for rounding.
+        # Symmetric except for rounding.
         even = (covariance + covariance.T) / 2
         scale_x, scale_y, lean = values[:3].tolist()
         found.append(Correction(scale_x, scale_y, lean, polynomial, even, record.correction.identity))
@@ -277,7 +276,6 @@ def _history(
     frame: Frame,
     level: float,
 ) -> History:
-    """Compare the calibrations of one comparator."""
     mine = [records[k] for k in own]
     covariance = together.covariance[own][:, :, own]
     found = quantities_of(mine, [corrections[k] for k in own], covariance, frame)
@@ -301,7 +299,7 @@ def _history(
 
 
 def _certified(records: Sequence[RecordedCalibration], together: Together, plate: int) -> Grid:
-    """Return a plate as all calibrations have it."""
+    """Return a plate adjusted from all calibrations."""
     grid = together.grids[plate]
     days = [each.day.isoformat() for each in records if plate in each.grids]
     sigma = math.sqrt(float(np.diag(together.covariance_um2[plate]).mean()))
@@ -310,7 +308,6 @@ def _certified(records: Sequence[RecordedCalibration], together: Together, plate
 
 
 def _operators(records: Sequence[RecordedCalibration]) -> dict[int, tuple[float, float, int]]:
-    """Pool the variances of pointings of each operator over all calibrations."""
     sums: dict[int, Floats] = {}
     for record in records:
         for operator, (x, y, freedom) in record.operators.items():

@@ -1,4 +1,4 @@
-"""The document of calibrations over years (docs/comparator.md lists its members), and its verdict."""
+"""Document and verdict of calibrations over years (JSON members: docs/comparator.md)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def calibrations(comparison: Comparison) -> Table:
-    """Return the calibrations: names, days, what of, precision of comparator and pointings."""
+    """Return the calibrations with days, plates, and precisions."""
     found = comparison.calibrations
     plates = [", ".join(map(str, each.grids)) for each in found]
     celsius, squares = (Axis.of("", "°C"),), (Axis.of("", "um2"),)
@@ -42,7 +42,7 @@ def calibrations(comparison: Comparison) -> Table:
 
 
 def operators(comparison: Comparison) -> Table:
-    """Return the operators with the precision of their pointings in all calibrations."""
+    """Return the operators with their pointing precision in all calibrations."""
     values = np.array([*comparison.operators.values()]).reshape(-1, 3)
     pointing, freedom = values[:, :2], values[:, 2].astype(int)
     head = "sd of a pointing in {}"
@@ -69,7 +69,7 @@ def points(comparison: Comparison, plate: int) -> Table:
 
 
 def comparison_findings(comparison: Comparison) -> Findings:
-    """Return the tests of a comparison: of all readings, and of what should not have changed."""
+    """Return the tests of a comparison: all readings, and changes over time."""
     places = [
         (record.name, case.number, point, axis)
         for record in comparison.calibrations

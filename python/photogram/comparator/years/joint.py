@@ -1,14 +1,14 @@
-"""All readings of many calibrations in one adjustment: each has its comparator and cases, plates are common.
+"""Joint adjustment of many calibrations with separate comparators and cases, and common plates.
 
-Linear about the joint adjustments of the calibrations: a reading x of the grid point g (plate, in the
-handedness of the comparator) leaves
+Linear about the joint adjustments of the calibrations. A reading x of the grid point g (plate, in the
+handedness of the comparator) has the residual
 
-    v = -(M J)^-1 (M Q dp + M' C dtheta + dT - dg + w),   w = M C(x) + T - g,
+    v = -(M J)^-1 (M Q dp + M' C dtheta + dT - dg + w),   w = M C(x) + T - g.
 
-C the corrected reading with the partials J by the reading and Q by the parameters p, M the rotation and T the
-translation of the case. Parameters and cases of a calibration are eliminated, what is left are normal
-equations of the corrections of grid points, to which their given coordinates add 1 / sigma^2; what remains of
-common errors of plates between calibrations is in the covariance of their parameters.
+C is the corrected reading with the partials J by the reading and Q by the parameters p. M is the rotation and
+T the translation of the case. Parameters and cases of a calibration are eliminated. The result are normal
+equations of grid corrections, to which given coordinates add 1 / sigma^2. The covariance of the parameters
+contains the remaining errors common to several calibrations.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """The adjustment of all calibrations."""
+    """Result of the adjustment of all calibrations."""
 
-    parameters: list[Floats]  # For each calibration (21,) those of its correction
-    covariance: Floats  # (k, 21, k, 21) of all of them; zero where a parameter is held
-    grids: dict[int, Grid]  # The plates as they were given to the first calibration that has each
-    # For each plate (l, 2) adjusted less given coordinates, and (2 l, 2 l) of them, x and y of a point
-    # behind each other
+    parameters: list[Floats]  # Correction parameters (21,) of each calibration
+    covariance: Floats  # (k, 21, k, 21) covariance of all parameters; zero for fixed ones
+    grids: dict[int, Grid]  # Plates as given to the first calibration with each
+    # For each plate (l, 2) adjusted minus given coordinates, and their covariance (2 l, 2 l), ordered x, y
+    # per point
     corrections_um: dict[int, Floats]
     covariance_um2: dict[int, Floats]
-    # For each calibration and case (n, 2) residuals over their standard deviations, unit weight known
+    # For each calibration and case (n, 2) residuals over their standard deviations, a priori unit weight
     standardized: list[list[Floats]]
-    test: GlobalTest  # Of all residuals and corrections against their standard deviations
+    test: GlobalTest  # Test of all residuals and corrections against their standard deviations
 
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """Linear equations of a case: v = A a + G dg + v0 for its own unknowns a, weights of v."""
+    """Linear equations of a case: v = A a + G dg + v0, unknowns a, weights of v."""
 
     own: Floats
     grid: Floats
@@ -59,7 +59,7 @@ class _Case:
 
 @dataclass(frozen=True, eq=False)
 class _Reduced:
-    """A calibration with its own unknowns eliminated."""
+    """Calibration with its own unknowns eliminated."""
 
     cases: list[_Case]
     active: Indices
@@ -70,7 +70,7 @@ class _Reduced:
 
 
 def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
-    """Adjust all calibrations in one; see the module."""
+    """Adjust all calibrations together."""
     grids = _grids(records)
     starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))
     size = 2 * sum(len(grid.points) for grid in grids.values())
@@ -113,7 +113,7 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
 
 
 def _grids(records: Sequence[RecordedCalibration]) -> dict[int, Grid]:
-    """Return all plates with all points that anybody measured, as the first calibrations took them."""
+    """Return all plates with all measured points, from the first calibrations."""
     plates: dict[int, Grid] = {}
     for record in records:
         for plate, grid in record.grids.items():
@@ -132,7 +132,7 @@ SAME_UM = 1e-3  # rounding of given coordinates of a plate
 
 
 def _growth(own: Grid, other: Grid) -> float:
-    """Return by what the coordinates of a plate grew since the first calibration: its temperature differs."""
+    """Return the growth factor of plate coordinates relative to the first calibration."""
     if own.temperature_c is None or other.temperature_c is None or own.expansion_per_k is None:
         return 1.0
     return 1.0 + own.expansion_per_k * (other.temperature_c - own.temperature_c)
@@ -145,7 +145,7 @@ def _reduce(
     normal: Floats,
     right: Floats,
 ) -> _Reduced:
-    """Add what a calibration says of the grid to the normal equations; keep what leads back to its own."""
+    """Add a calibration to the normal equations of the grid, for back substitution."""
     active = np.flatnonzero(np.diag(record.correction.covariance) > 0)
     unknowns = len(active) + 3 * len(record.cases)
     inner, own_right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
@@ -179,7 +179,7 @@ def _equations(
     by_parameters, by_reading = partials_of(correction, case.means_um)
     corrected = correction.apply(case.means_um)
     turn = rotation_matrix(case.rotation_rad)
-    # A shift of the corrected readings is one of the case: both count from its middle.
+    # The case absorbs a shift of the corrected readings: both refer to their centre.
     away = corrected - corrected.mean(axis=0)
     turned = np.stack([away @ turn[1], -away @ turn[0]], axis=1)[..., np.newaxis]
     back = -np.asarray(np.linalg.inv(turn @ by_reading))
@@ -192,7 +192,6 @@ def _equations(
 
 
 def _inverse(normal: Floats, what: str) -> Floats:
-    """Return the inverse of normal equations, each unknown in its own unit."""
     scale = np.sqrt(np.diag(normal))
     try:
         root = np.linalg.cholesky(normal / np.outer(scale, scale))
@@ -209,7 +208,7 @@ def _residuals(
     cofactors: Floats,
     shift: Floats,
 ) -> tuple[list[list[Floats]], float, int]:
-    """Return standardized residuals of all cases, the sum of weighted squares, and how many there are."""
+    """Return standardized residuals, the weighted sum of squares, and the count."""
     standardized, squares, count = [], 0.0, 0
     for each, own_back, own_values in zip(reduced, back, values, strict=True):
         with_grid = own_back @ cofactors
@@ -241,7 +240,6 @@ def _spread(active: Indices, values: Floats) -> Floats:
 
 
 def _covariance(reduced: Sequence[_Reduced], back: Sequence[Floats], cofactors: Floats) -> Floats:
-    """Return the cofactors of the parameters of all corrections, (k, 21, k, 21)."""
     count = len(reduced)
     blocks = np.zeros((count, count, PARAMETERS, PARAMETERS))
     for i, first in enumerate(reduced):

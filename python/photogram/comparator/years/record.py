@@ -1,4 +1,4 @@
-"""One calibration as it takes part in a comparison: its JSON document, read again."""
+"""Calibration record of a comparison, read from its JSON document."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from photogram.words import phrase
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
 OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
 _WHAT = "calibration of a comparator"
-FIRST_YEAR = 50  # Years of two digits from here on are of the 20th century, those before of the 21st
+FIRST_YEAR = 50  # Two-digit years from this one on are in the 20th century, earlier ones in the 21st
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedCase:
-    """Mean readings of a case, and how the plate lay.
+    """Mean readings of a case, and the plate orientation.
 
     Attributes
     ----------
     number, operator, plate, left_handed
-        Of the case.
+        Numbers and handedness of the case.
     points, counts
-        (n,) grid points, and how often each was read.
+        (n,) grid points, and number of readings of each.
     means_um
         (n, 2) mean readings.
     rotation_rad, translation_um
-        grid = M(rotation) corrected + translation, by the joint adjustment.
+        grid = M(rotation) corrected + translation, from the joint adjustment.
     """
 
     number: int
@@ -57,26 +57,26 @@ class RecordedCase:
 
 @dataclass(frozen=True, eq=False)
 class RecordedCalibration:
-    """A calibration: what was measured, and its joint correction.
+    """Calibration record with measurements and joint correction.
 
     Attributes
     ----------
     name
-        Of its file, or its place among the calibrations.
+        Name of its file, or its index among the calibrations.
     day
-        On which it was measured.
+        Date of the measurement.
     correction
-        Of the joint adjustment, with its identity.
+        Correction of the joint adjustment, with its identity.
     random_um, freedom
-        Standard deviation of the comparator itself, degrees of freedom of the joint adjustment.
+        Standard deviation of the comparator, degrees of freedom of the joint adjustment.
     pointing_um, pointing_covariance_um2, pointing_freedom
         Standard deviations of a pointing in x and y, their covariance, degrees of freedom.
     operators
-        For each operator variances of a pointing in x and y (um^2), and their degrees of freedom.
+        For each operator: variances of a pointing in x and y (um^2), and their degrees of freedom.
     cases
         The cases.
     grids
-        The plates as they were taken, points that were measured.
+        Plates with given coordinates of measured points.
     """
 
     name: str
@@ -93,25 +93,25 @@ class RecordedCalibration:
 
     @property
     def comparator(self) -> str:
-        """What its comparator is called."""
+        """Name of the comparator."""
         identity = self.correction.identity
         assert identity is not None
         return f"comparator {identity.comparator}{', second stage' if identity.secondary else ''}"
 
     @property
     def temperature_c(self) -> float | None:
-        """Of the plates."""
+        """Temperature of the plates."""
         return self.correction.identity.temperature_c if self.correction.identity else None
 
     @classmethod
     def read(cls, path: Path) -> list[RecordedCalibration]:
-        """Read what `photogram comparator --json` wrote: one calibration, or several.
+        """Read one or several calibrations from a file of `photogram comparator --json`.
 
         Raises
         ------
         InputError
-            The file cannot be read or holds none; a calibration that was withheld, has no joint adjustment or
-            no date.
+            If the file cannot be read or does not contain a calibration. If a calibration was withheld, or if
+            it has neither joint adjustment nor date.
         """
         with json.holding(_WHAT, path):
             found = orjson.loads(read_bytes(path))
@@ -121,13 +121,13 @@ class RecordedCalibration:
 
     @classmethod
     def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
-        """Return a calibration as its document says it."""
+        """Return the record of a calibration."""
         with json.holding(_WHAT):
             return _from_document(orjson.loads(calibration.to_json()), name)
 
 
 def day_of(text: str) -> date:
-    """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it."""
+    """Return the date of a text: 1972-07-17, or 7/17/72 as in the report."""
     year = month = day = 0
     if match := ISO.match(text.strip()):
         year, month, day = map(int, match.groups())
@@ -224,7 +224,7 @@ def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> R
 
 
 def _grid(plate: Any, own: Any) -> Grid:
-    """Return a plate as it was taken: its corrected coordinates less the corrections."""
+    """Return a plate as given: corrected coordinates minus corrections."""
     given = np.array(plate["corrected_plate_um"]) - np.array(plate["corrections_plate_um"])
     sigma = plate["sigma_um"]["a_priori"]
     return Grid(

@@ -1,4 +1,4 @@
-"""Cameras over years: what changed."""
+"""Comparison of camera calibrations over years."""
 
 from photogram.film.years.comparison import CameraComparison, DatedCamera, compare_cameras
 

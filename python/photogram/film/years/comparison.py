@@ -1,11 +1,11 @@
-"""Calibrations of cameras compared: histories of each camera that was calibrated more than once.
+"""Comparison of the calibrations of each camera over time.
 
-The comparison does not depend on the model of a camera and its balance: principal distance and radial terms
-are correlated, and laboratories balance curves differently, so parameters cannot be compared. In the field of
-all calibrations, up to the angle alpha, the images of directions are decomposed into orthogonal fields over a
-disc: a shift, a scale (principal distance of the whole field), the radial shapes R_3, R_5, R_7 of Zernike,
-decentring, affinity and shear. With rho = tan(angle) / tan(alpha) each has the length 1 at the edge, where
-rho = 1.
+The comparison does not depend on camera model and balancing. Principal distance and radial terms are
+correlated, and laboratories balance curves differently, so parameters cannot be compared. In the field common
+to all calibrations, up to the angle alpha, the image coordinates of directions are decomposed into orthogonal
+fields over a disc. The fields are a shift, a scale (principal distance of the whole field), the radial shapes
+R_3, R_5, R_7 of Zernike, decentring, affinity and shear. With rho = tan(angle) / tan(alpha), each has the
+length 1 at the edge, rho = 1.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
 from photogram.words import Phrase, phrase
 
-NODES = 9  # radii, by Gauss and Legendre
+NODES = 9  # radii, Gauss-Legendre nodes
 AZIMUTHS = 12
-STEP = 0.01  # of differences, in standard deviations
+STEP = 0.01  # of numerical differences, in standard deviations
 UM = 1e3
-LEAST = 1e-4  # Least standard deviation of an estimated figure, in parts of the largest of the others
-ALONE = 1e-3  # Least part of the standard deviation of a figure that is independent of the figures before it
+LEAST = 1e-4  # Least standard deviation of an estimated value, relative to the largest one
+ALONE = 1e-3  # Least independent part of the standard deviation of a value given the values before it
 
 _RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
-"""Coefficients of rho, rho^3, ...: R_1, which is rho, R_3, R_5, R_7."""
+"""Coefficients of rho, rho^3, ...: R_1 = rho, R_3, R_5, R_7."""
 
 
 @dataclass(frozen=True, eq=False)
 class CameraFigures:
-    """Values (k, m) of k calibrations with their covariances (k, m, m), names and units."""
+    """Values (k, m) of k calibrations, their covariances (k, m, m), names and units."""
 
-    values: Floats  # Of what all calibrations estimated
+    values: Floats  # estimated by all calibrations
     covariances: Floats
     names: tuple[str, ...]
     units: tuple[str, ...]
-    held: tuple[str, ...]  # Names of figures that only some calibrations estimated: they cannot be compared
+    held: tuple[str, ...]  # Names of values that only some calibrations estimated, which are not comparable
 
 
 def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
-    """Return the figures of cameras of one unit within an angle (rad) from the axis.
+    """Return comparable values of cameras within an angle (rad) from the axis.
 
-    Raises InputError: cameras of several units; one that has no image within the angle.
+    InputError: if cameras have different units, or if a camera does not reach the angle.
     """
     units = {each.unit for each in cameras}
     if len(units) > 1:
@@ -77,7 +77,7 @@ def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
 
 
 def _estimated(root: Floats) -> Bools:
-    """Return which figures are estimated: those of fixed terms depend on others, with small variances."""
+    """Return which values are estimated. Values of fixed terms depend on others."""
     sd = np.linalg.norm(root, axis=1)
     found: Bools = sd > LEAST * sd.max()
     before = np.zeros((0, root.shape[1]))
@@ -91,7 +91,7 @@ def _estimated(root: Floats) -> Bools:
 
 
 def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
-    """Return names, factors to the units of tables, and these units, in the order of fields."""
+    """Return names, factors to the units of tables, and these units, in field order."""
     names = ["principal distance", "shift x", "shift y", "radial 3", "radial 5", "radial 7"]
     names += ["decentring x", "decentring y", "affinity", "shear"]
     small = UM if metric else 1.0
@@ -100,7 +100,7 @@ def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
 
 
 def _apart(angle: float) -> tuple[Floats, Floats]:
-    """Return directions (n, 3), and the decomposition (10, 2n) of their images, without a rotation."""
+    """Return directions (n, 3) and the decomposition (10, 2n) without a rotation."""
     rho = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
     azimuth = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
     r, a = (each.ravel() for each in np.meshgrid(rho, azimuth))
@@ -110,7 +110,7 @@ def _apart(angle: float) -> tuple[Floats, Floats]:
     fields = [
         *((r * x, r * y), (one, none), (none, one)),
         *((of * x, of * y) for of in radial),
-        # Of r^2 + 2 x^2, 2 x y the mean over the disc is a shift by 1.
+        # The mean over the disc of r^2 + 2 x^2, 2 x y is a shift by 1.
         *((r**2 * (1 + 2 * x**2) - 1, 2 * r**2 * x * y), (2 * r**2 * x * y, r**2 * (1 + 2 * y**2) - 1)),
         *((r * x, -r * y), (r * y, r * x), (-r * y, r * x)),
     ]
@@ -120,7 +120,7 @@ def _apart(angle: float) -> tuple[Floats, Floats]:
 
 
 def _with_root(camera: Camera, directions: Floats, apart: Floats) -> tuple[Floats, Floats]:
-    """Return the figures of a camera, and F of their covariance F F'."""
+    """Return the values of a camera, and F of their covariance F F'."""
 
     def at(changes: dict[str, float]) -> Floats:
         changed = camera.replace(parameters={**camera.parameters, **changes}) if changes else camera
@@ -141,23 +141,23 @@ def _with_root(camera: Camera, directions: Floats, apart: Floats) -> tuple[Float
 
 @dataclass(frozen=True)
 class DatedCamera:
-    """A calibrated camera.
+    """Camera calibration with its date.
 
     Attributes
     ----------
     day
-        On which it was calibrated.
+        Date of the calibration.
     camera
-        With its covariance; its name says which one it is.
+        Camera with its covariance; its name identifies the camera.
     angle
-        rad from the axis up to which it was calibrated; None where that is not known.
+        Largest calibrated angle from the axis, rad; None if unknown.
     source
-        What it is from.
+        Source of the calibration.
 
     Raises
     ------
     InputError
-        A camera without a covariance matrix, an angle beyond the front of the camera.
+        If the camera lacks a covariance matrix, or if the angle is beyond the front of the camera.
     """
 
     day: date
@@ -174,12 +174,12 @@ class DatedCamera:
 
     @classmethod
     def of(cls, certificate: Certificate, terms: int | None = None) -> DatedCamera:
-        """Return the camera of a certificate; `terms` odd ones of its curve.
+        """Return the dated camera of a certificate; `terms` is the number of odd terms.
 
         Raises
         ------
         InputError
-            It has no date, or no focal length.
+            If the date or the focal length is missing.
         """
         if certificate.day is None:
             raise InputError(phrase("films.undated", certificate=certificate.name), file=certificate.file)
@@ -190,18 +190,18 @@ class DatedCamera:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CameraComparison(Documented, Judged, Brief):
-    """Cameras over years.
+    """Comparison of camera calibrations over years.
 
     Attributes
     ----------
     calibrations
-        In the order of their days.
+        Calibrations in order of date.
     histories
-        Of every camera with two calibrations or more, by its name: `camera rc10-2345`.
+        History of every camera with at least two calibrations, by name: `camera rc10-2345`.
     angles
-        rad from the axis up to which each was compared.
+        Largest compared angle of each camera from the axis, rad.
     remarks
-        Remarks on figures that could not be compared.
+        Warnings on values that could not be compared.
     """
 
     calibrations: tuple[DatedCamera, ...]
@@ -210,7 +210,7 @@ class CameraComparison(Documented, Judged, Brief):
     remarks: tuple[Phrase, ...]
 
     def document(self) -> Document:
-        """Return the document of the comparison: changes, control charts, calibrations, all values."""
+        """Return the document with changes, control charts, calibrations and all values."""
         from photogram.film.years.document import comparison_document
 
         return comparison_document(self)
@@ -229,19 +229,18 @@ def compare_cameras(
     Parameters
     ----------
     calibrations
-        Certificates with a date, or calibrated cameras with their days, in any order. The certificates of a
-        camera get as many odd terms as the one that asks for most.
+        Certificates with a date, or dated cameras, in any order. All certificates of a camera use the largest
+        number of odd terms that one of them requires.
     angle
-        rad from the axis up to which images are compared; the least to which those of a camera were
-        calibrated when None.
+        Largest compared angle from the axis, rad. If None, the least calibrated angle of a camera.
     level
-        Probability that a change is found in a camera where there is none.
+        Probability of a false detection of a change per camera.
 
     Raises
     ------
     InputError
-        Fewer than two calibrations of a camera, one without date or covariance, or the same twice; cameras
-        of several units; an angle that nothing says.
+        If a camera has fewer than two calibrations, one without date or covariance, or the same one twice. If
+        cameras have several units, or if the angle is unknown.
     """
     records = sorted(_dated(calibrations), key=lambda each: each.day)
     remarks: list[Phrase] = []

@@ -1,4 +1,4 @@
-"""The document of cameras over years (docs/certificates.md lists its members), and its verdict."""
+"""Document and verdict of cameras over years (JSON members: docs/certificates.md)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ANGLE = (Axis.turned("", "deg"),)
 
 
 def calibrations(comparison: CameraComparison) -> Table:
-    """Return the calibrations: days, cameras, models, up to which angle."""
+    """Return the calibrations with dates, cameras, models and largest angles."""
     found = comparison.calibrations
     angles = np.array([np.nan if each.angle is None else each.angle for each in found])
     columns = [
@@ -36,9 +36,9 @@ def calibrations(comparison: CameraComparison) -> Table:
 
 
 def comparison_findings(comparison: CameraComparison) -> Findings:
-    """Return the tests of what should not have changed."""
+    """Return the tests for changes of the camera."""
     histories = comparison.histories
-    # What changes explain is not tested once more.
+    # Values with a detected change are not tested again.
     quiet = [
         (whose, history, own)
         for whose, history in histories.items()

@@ -1,4 +1,4 @@
-"""Six simulated certificates of one camera over fifteen years, whose principal distance steps in between."""
+"""Simulated certificates of one camera over fifteen years with a step of the principal distance."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from photogram.film.lens_table import RadialTable
 
 DAYS = ("1974-03-12", "1977-05-03", "1980-02-27", "1983-05-11", "1986-04-08", "1989-06-20")
 ANGLES = (7.5, 15.0, 22.7, 30.0, 35.0, 40.0)
-FOCAL_LENGTH, STEP = 152.375, 0.015  # Millimetres; the step before the fourth certificate is one of a repair
+FOCAL_LENGTH, STEP = 152.375, 0.015  # Millimetres; a repair before the fourth certificate causes the step
 CURVE = (-3.1e-4, 3.8e-8, -1.0e-12)
 POINT = (0.004, -0.012)
 SD_READING, SD_FOCAL_LENGTH, SD_POINT = 1.5e-3, 0.003, 0.003
 
 
 def simulated_certificates() -> list[Certificate]:
-    """Calibrate a camera six times; readings are printed to a micrometre."""
+    """Simulate six calibrations of a camera; readings are printed to a micrometre."""
     rng = np.random.default_rng(1974)
     angle = np.radians(ANGLES)
     found = []
     for k, day in enumerate(DAYS):
         true = FOCAL_LENGTH + (STEP if k >= 3 else 0.0)
-        # The focal length has an error of its own; the table says how images lie against it.
+        # The focal length has its own error; the table refers to the printed value.
         printed = round(rng.normal(true, SD_FOCAL_LENGTH), 3)
         curve = (printed * np.tan(angle))[:, np.newaxis] ** [1, 3, 5] @ np.array(CURVE)
         distortion = rng.normal(curve, SD_READING)

@@ -1,1 +1,1 @@
-"""Cameras and rigs as others take them: files of OpenCV, ROS, Kalibr and mrcal."""
+"""Output of cameras and rigs: files of OpenCV, ROS, Kalibr and mrcal."""

@@ -1,4 +1,4 @@
-"""The formats of cameras by their names, and files of a calibration in them."""
+"""Camera formats by name, and files of a calibration in these formats."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> 
     Parameters
     ----------
     calibrated
-        The adjusted calibration; pixels count from 0 at the centre of the first.
+        Adjusted calibration; pixels count from 0 at the centre of the first.
     to
-        `opencv_yaml`, `ros_camera_info` (a file a camera), `kalibr_camchain` (one file), `mrcal` (a
-        `.cameramodel` a camera, with the calibration where mrcal could have made it).
+        `opencv_yaml`, `ros_camera_info` (one file per camera), `kalibr_camchain` (one file), `mrcal` (one
+        `.cameramodel` per camera, with the calibration if mrcal supports it).
     need
-        Of `mrcal`: the largest standard deviation (pixels, of directions) inside the
-        `valid_intrinsics_region` of its cameras; None: there is no such region.
+        For `mrcal`: the largest standard deviation (pixels, of directions) inside the
+        `valid_intrinsics_region` of its cameras; None: omit the region.
 
     Returns
     -------
-    Contents by the names of files.
+    Contents by file name.
 
     Raises
     ------
     InputError
-        A format that there is not, a lens that it cannot hold: the message has the command that fits one that
-        it can. `need` with another format, or no pixel that is so well known.
+        If the format is unknown or does not support the lens: the message has the command that fits a
+        supported one. If `need` is given with another format, or if no pixel is accurate enough.
     """
     one_of("format of cameras", to, list(CAMERA_FORMATS))
     rig = rig_of(calibrated)
@@ -64,7 +64,7 @@ FILE = "cameras_covariance.json"
 
 
 def cameras_covariance(calibrated: Calibrated) -> bytes:
-    """Return the file: parameters of cameras, then dt, w of sensors (R <- Exp(w) R, t <- t + dt)."""
+    """Return a covariance file of camera parameters, then dt, w of sensors."""
     names, cofactors = calibrated.cofactors(("cameras", "sensors"))
     scale = calibrated.result.covariance_scale
     return json.to_json(

@@ -1,4 +1,4 @@
-"""`.cameramodel` of mrcal: a camera, its pose, and the calibration that it comes from, for its tools."""
+"""`.cameramodel` files of mrcal: a camera, its pose, and its calibration for mrcal tools."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from photogram.words import phrase
 TITLE = "a .cameramodel of mrcal"
 CORE = frozenset({"f", "fx", "fy", "cx", "cy"})
 OPENCV_TERMS = (0, 4, 5, 8, 12)  # of the models PINHOLE, OPENCV4, OPENCV5 ...
-GRID_BOARDS = ("chessboard", "charuco")  # corners at one spacing in rows and columns
+GRID_BOARDS = ("chessboard", "charuco")  # corners with equal spacing in rows and columns
 WEIGHT_OF_ABSENT = -1.0
 
 
 def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, bytes]:
-    """Return a file a camera.
+    """Return one file per camera.
 
-    `optimization_inputs` go with the cameras where the calibration is at hand and mrcal could have made it: a
-    board on a grid, its shape held or two parabolas, cameras of one model, no single term of a lens held.
-    `valid` is (n, 2) by the numbers of cameras: the closed outline of what is known well enough.
+    `optimization_inputs` are included if the calibration is available and supported by mrcal. This requires a
+    grid board, fixed or with two parabolas, cameras of one model, and no single fixed lens terms. `valid` is
+    (n, 2) by camera number: the closed outline of the region with sufficient accuracy.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     inputs = None if rig.calibrated is None else _inputs(rig, rig.calibrated, lenses)
@@ -55,7 +55,7 @@ def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, 
 
 
 def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
-    """Return the name of a model without its beginning, and its parameters in the order of mrcal."""
+    """Return a model name without its prefix, and its parameters in mrcal order."""
     camera = rig.cameras[row]
     if camera.model == KNOTTED and camera.knots is not None:
         order, nx, ny, fov = (camera.parameters[name] for name in ("order", "nx", "ny", "fov_x_deg"))
@@ -69,7 +69,7 @@ def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
     if lens is None or lens.fisheye:
         raise rig.refusal(row, TITLE, ["opencv8", "opencv5", "opencv12", "cahvor", KNOTTED])
     free = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    # Terms that were free are there, be they 0.
+    # Free terms are included even if they are 0.
     count = next(
         each for each in OPENCV_TERMS if not any(lens.terms.get(k) or free.get(k) for k in TERMS[each:])
     )
@@ -78,12 +78,11 @@ def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
 
 
 def _vectors(poses: Floats) -> Floats:
-    """Return (n, 6) rotation vectors and translations of (n, 4, 4) poses."""
     return np.column_stack([_photocore.rotation_vectors(poses[:, :3, :3]), poses[:, :3, 3]])
 
 
 def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) -> bytes | None:
-    """Return the archive of a calibration between letters; None where mrcal could not have made it."""
+    """Return the calibration archive as text; None if mrcal does not support it."""
     calibration, count = calibrated.calibration, len(rig.cameras)
     board = calibration.board
     free = [{each.names[k] for k in each.estimated} for each in calibrated.cameras]
@@ -136,26 +135,24 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
 
 
 def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
-    """Return (P, rows, columns, 3) x, y, weight of corners, (P, 3) view, camera, sensor of pictures."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
     found = np.zeros((len(corners.pictures), board.rows * board.columns, 3))
     found[..., 2] = WEIGHT_OF_ABSENT
     found[corners.picture, corners.point, :2] = corners.xy
-    # What does not count has a weight below 0.
+    # Unused corners have a weight below 0.
     found[corners.picture, corners.point, 2] = np.where(corners.use, 1.0, -1.0) / corners.sd
     order = np.lexsort([corners.cameras, corners.views])
     indices = np.column_stack([corners.views, corners.cameras, corners.cameras - 1]).astype(np.int32)
     return found.reshape(-1, board.rows, board.columns, 3)[order], indices[order]
 
 
-OUTLINE_DIRECTIONS, OUTLINE_STEPS = 90, 400  # about the best known pixel
+OUTLINE_DIRECTIONS, OUTLINE_STEPS = 90, 400  # about the most accurate pixel
 
 
 def valid_region(found: UncertaintyMap, largest: float) -> Floats:
-    """Return (n, 2) the closed outline of the pixels to which the worst sd stays below a bound.
+    """Return (n, 2) the closed outline of pixels whose worst sd is below a limit.
 
-    From the best known pixel of the map outwards in 90 directions, each as far as the standard deviation,
-    linear between pixels of the map, is not above the bound.
+    It is searched from the most accurate pixel in 90 directions, with linear interpolation of the map.
     """
     sd = np.where(np.isfinite(found.sd), found.sd, np.inf)
     row, column = np.unravel_index(np.argmin(sd), sd.shape)
@@ -164,7 +161,7 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
         raise InputError(phrase("targets.no-region", **fields))
     middle = np.array([found.columns[column], found.rows[row]])
     angles = np.linspace(0, 2 * np.pi, OUTLINE_DIRECTIONS + 1)
-    # Down to the farthest corner, and cut where the picture ends.
+    # Down to the farthest corner, and clipped to the image.
     lengths = np.linspace(0, float(np.hypot(*found.size)), OUTLINE_STEPS)
     places = (
         middle + lengths[:, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, np.newaxis]
@@ -177,7 +174,7 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
 
 
 def _between(found: UncertaintyMap, sd: Floats, places: Floats) -> Floats:
-    """Return values of a map at places (..., 2), linear between its pixels in both directions."""
+    """Return values of a map at positions (..., 2) by bilinear interpolation."""
     parts = []
     for axis, nodes in enumerate((found.columns, found.rows)):
         own = np.clip(np.searchsorted(nodes, places[..., axis], side="right") - 1, 0, len(nodes) - 2)

@@ -1,4 +1,4 @@
-"""YAML of OpenCV: camera matrix, distortion, errors; of further cameras of a rig R, T, E and F as well."""
+"""OpenCV YAML: camera matrix, distortion, errors; for other cameras of a rig R, T, E and F."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEVIATIONS = ("fx", "fy", "cx", "cy", *TERMS, "tx", "ty")  # order of `std_devia
 
 
 def opencv_yaml(rig: Rig) -> dict[str, bytes]:
-    """Return a file a camera."""
+    """Return one file per camera."""
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     return {
         f"{name}.yaml": "\n".join(["%YAML:1.0", "---", *_camera(rig, row, lenses), ""]).encode()
@@ -68,7 +68,7 @@ def _errors(calibrated: Calibrated, row: int) -> list[str]:
 
 
 def _stereo(sensor: Floats, before: Floats, own: Floats) -> list[str]:
-    """Return R, T of camera 0 -> this one, E = [T]x R and F = K^-T E K0^-1, its last element 1."""
+    """Return R, T of camera 0 -> this camera, E = [T]x R and F = K^-T E K0^-1, scaled."""
     rotation, shift = sensor[:3, :3], sensor[:3, 3]
     essential = cross_matrices(shift) @ rotation
     fundamental = np.linalg.inv(own).T @ essential @ np.linalg.inv(before)

@@ -1,7 +1,7 @@
-"""What is written of a calibration: cameras, sizes of their pictures, and where they are to each other.
+"""Output content of a calibration: cameras, image sizes, and relative poses.
 
-Lenses are as OpenCV, ROS and Kalibr have them: a pinhole with terms in one order, or a fisheye with four;
-so is YAML: numbers with all their digits, matrices in rows.
+Lenses follow OpenCV, ROS and Kalibr: a pinhole with ordered terms, or a fisheye with four. YAML numbers have
+all digits, and matrices are written by row.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _OTHER_NAMES = {"k": "k1"}
 
 @dataclass(frozen=True)
 class Terms:
-    """A lens."""
+    """Lens of the pinhole or fisheye type."""
 
     fisheye: bool  # Whether it is equidistant
     focal: tuple[float, float]  # fx, fy and cx, cy
     centre: tuple[float, float]
-    terms: Mapping[str, float]  # By their names; missing ones are 0
+    terms: Mapping[str, float]  # By name; missing terms are 0
 
     @property
     def matrix(self) -> Floats:
@@ -45,19 +45,19 @@ class Terms:
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     def first(self, count: int) -> list[float] | None:
-        """Return the first terms in the order of OpenCV; None where others are not 0."""
+        """Return the first terms in OpenCV order; None if others are not 0."""
         order = FISHEYE_TERMS if self.fisheye else TERMS
         if any(value for name, value in self.terms.items() if name not in order[:count]):
             return None
         return [self.terms.get(name, 0.0) for name in order[:count]] + [0.0] * (count - len(order))
 
     def fewest(self, counts: tuple[int, ...]) -> list[float] | None:
-        """Return the terms of the first of some counts that is enough; None where none is."""
+        """Return the terms for the first sufficient count; None if all are too small."""
         return next((found for each in counts if (found := self.first(each)) is not None), None)
 
 
 def terms_of(camera: Camera) -> Terms | None:
-    """Return a camera as such a lens, to the last digit; None where it is none."""
+    """Return a camera as an exactly equivalent lens; None if impossible."""
     if camera.model not in PINHOLES | FISHEYES:
         return None
     values = camera.parameters
@@ -72,27 +72,30 @@ class Rig:
     """K cameras in pixels from 0 at the centre of the first."""
 
     cameras: tuple[Camera, ...]  # The cameras
-    # Width and height of their pictures, pixels; None where not known
+    # Image width and height, pixels; None if unknown
     sizes: tuple[tuple[int, int] | None, ...]
-    sensors: Floats  # (K, 4, 4) camera 0 -> camera k; NaN of cameras that are not tied to it
-    calibrated: Calibrated | None = None  # What they came from; None where that is not at hand
+    sensors: Floats  # (K, 4, 4) camera 0 -> camera k; NaN for cameras not tied to it
+    calibrated: Calibrated | None = None  # The source calibration; None if not available
 
     @property
     def names(self) -> list[str]:
-        """What files call the cameras."""
+        """Camera names in files."""
         return [each.name or f"camera {row}" for row, each in enumerate(self.cameras)]
 
     @property
     def files(self) -> list[str]:
-        """The same as names of files."""
+        """Camera names as file names."""
         return ["".join(c if c.isalnum() or c in "-_." else "-" for c in each) for each in self.names]
 
     def tied(self, camera: int) -> bool:
-        """Return whether the pose of a camera to camera 0 is known."""
+        """Return whether the pose of a camera relative to camera 0 is known."""
         return bool(np.isfinite(self.sensors[camera]).all())
 
     def size(self, camera: int) -> tuple[int, int]:
-        """Return width and height of the pictures of a camera; an InputError where they are not known."""
+        """Return image width and height of a camera.
+
+        InputError: if they are unknown.
+        """
         found = self.sizes[camera]
         if found is None:
             raise InputError(phrase("targets.no-size", camera=self.names[camera]))
@@ -101,7 +104,7 @@ class Rig:
     def refusal(
         self, camera: int, title: str, models: Sequence[str], code: str = "targets.refused"
     ) -> InputError:
-        """Return the error of a camera that a format cannot represent, with the models that it can."""
+        """Return the error of an unsupported camera, with the supported models."""
         fields = {"camera": self.names[camera], "model": self.cameras[camera].model, "to": "|".join(models)}
         return InputError(phrase(code, title=title, **fields))
 

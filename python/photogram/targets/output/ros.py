@@ -1,7 +1,7 @@
 """YAML of ROS (`sensor_msgs/CameraInfo`) and Kalibr (`camchain.yaml`).
 
-ROS has a file for each camera, and a pair is rectified so that rows are equal; in the file of Kalibr cameras
-follow each other, each with its pose to the one before.
+ROS has one file per camera, and a pair is rectified to equal rows. A Kalibr file lists all cameras, each with
+its pose relative to the previous one.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ PLUMB_BOB_TERMS, RATIONAL_TERMS, EQUIDISTANT_TERMS = 5, 8, 4
 
 
 def ros_camera_info(rig: Rig) -> dict[str, bytes]:
-    """Return a file a camera.
+    """Return one file per camera.
 
-    Of two cameras that are tied the rectification turns both so that a point has one row in both; the
-    projection of the second has -fx b, b the base. All others are not rectified.
+    For two tied cameras, the rectification rotates both so that a point has the same row in both. The
+    projection of the second contains -fx b with the base b. Other cameras are not rectified.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     rectified: list[tuple[Floats, Floats] | tuple[()]] = [()] * len(lenses)
@@ -44,7 +44,6 @@ def _lens(rig: Rig, row: int) -> Terms:
 
 
 def _distortion(lens: Terms) -> tuple[str, list[float]]:
-    """Return the model and its terms; none where no model has them."""
     if lens.fisheye:
         return "equidistant", lens.first(EQUIDISTANT_TERMS) or []
     if (terms := lens.first(PLUMB_BOB_TERMS)) is not None:
@@ -55,8 +54,8 @@ def _distortion(lens: Terms) -> tuple[str, list[float]]:
 def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats]]:
     """Return rotation and (3, 4) projection of both cameras.
 
-    Each is turned by half of the rotation between them, then both so that the base is the x axis. One
-    focal length, the shorter, and one centre, the mean of those where the old axes lie then, serve both.
+    Each is rotated by half of the rotation between them, then both so that the base is the x axis. Both use
+    the shorter focal length, and the mean of their rotated axes as centre.
     """
     half = _photocore.rotation_vectors(sensor[np.newaxis, :3, :3]) / 2
     turns = _photocore.vector_rotations(np.concatenate([half, -half]))
@@ -68,7 +67,7 @@ def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats
     common = _photocore.vector_rotations(angle * axis[np.newaxis])[0]
     turned = [common @ each for each in turns]
     focal = min(value for each in lenses for value in each.focal)
-    # Where the middle of a picture comes to lie: K^-1 c is the old axis.
+    # Rotated position of the image centre: K^-1 c is the original axis.
     axes = [each[:2, 2] / each[2, 2] for each in turned]
     centre = np.mean(
         [np.array(each.centre) - focal * own for each, own in zip(lenses, axes, strict=True)], axis=0
@@ -87,8 +86,8 @@ KALIBR_TERMS = 4
 def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
     """Return the file.
 
-    `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` takes points from the axes of the camera
-    before to those of this one.
+    `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` transforms points from the previous
+    camera to this one.
     """
     lines = []
     for row in range(len(rig.cameras)):
