@@ -1,4 +1,4 @@
-"""What an adjustment gives, as arrays, tables, text and JSON."""
+"""Results of adjustments as arrays, tables, text and JSON."""
 
 import lazy_loader
 

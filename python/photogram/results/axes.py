@@ -1,4 +1,4 @@
-"""Names and components of the parts of networks, their units, and the units of differences for people."""
+"""Names, components and units of the parts of networks, and display units of differences."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))  #
 
 
 def point_axes(block: Block) -> tuple[Axis, ...]:
-    """Return the three coordinates of points and stations: on the earth two of them are angles."""
+    """Return the axes of points and stations; geographic plan coordinates are angles."""
     unit = block.linear_unit
     if block.geographic:
         return Axis.turned("longitude", "dms"), Axis.turned("latitude", "dms"), Axis.of("height", unit)
@@ -30,19 +30,19 @@ def point_axes(block: Block) -> tuple[Axis, ...]:
 
 
 def image_axes(unit: str) -> tuple[Axis, ...]:
-    """Return the two image coordinates: residuals in millimetres are read in micrometres."""
+    """Return the axes of image coordinates; residuals in mm are displayed in micrometres."""
     small, factor = ("um", 1000.0) if unit == "mm" else (unit, 1.0)
     return tuple(Axis(name, unit, "", f"_{unit}", small, factor) for name in "xy")
 
 
 def component_axis(name: str, unit: str) -> Axis:
-    """Return a component of an observation or unknown: small rotations are read in seconds of arc."""
+    """Return the axis of a component; small rotations are displayed in seconds of arc."""
     return Axis.turned(name) if unit == "rad" else Axis.of(name, unit)
 
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What the photos, points and images of a network are called and measured in."""
+    """Names, axes and units of the photos, points and images of a network."""
 
     photos: np.ndarray  # (P,), (n,) names, or numbers from 0
     points: np.ndarray
@@ -50,40 +50,39 @@ class Terms:
     point_axes: tuple[Axis, ...]
     image_axes: tuple[Axis, ...]
     photo_values: Floats  # (P, k) adjusted unknowns
-    # What the unknowns of a photo consist of: how people call it, and JSON documents
+    # Unknowns of a photo: their name in texts, and their member in JSON documents
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
-    of_photos: tuple[Quantity, ...] = ()  # What tables tell first: of photos, of points that took part
+    of_photos: tuple[Quantity, ...] = ()  # First columns of the tables of photos and points
     of_points: tuple[Quantity, ...] = ()
-    kinds: Iterable[ObservedKind] = ()  # Other observations than images
+    kinds: Iterable[ObservedKind] = ()  # Additional observations
     # (o,) rows of these in the block, in the order of the core
     observation_rows: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    lengths: Floats | None = None  # (3,) of the units of coordinates, where two of them are angles
+    lengths: Floats | None = None  # (3,) length units of coordinates if plan coordinates are angles
     linear_unit: str = ""
-    split: bool = False  # Whether JSON documents tell differences of positions from those of attitudes
+    split: bool = False  # Whether JSON documents separate differences of positions and attitudes
 
     @property
     def identity(self) -> str:
-        """How JSON documents call the name or number of a thing."""
+        """The member of JSON documents for the name or number of an item."""
         return "number" if self.points.dtype.kind == "i" else "id"
 
 
 @dataclass(frozen=True, eq=False)
 class Determined:
-    """Where the points and photos of an adjusted network are, and how well that is known."""
+    """Positions of the points and photos of an adjusted network, with cofactors."""
 
-    stations: Floats  # (P, 3), (n, 3) places, with axes of equal units
+    stations: Floats  # (P, 3), (n, 3) positions in axes of equal units
     points: Floats
     poses: Floats  # (P, 6, 6) cofactors of position and attitude
-    ranks: Indices  # (P,) how many unknowns of a pose are not fixed
+    ranks: Indices  # (P,) numbers of pose unknowns that are not fixed
     point_cofactors: Floats  # (n, 3, 3) with axes of equal units
-    # (P,) which photos are no stations: scanners, of which each line is taken from another place; None
-    # for none
+    # (P,) photos of scanners, which have a separate station for each line; None without any
     moving: Bools | None = None
 
 
 def block_terms(result: Result) -> Terms:
-    """Return names and components of photos, points and images of a block."""
+    """Return the terms of a block."""
     block, axes = result.block, point_axes(result.block)
     point_kinds = result.point_kinds[result.used_points]
     lengths = None

@@ -1,4 +1,4 @@
-"""The result of a block as files of a folder, and back (`docs/results.md`)."""
+"""Writing and reading the result of a block as files of a folder (`docs/results.md`)."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _parts(block: Block) -> dict[str, list[Part]]:
     )
     scanned = scanners(block)[block.image_photos]
     if scanned.any():
-        # What is measured there has no length; residuals and deviations are in the focal plane.
+        # Image coordinates of spherical cameras are angles; residuals and deviations are in the focal plane.
         units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
         xy, *others = parts["images"]
         parts["images"] = [
@@ -177,9 +177,9 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
 
 @dataclass(frozen=True, eq=False)
 class KeptTrajectory(Stand):
-    """What stands for a trajectory: what makes it, and the coefficients that it has made.
+    """A stored trajectory: its definition and its computed coefficients.
 
-    A trajectory that is made again has coefficients of its own, and is given back those that others share.
+    A recreated trajectory has new coefficients, which are replaced by shared ones.
     """
 
     name: str
@@ -197,7 +197,7 @@ class KeptTrajectory(Stand):
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 
     def original(self) -> Trajectory:
-        """Return the trajectory; the coefficients in the file must be those of its table and bases."""
+        """Return the trajectory; the stored coefficients must match its table and bases."""
         own_parts = (self.table, self.position, self.rotation, self.body)
         made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (
@@ -243,7 +243,7 @@ CLASSES = (
 
 
 def saved_classes() -> list[type]:
-    """Return the classes that the document of a block may name, observations and unknowns of all kinds."""
+    """Return the classes that the document of a block may contain."""
     found, bases = [*CLASSES], [Observation, Unknown, Passage]
     while bases:
         own: list[Any] = bases.pop().__subclasses__()

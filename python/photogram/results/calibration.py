@@ -1,11 +1,11 @@
-"""What a self-calibration has found: which parameters are significant, which cannot be told apart.
+"""Results of self-calibrations: tests and correlations of camera parameters.
 
-For an estimated parameter p with cofactor q: its standard deviation is s = sigma0 sqrt(q), its test value
-t = (p - p_ref) / s has Student's distribution with the degrees of freedom of the adjustment (the normal one
-where the unit weight is a priori), p_ref being 0 for terms of the lens and the given value for focal length
-and principal point. R^2 = 1 - 1 / (n q), n the diagonal of the normal equations, is its multiple correlation
-with all other unknowns. A group of g terms has p' Q^-1 p / (g sigma0^2), Fisher's F with g and those degrees
-of freedom.
+A parameter p with cofactor q has the standard deviation s = sigma0 sqrt(q). Its test value t = (p - p_ref) /
+s has Student's distribution with the degrees of freedom of the adjustment, or the normal distribution if the
+unit weight is known a priori. p_ref is 0 for distortion terms and the given value for focal length and
+principal point. R^2 = 1 - 1 / (n q) is the squared multiple correlation with all other unknowns; n is the
+diagonal of the normal equations. For a group of g terms, p' Q^-1 p / (g sigma0^2) has Fisher's F distribution
+with g and these degrees of freedom.
 """
 
 from __future__ import annotations
@@ -48,29 +48,29 @@ class ParameterTest:
     given: float
     given_sd: float
     test_value: float  # (value - reference) / sd
-    probability: float  # Of a test value this large if the reference is right
+    probability: float  # Probability of a larger test value under the null hypothesis
     multiple_correlation: float  # R with all other unknowns, 0 to 1
-    redundancy: float  # Redundancy number of its weight; 0 without
+    redundancy: float  # Redundancy number of its weight; 0 without a weight
     gain: float  # Increase of the weighted sum of squares without the parameter (first order)
 
     @property
     def change(self) -> float:
-        """Adjusted minus given."""
+        """Adjusted minus given value."""
         return self.value - self.given
 
     @property
     def significant(self) -> bool:
-        """Whether it differs from its reference at the level of 5 percent."""
+        """Whether it differs from its reference at the 5 percent level."""
         return self.probability < LEVEL
 
     @property
     def separable(self) -> bool:
-        """Whether the observations tell it from the other unknowns."""
+        """Whether the observations separate it from the other unknowns."""
         return not self.multiple_correlation**2 > INSEPARABLE
 
     @property
     def from_prior(self) -> bool:
-        """Whether its weight determines it rather than the images."""
+        """Whether its weight determines it, and not the images."""
         return 0 < self.given_sd < math.inf and self.redundancy < FROM_PRIOR
 
     @property
@@ -80,21 +80,21 @@ class ParameterTest:
 
     @property
     def is_lens(self) -> bool:
-        """Whether it is a term of the lens, not of the principal point or distance."""
+        """Whether it is a distortion term, not the principal point or distance."""
         return self.name not in INTERIOR
 
 
 @dataclass(frozen=True)
 class GroupTest:
-    """Terms of a lens tested together."""
+    """Distortion terms that are tested together."""
 
     names: tuple[str, ...]  # The parameters
     test_value: float  # p' Q^-1 p / (g sigma0^2)
-    probability: float  # Of a test value this large if all are zero
+    probability: float  # Probability of a larger test value if all terms are zero
 
     @property
     def significant(self) -> bool:
-        """Whether they differ from zero at the level of 5 percent."""
+        """Whether the terms differ from zero at the 5 percent level."""
         return self.probability < LEVEL
 
     @property
@@ -111,13 +111,13 @@ class Correlation:
 
 @dataclass(frozen=True)
 class PoseCorrelation:
-    """A parameter that is correlated with one component of the poses of photos."""
+    """A parameter that is correlated with one component of photo poses."""
 
-    # Names of the parameter and of the component: a coordinate, omega, phi or kappa
+    # Names of the parameter and of the pose component: a coordinate, omega, phi or kappa
     parameter: str
     component: str
     photos: tuple[str, ...]  # Photos with correlations above 0.95, the largest first
-    coefficient: float  # The largest
+    coefficient: float  # The largest coefficient
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,18 +129,18 @@ class Calibration:
     camera
         The adjusted camera.
     parameters
-        Its estimated parameters, tested.
+        Tests of its estimated parameters.
     groups
-        Families of terms, tested together.
+        Joint tests of families of terms.
     correlations
-        Pairs of its parameters that are correlated by more than 0.95, largest first.
+        Correlations of parameter pairs above 0.95, largest first.
     poses
         Correlations above 0.95 with positions and attitudes of photos, by parameter and component.
     terms
-        Terms as they are kept or left out together, tested at 1 percent, with what they do to images.
+        Terms that are used together, tested at 1 percent, with their effect on images.
     removable
-        The term that may be left out: the least significant one that stands alone; None if all are needed.
-        Never several at once: without one of them the others have other tests.
+        The term that may be omitted: the least significant independent term; None if all are required. Only
+        one term, because its removal changes the tests of the others.
     """
 
     camera: AdjustedCamera
@@ -152,7 +152,7 @@ class Calibration:
     removable: str | None
 
     def remarks(self) -> list[str]:
-        """Say what needs attention, in sentences."""
+        """Return warnings about the calibration, as sentences."""
         said = []
         for each in self.parameters:
             own = {"name": each.name, "r": each.multiple_correlation, "redundancy": each.redundancy}
@@ -170,10 +170,10 @@ class Calibration:
 
 
 def calibrations(result: Result) -> list[Calibration]:
-    """Return what has been found of each camera with unknown parameters; none without covariances.
+    """Return the calibrations of all cameras with unknown parameters; empty without covariances.
 
-    Correlations with the poses of photos take a factor of the normal equations, and a solution for each
-    parameter; they are computed of the first 20 cameras, and not of a block that was adjusted in parts.
+    Correlations with photo poses require a factorization of the normal equations and a solution for each
+    parameter. They are computed for the first 20 cameras, and not for blocks that were adjusted in parts.
     """
     cameras = [each for each in result.cameras if each.estimated and np.isfinite(each.cofactors).all()]
     covariances = result.covariances() if cameras and result.WHOLE else None
@@ -224,7 +224,7 @@ def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> Gr
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return groups of estimated terms: by letter, radial ones also without the first, Gruen's by degree."""
+    """Return groups of estimated terms: by letter, radial terms also without the first, Gruen's by degree."""
     by_family: dict[str, list[str]] = {}
     for k in camera.estimated:
         name = camera.names[k]
@@ -269,7 +269,7 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
 
 
 def _removable(parameters: tuple[ParameterTest, ...]) -> str | None:
-    """Return the least significant term; a radial one only after those of higher powers."""
+    """Return the least significant term; radial terms in order of decreasing power."""
     lens = [each for each in parameters if each.is_lens]
     radial = [each.name for each in lens if re.fullmatch(r"[Kk]\d", each.name)]
     held_up = set(radial[:-1])

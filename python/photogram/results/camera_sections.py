@@ -1,4 +1,4 @@
-"""The section of cameras: adjusted ones with their tests, correlations and distortion, and fixed ones."""
+"""The section of adjusted cameras (tests, correlations, distortion) and fixed cameras."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from photogram.show.quantity import Axis, Quantity, Table, component, members, o
 if TYPE_CHECKING:
     from photogram import Result
 
-LISTED = 12  # Cameras with a table of their own
+LISTED = 12  # Number of cameras with individual tables
 RADII = 9  # Rows of a distortion curve
 
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
-    """Return adjusted cameras with their tests, correlations and distortion, and those that are held."""
+    """Return the section of adjusted and fixed cameras."""
     found = calibrations(result)
     shown, note = found[:LISTED], "the table of cameras has all"
     tables = [parameters_table(each, law_of(result)) for each in shown]
@@ -67,7 +67,6 @@ def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
 
 
 def law_of(result: Result) -> str:
-    """Return the distribution of the tests of parameters."""
     return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
 
 
@@ -106,7 +105,7 @@ def parameters_table(found: Calibration, law: str = "") -> Table:
 
 
 def gains_section(result: Result) -> Section:
-    """Return the redundancy numbers of weighted parameters, and the gains of all, for reports as text."""
+    """Return redundancy numbers and gains of parameters, for text reports."""
     tables = []
     for found in calibrations(result)[:LISTED]:
         every, name = found.parameters, found.camera.name
@@ -121,7 +120,6 @@ def gains_section(result: Result) -> Section:
 
 
 def outcome(each: ParameterTest) -> str:
-    """Return the outcome of the tests of a parameter."""
     words = ["significant" if each.significant else "not significant"]
     if not each.is_lens:
         words = ["differs from the given value" if each.significant else "as given"]

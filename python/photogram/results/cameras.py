@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustedCamera(Brief):
-    """A camera after the adjustment, with k parameters. Arrays cannot be written."""
+    """A camera with k parameters after the adjustment; arrays are read-only."""
 
     name: str
     given: Camera  # initial values, observed if weighted
     camera: Camera  # with the adjusted parameters
-    cofactors: Floats  # (k, k) for a priori unit weight; zero for held parameters, NaN without covariances
+    cofactors: Floats  # (k, k) for a priori unit weight; zero for fixed parameters, NaN without covariances
     covariance: Floats  # (k, k) cofactors times the variance of unit weight
-    redundancy: Floats  # (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted
+    redundancy: Floats  # (k,) redundancy numbers of weighted parameters; 0 for others
     # (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
-    # have if all other unknowns were known; 0 for held ones
+    # have if all other unknowns were known; 0 for fixed ones
     information: Floats
-    photos: int  # number of its photos, and of their images in the adjustment
+    photos: int  # numbers of its photos, and of their images in the adjustment
     images: int
 
     def __post_init__(self) -> None:
@@ -40,7 +40,7 @@ class AdjustedCamera(Brief):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters."""
+        """Names of the parameters."""
         return self.camera.names
 
     @property
@@ -50,24 +50,24 @@ class AdjustedCamera(Brief):
 
     @property
     def sd(self) -> Floats:
-        """(k,) their standard deviations; 0 where held."""
+        """(k,) standard deviations of the parameters; 0 if fixed."""
         return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
 
     @property
     def correlations(self) -> Floats:
-        """(k, k) correlation coefficients; NaN for held parameters."""
+        """(k, k) correlation coefficients; NaN for fixed parameters."""
         sd = np.sqrt(np.diag(self.cofactors))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.cofactors / np.outer(sd, sd))
 
     @property
     def estimated(self) -> list[int]:
-        """Which parameters are free or weighted."""
+        """Indices of free and weighted parameters."""
         return np.flatnonzero(self.given.deviations > 0).tolist()
 
     @property
     def weighted(self) -> list[int]:
-        """Which of these are weighted."""
+        """Indices of weighted parameters."""
         sd = self.given.deviations
         return np.flatnonzero((sd > 0) & np.isfinite(sd)).tolist()
 
@@ -77,7 +77,7 @@ class AdjustedCamera(Brief):
         Raises
         ------
         InputError
-            Its knots were estimated, too: their covariance has no place in a camera.
+            If its knots were estimated: a camera cannot store their covariance.
         """
         if self.given.knot_unknowns:
             raise InputError(phrase("adjusted.knots", camera=self.name))
@@ -87,7 +87,7 @@ class AdjustedCamera(Brief):
         return self.camera.replace(sd=0.0, covariance=covariance)
 
     def restarted(self) -> Camera:
-        """Return the camera as it was given, but with adjusted values of free parameters."""
+        """Return the given camera with adjusted values of free parameters."""
         found = np.where(np.isinf(self.given.deviations), self.values, self.given.values)
         parameters = dict(zip(self.names, found.tolist(), strict=True))
         return self.given.replace(parameters=parameters, knots=self.camera.knots)
@@ -104,7 +104,7 @@ class AdjustedCamera(Brief):
 def adjusted_cameras(
     block: Block, solution: _photocore.BlockSolution, scale: float
 ) -> tuple[AdjustedCamera, ...]:
-    """Return the adjusted cameras of a block, covariances scaled; none where it has principal distances."""
+    """Return the adjusted cameras of a block with scaled covariances; none for given principal distances."""
     if not block.cameras:
         return ()
     found = []
@@ -133,7 +133,7 @@ def adjusted_cameras(
 
 
 def _knots(block: Block, solution: _photocore.BlockSolution) -> dict[int, Floats]:
-    """Return (ny, nx, 2) adjusted knots of cameras that have unknown ones, by their identity."""
+    """Return (ny, nx, 2) adjusted knots of cameras with unknown knots, by `id`."""
     if not any(each.knot_unknowns for each in block.cameras):
         return {}
     rows = {id(each): row for row, each in enumerate(block.unknowns)}
@@ -148,5 +148,5 @@ def _knots(block: Block, solution: _photocore.BlockSolution) -> dict[int, Floats
 
 
 def units(camera: Camera) -> list[str]:
-    """Return the unit of each parameter: `mm`, `mm^-2`, ... or nothing for plain numbers."""
+    """Return the unit of each parameter: `mm`, `mm^-2`, ..., empty for plain numbers."""
     return [camera.unit_of(name) for name in camera.names]

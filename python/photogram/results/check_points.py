@@ -1,4 +1,4 @@
-"""Check points of an adjusted block: known coordinates that took no part in it, and how it agrees."""
+"""Check points of an adjusted block: known coordinates that were not used in the adjustment."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from photogram.show.quantity import Axis
     from photogram.statistics.findings import Agreement
 
-MOST = 1000  # Check points of the joint test; of more points every second, third ... is used
+MOST = 1000  # Largest number of check points in the joint test; of more points a regular subset is used
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class CheckPoints:
 
     @cached_property
     def statistics(self) -> tuple[Floats, Floats]:
-        """(k,) test values T (F where the unit weight is estimated) and their probabilities."""
+        """(k,) test values T (F if the unit weight is estimated) and their probabilities."""
         if self.agreement is None:
             return np.full(len(self.rows), math.nan), np.full(len(self.rows), math.nan)
         tested = self.agreement.points
@@ -48,9 +48,9 @@ class CheckPoints:
 
 
 def check_points(result: Result) -> CheckPoints:
-    """Return the check points of a result, tested one by one and together.
+    """Return the check points of a result with single and joint tests.
 
-    A block that was adjusted in parts has no covariances of points with each other, so no test of all.
+    Blocks that were adjusted in parts have no covariances between points, and therefore no joint test.
     """
     block = result.block
     rows = np.flatnonzero(result.used_points & (result.point_kinds == "check"))
@@ -91,30 +91,30 @@ def _agreement(result: Result, found: CheckPoints) -> Agreement:
     if joint is None:
         try:
             joint = result.covariance(("point", found.names[some])) / result.covariance_scale
-        except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
+        except AdjustmentError:  # not enough memory, or singular by rounding: single tests remain
             return alone
     return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
-    """Return the name of a point; results are pickled with what names their tests."""
+    """Return the name of a point; a module-level function, so that results can be pickled."""
     return names[place[0]]
 
 
 def together(count: int) -> slice:
-    """Return which of so many check points are tested together: every so many of too many."""
+    """Return the slice of check points that are tested jointly."""
     return slice(None, None, -(-count // MOST) or None)
 
 
 def tested_together(block: Block) -> list[int]:
-    """Return the points of a block whose cofactors with each other that test needs, where all take part."""
+    """Return the points whose joint cofactors this test requires, if all take part."""
     rows = np.flatnonzero(point_kinds(block) == "check")
     chosen: list[int] = rows[together(len(rows))].tolist()
     return chosen
 
 
 def point_kinds(block: Block) -> NDArray[np.str_]:
-    """Return (n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
+    """Return (n,) types: `control` with an observed component, `check` if known only, else `pass`."""
     held: Bools = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held[observed_control(block)] = True
     known = np.isfinite(block.point_positions).any(axis=1)
@@ -122,7 +122,7 @@ def point_kinds(block: Block) -> NDArray[np.str_]:
 
 
 def observed_control(block: Block) -> list[int]:
-    """Return the points of control that is observed with a covariance matrix of its own."""
+    """Return the control points with an observed covariance matrix."""
     names = {each.point for each in block.observations if isinstance(each, Control)}
     return [row for row, name in enumerate(block.point_ids) if name in names] if names else []
 
@@ -130,7 +130,7 @@ def observed_control(block: Block) -> list[int]:
 def _apart(
     differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats
 ) -> dict[str, float | str | Phrase]:
-    """Return how far a point is off in the component with the largest test value."""
+    """Return the distance of a point in the component with the largest test value."""
     own = differences[place[0]]
     with np.errstate(all="ignore"):
         k = int(np.nanargmax(np.abs(own) / np.where(sd > 0, sd, 1e-300)))
@@ -140,12 +140,12 @@ def _apart(
 
 
 def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:
-    """Return standard deviations of given coordinates, and for which points those of control are assumed."""
+    """Return standard deviations of given coordinates, and the points with assumed ones."""
     own = np.full((len(rows), 3), math.nan)
     if block.point_check_sd is not None:
         own = block.point_check_sd[rows]
     lacking: Bools = np.asarray((np.isnan(own) & np.isfinite(differences)).any(axis=1))
-    # Those of observations are lengths, in geographic blocks too.
+    # Standard deviations of observations are lengths, also in geographic blocks.
     observed = [] if block.geographic else [e for e in block.observations if isinstance(e, Control)]
     every = np.vstack([block.point_sd, *(np.sqrt(np.diag(each.precision)) for each in observed)])
     assumed = [np.median(held) if (held := column[np.isfinite(column)]).size else 0.0 for column in every.T]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 INCHES_OF_COMPONENT = 0.32
-MARGIN = 1.1  # Limits over the extreme values
+MARGIN = 1.1  # Limits relative to the extreme values
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +40,7 @@ class VarianceComponents(Judged, Documented, Brief):
     network
         The block or collection with all standard deviations multiplied by the roots of the components.
     result
-        Its adjustment.
+        The adjustment of this network.
     first
         The adjustment with the given standard deviations.
     """
@@ -52,12 +52,12 @@ class VarianceComponents(Judged, Documented, Brief):
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """The components, estimated and held."""
+        """The estimated and fixed components."""
         return self.estimate.components
 
     @property
     def worth_changing(self) -> list[Component]:
-        """Those that differ significantly, and by more than 25 percent of the standard deviation, from 1."""
+        """Components that differ from 1 significantly, and by more than 25 percent of the deviation."""
         return [each for each in self.components if each.worth_changing]
 
     def plot(self) -> Plot:
@@ -95,8 +95,8 @@ class VarianceComponents(Judged, Documented, Brief):
     def _findings(self) -> Findings:
         """Return the components and the tests of the adjustment with their weights.
 
-        Too optimistic weights would make gross errors of good observations. The global test is that of the
-        given weights.
+        With the given weights, if optimistic, good observations would be rejected as gross errors. The global
+        test uses the given weights.
         """
         estimated = [
             GroupFactor(
@@ -118,7 +118,7 @@ class VarianceComponents(Judged, Documented, Brief):
         )
 
     def document(self) -> Document:
-        """Return the document: judgement, what to do first, the components."""
+        """Return the document: verdict, first actions, components."""
         sections = [components_section(self)]
         return Document("Variance components", "", [judged(self.verdict)], self.verdict.next, [], sections)
 
@@ -141,7 +141,7 @@ class VarianceComponents(Judged, Documented, Brief):
 
 
 def weighed_document(found: VarianceComponents, network: Document) -> Document:
-    """Return the document of the network with the given weights, judged by the components."""
+    """Return the document of the network with the given weights, with findings on the components."""
     own = found.document()
     sections = [*own.sections, *network.sections]
     return replace(network, judgements=own.judgements, advice=own.advice, sections=sections)
@@ -187,7 +187,7 @@ def components_table(found: VarianceComponents) -> Table:
 
 
 def statement(found: VarianceComponents) -> list[Phrase]:
-    """Return the messages on what to do."""
+    """Return messages on necessary changes."""
     estimate = found.estimate
     if not estimate.converged:
         return [phrase("variance.not-converged")]

@@ -1,4 +1,4 @@
-"""Covariances of anything in an adjusted network with anything else, and of functions of them."""
+"""Covariances between any unknowns of an adjusted network, and of functions of them."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ if TYPE_CHECKING:
     from photogram import Result
 
 Wanted = str | int | Sequence[str] | Sequence[int] | None
-"""A name, names, or None for all; the photos and points of collections are called by their numbers."""
+"""A name, names, or None for all. Photos and points of collections are identified by number."""
 
-Item = tuple[str, Wanted]  # Kind (`photo`, `step`, `point`, `camera`, `unknown`) and names
+Item = tuple[str, Wanted]  # Type (`photo`, `step`, `point`, `camera`, `unknown`) and names
 
 Selection = Item | Sequence[Item]  # One or several items
 
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    rows: list[tuple[str, int]]  # Kind and index of each part, as the core knows them
-    labels: list[tuple[str, str, str]]  # What each unknown is: kind, name, component
-    values: Floats  # Adjusted values and standard deviations, one after the other
+    rows: list[tuple[str, int]]  # Type and index of each part in the core
+    labels: list[tuple[str, str, str]]  # Type, name and component of each unknown
+    values: Floats  # Adjusted values and standard deviations, concatenated
     sd: Floats
-    shapes: list[tuple[int, ...]]  # Of each item: (k,) for one name, (n, k) for several
+    shapes: list[tuple[int, ...]]  # Shape of each item: (k,) for one name, (n, k) for several
 
     def arrays(self, values: Floats) -> list[Floats]:
-        """Return values item by item."""
+        """Return values by item."""
         parts, start = [], 0
         for shape in self.shapes:
             size = int(np.prod(shape))
@@ -49,28 +49,28 @@ class Selected:
 
 @dataclass(frozen=True, eq=False)
 class Things:
-    ids: Sequence[str]  # Of each its name, the names of its unknowns, their values and standard deviations
+    ids: Sequence[str]  # Names, names of their unknowns, values and standard deviations
     components: Sequence[tuple[str, ...]]
     values: Sequence[Floats] | Floats
     sd: Sequence[Floats] | Floats
-    # What the core calls the parts of such a thing; none where it is called as it is
+    # Types of the parts in the core; empty if the type is the same
     parts: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, every: Sequence[Any], components: str) -> Things:
-        """Return adjusted cameras or common unknowns, whose unknowns an attribute names."""
+        """Return cameras or common unknowns; an attribute contains the names of their unknowns."""
         names, unknowns = [each.name for each in every], [getattr(each, components) for each in every]
         return cls(names, unknowns, [each.values for each in every], [each.sd for each in every])
 
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    network: str  # What it is called: a block, or a collection
-    things: Mapping[str, Things]  # By their kinds
-    numbered: bool = False  # Whether they are called by their numbers
+    network: str  # Type of the network: block or collection
+    things: Mapping[str, Things]  # By type
+    numbered: bool = False  # Whether they are identified by number
 
     def selected(self, selection: Selection) -> Selected:
-        """Return what a selection names; refuse a kind or name that is not there, or that is no name."""
+        """Return the unknowns of a selection; refuse unknown types and names."""
         items = [selection] if isinstance(selection, tuple) and isinstance(selection[0], str) else selection
         rows: list[tuple[str, int]] = []
         labels: list[tuple[str, str, str]] = []
@@ -130,7 +130,7 @@ def photo_components(block: Block) -> tuple[str, ...]:
 
 
 def adjusted(result: Result) -> Adjusted:
-    """Return the adjusted values of a result by kinds and names."""
+    """Return the adjusted values of a result by types and names."""
     block = result.block
     photos, sd = np.hstack([result.photo_positions, result.photo_attitudes]), result.photo_sd
     unknowns_of_photo, count = photo_components(block), len(photos)
@@ -143,7 +143,7 @@ def adjusted(result: Result) -> Adjusted:
             "photo": Things(block.photo_ids, [unknowns_of_photo] * count, photos, sd),
             "step": Things(block.photo_ids, [steps] * count, photos, sd),
             "point": Things(block.point_ids, points, result.point_positions, result.point_sd),
-            # Blocks with principal distances have a camera for each, which is known and never asked for.
+            # Cameras of blocks with principal distances are known, one for each photo.
             "camera": Things.of(result.cameras, "names"),
             "unknown": Things.of(result.unknowns, "components"),
         },
@@ -168,14 +168,14 @@ class Propagated:
     value
         f(x): a number, or an array.
     standard_deviation
-        Of each, in the shape of the value.
+        Standard deviations in the shape of the value.
     covariance
-        (m, m) of all m values, in their order: J Q J^T times the variance of unit weight.
+        (m, m) covariance matrix of all m values in their order: J Q J^T times the variance of unit weight.
     partials
         (m, k) J.
     bias
-        Where it was asked for, 1/2 trace(f'' Q): by how much the mean of f(x) exceeds f of the mean, in the
-        shape of the value; None otherwise.
+        1/2 trace(f'' Q), the difference between the mean of f(x) and f of the mean, in the shape of the
+        value; None unless requested.
     """
 
     value: Any
@@ -186,15 +186,16 @@ class Propagated:
 
 
 class Covariances:
-    """The covariances of an adjusted network, in its datum: it keeps a factor of the normal equations.
+    """The covariances of an adjusted network in its datum; contains a factor of the normal equations.
 
-    A selection is a kind with a name, `("point", "P12")`, several names, `("photo", ["1", "2"])`, or None for
-    all that took part, `("camera", None)`; or a list of these. Kinds are `photo` (position, omega, phi,
-    kappa), `step` (of a photo: its position, and the rotation about its own axes, which is never singular),
-    `point`, `camera` and `unknown` (of observations in common). In a collection, whose photos and points are
-    called by their numbers, they are `photo` (all its parameters), `pose` and `camera` (its first six, and
-    the others) and `point`. Rows and columns stand in this order.
-    Units are those of the result: the linear unit, radians, the units of cameras.
+    A selection is a type with a name, `("point", "P12")`, several names, `("photo", ["1", "2"])`, or None for
+    all that were adjusted, `("camera", None)`; or a list of selections. Types are `photo` (position, omega,
+    phi, kappa), `step` (position of a photo and rotation about its own axes, which is never singular),
+    `point`, `camera` and `unknown` (common unknowns of observations). In collections, photos and points are
+    identified by number. Types are `photo` (all parameters), `pose` and `camera` (the first six and the other
+    parameters), and `point`. Rows and columns have this order.
+
+    Units are the units of the result: the linear unit, radians, the units of cameras.
     """
 
     def __init__(
@@ -208,35 +209,35 @@ class Covariances:
         self._core = self._asked(factored)
 
     def labels(self, selection: Selection) -> list[tuple[str, str, str]]:
-        """Return what the rows of a selection are: kind, name, component.
+        """Return type, name and component of each row of a selection.
 
         Raises
         ------
         InputError
-            A kind or name that is not there.
+            If a type or name does not exist.
         """
         return self._adjusted.selected(selection).labels
 
     def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the joint covariance matrix of a selection, or that of one with another.
+        """Return the covariance matrix of a selection, or between two selections.
 
-        It takes half of a solution for each unknown, or a whole one for each of the smaller side where that
-        is much smaller. Memory is estimated first: (unknowns of a) x (unknowns of b) numbers, and what the
-        fronts of the factor need.
+        The computation requires half a solution for each unknown, or a full solution for each unknown of the
+        smaller selection if it is much smaller. Memory is estimated first: (unknowns of a) x (unknowns of b)
+        numbers, and the fronts of the factor.
 
         Parameters
         ----------
         a, b
-            Selections; without b every two unknowns of a.
+            Selections; without b all pairs of unknowns of a.
 
         Raises
         ------
         InputError
-            A kind or name that is not there, or a point that was left out.
+            If a type or name does not exist, or a point was excluded.
         OutOfMemoryError
-            It would take more memory than there is.
+            If the memory is not sufficient.
         KeyboardInterrupt
-            Ctrl-C.
+            If the user presses Ctrl-C.
         """
         rows = self._adjusted.selected(a).rows
         columns = None if b is None else self._adjusted.selected(b).rows
@@ -247,34 +248,34 @@ class Covariances:
     def combined(self, partials: Floats, selection: Selection) -> Floats:
         """Return the (m, m) covariance matrix of m linear combinations of a selection, J Q J' scaled.
 
-        It takes as many solutions as there are combinations, however many unknowns these are of.
+        The number of solutions is the number of combinations, for any number of unknowns.
 
         Parameters
         ----------
         partials
             (m, k) J: a column for each unknown of the selection.
         selection
-            What is combined; rotation steps, too.
+            The unknowns that are combined; also rotation steps.
 
         Raises
         ------
         InputError, OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariance`.
+            As in :meth:`covariance`.
         """
         rows = self._adjusted.selected(selection).rows
         found = self._asked(lambda: self._core.propagate(partials, rows, threads=0, progress=None))
         return np.asarray(found * self._scale)
 
     def correlation(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return correlation coefficients in place of covariances; NaN for what is held.
+        """Return correlation coefficients instead of covariances; NaN for fixed unknowns.
 
-        A camera with all photos, `correlation(("camera", "wide"), ("step", None))`, takes as many solutions
-        as the camera has parameters.
+        A camera with all photos, `correlation(("camera", "wide"), ("step", None))`, requires one solution for
+        each parameter of the camera.
 
         Raises
         ------
         InputError, OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariance`.
+            As in :meth:`covariance`.
         """
         covariance = self.covariance(a, b)
         if b is None:
@@ -285,7 +286,7 @@ class Covariances:
             return np.asarray(covariance / np.outer(left, right))
 
     def _deviations(self, selection: Selection) -> Floats:
-        """Return standard deviations; of rotation steps from the core, of all others from the result."""
+        """Return standard deviations; of rotation steps from the core, others from the result."""
         selected = self._adjusted.selected(selection)
         if all(kind != "step" for kind, _ in selected.rows):
             return selected.sd
@@ -301,25 +302,25 @@ class Covariances:
     ) -> Propagated:
         """Return a function of adjusted unknowns with its covariance.
 
-        Partials are central differences over a hundredth of each standard deviation. Where the function takes
-        complex arrays and agrees with these, they are exact (complex step).
+        Partial derivatives are central differences with a hundredth of each standard deviation. If the
+        function accepts complex arrays and gives the same derivatives, exact complex steps are used.
 
         Parameters
         ----------
         function
-            Takes an array for each item of the selection: (k,) for one name, (n, k) for several; returns a
-            number or an array.
+            Its arguments are an array for each item of the selection: (k,) for one name, (n, k) for several.
+            It returns a number or an array.
         unknowns
-            What it is a function of.
+            The selection of its unknowns.
         bias
-            Whether to compute the bias, too: from second differences along the axes of the joint ellipsoid.
+            Whether to compute the bias from second differences along the axes of the joint ellipsoid.
 
         Raises
         ------
         InputError
-            A selection that is not there, or a function that returns no finite numbers.
+            If the selection does not exist, or the function returns values that are not finite.
         OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariance`.
+            As in :meth:`covariance`.
         """
         selected = self._adjusted.selected(unknowns)
         if any(kind == "step" for kind, _ in selected.rows):
@@ -338,22 +339,22 @@ class Covariances:
         return Propagated(value, sd, covariance, partials, found)
 
     def suspects(self) -> _photocore.NetworkSuspects:
-        """Return the groups of observations, whose rows :meth:`influences` counts."""
+        """Return the groups of observations; :meth:`influences` uses their rows."""
         return self._core.suspects()
 
     def influences(
         self, selection: Selection, function: Callable[..., Any] | None
     ) -> tuple[list[tuple[str, str, str]], Floats]:
-        """Return what errors of one standard deviation in every observation do to unknowns or a function.
+        """Return the effects of errors of one standard deviation in each observation.
 
         Parameters
         ----------
         selection, function
-            Unknowns, and what they go into; None for themselves.
+            Unknowns, and a function of them; None for the unknowns themselves.
 
         Returns
         -------
-        What the unknowns are, and (k, M) the effect of each row on each of the k.
+        The labels of the unknowns, and (k, M) effects of all rows on each of the k values.
         """
         selected = self._adjusted.selected(selection)
         if function is None:
@@ -370,7 +371,7 @@ class Covariances:
 
 
 def _evaluated(function: Callable[..., Any], selected: Selected, values: Floats) -> Floats:
-    """Evaluate a function; refuse what is no finite number."""
+    """Evaluate a function; refuse values that are not finite."""
     found = np.asarray(function(*selected.arrays(values)))
     if found.dtype.kind not in "fiub" or not np.isfinite(found).all():
         raise argument_error("function", "finite", value=value_field(found))
@@ -381,7 +382,7 @@ def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -
     """Return J: a row for each value, a column for each unknown."""
     partials = np.zeros((value.size, len(selected.values)))
     for k, sd in enumerate(selected.sd.tolist()):
-        if not sd > 0:  # held: no variance, whatever the partial
+        if not sd > 0:  # fixed: zero variance for any derivative
             continue
         ends = []
         for sign in (1.0, -1.0):
@@ -394,7 +395,7 @@ def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -
 
 
 def _complex_partials(function: Callable[..., Any], selected: Selected, differences: Floats) -> Floats:
-    """Return J by complex steps where the function takes them and agrees with differences, else these."""
+    """Return J by complex steps if possible and equal to differences, else by differences."""
     partials = np.zeros_like(differences)
     try:
         for k in np.flatnonzero(selected.sd > 0).tolist():
@@ -406,7 +407,7 @@ def _complex_partials(function: Callable[..., Any], selected: Selected, differen
             partials[:, k] = found.ravel().imag / COMPLEX_STEP
     except (TypeError, ValueError, ArithmeticError):
         return differences
-    # An absolute value on the way would be lost.
+    # Absolute values in the function have no complex derivative.
     scale = np.abs(differences * selected.sd).max(axis=1, initial=0.0, keepdims=True)
     agrees = np.abs((partials - differences) * selected.sd) <= 1e-3 * scale
     return partials if agrees.all() else differences

@@ -1,4 +1,4 @@
-"""What coordinates and standard deviations of a result refer to, in words."""
+"""Messages on the datum of coordinates and standard deviations."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ NOTABLE_LOSS = 1e-9  # Largest part of a variance by rounding without a message
 
 @dataclass(frozen=True)
 class ResultDatum:
-    """What coordinates and standard deviations refer to."""
+    """The datum of coordinates and standard deviations."""
 
-    # `observations` (control, weights and observations give it), `minimal control` (control and weights are
-    # just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`
+    # `observations` (control, weights and observations define it), `minimal control` (control and weights
+    # only define the datum, and check nothing), `minimum constraints`, `inner constraints` or `relative`
     kind: str
-    # Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other kinds
-    # than minimum constraints those from which the network was taken to its datum
+    # Photos, or coefficients of trajectories, with the names of their fixed unknowns; for types other than
+    # minimum constraints, before the transformation of the network to its datum
     held: tuple[tuple[str, str], ...] = ()
-    # points, photos: What carries inner constraints, or what cofactors are relative to
+    # points, photos: Items with inner constraints, or references of relative cofactors
     points: tuple[str, ...] = ()
     photos: tuple[str, ...] = ()
-    scale: bool = False  # Whether inner constraints take the scale from them, too: nothing else gives one
-    lost: float = 0.0  # About how large a part of the variances rounding may be
-    attitudes: tuple[str, ...] = ()  # Photos whose attitudes carry inner constraints
+    scale: bool = False  # Whether inner constraints also define the scale: no observation does
+    lost: float = 0.0  # Approximate part of the variances that is rounding error
+    attitudes: tuple[str, ...] = ()  # Photos with inner constraints on attitudes
     row: DatumRow | None = field(default=None, repr=False)
-    """As the core knows it."""
+    """The datum for the core."""
 
     @property
     def phrase(self) -> Phrase:
@@ -63,12 +63,12 @@ class ResultDatum:
 
     @property
     def is_chosen(self) -> bool:
-        """Whether standard deviations would be others in another datum."""
+        """Whether standard deviations depend on the choice of the datum."""
         return self.kind not in ("observations", "minimal control")
 
     @property
     def has_chosen_scale(self) -> bool:
-        """Whether nothing but the datum gives lengths."""
+        """Whether only the datum defines lengths."""
         return self.scale or (self.kind == "minimum constraints" and holds_scale(self.held))
 
     def document(self) -> dict[str, Any]:
@@ -81,13 +81,13 @@ class ResultDatum:
 
 
 def holds_scale(held: Sequence[tuple[str, str]]) -> bool:
-    """Whether the scale is held: by one coordinate of a photo or coefficient that holds nothing else."""
+    """Whether exactly one coordinate of a photo or coefficient fixes the scale."""
     names = [name for name, _ in held]
     return any(names.count(name) == 1 and not unknown.startswith(TURNS) for name, unknown in held)
 
 
 def held_unknowns(held: Sequence[tuple[str, str]]) -> list[Phrase]:
-    """Return fixed unknowns with their photos, those of one name together."""
+    """Return fixed unknowns with their photos, grouped by name."""
     photos: dict[str, list[str]] = {}
     for photo, unknown in held:
         photos.setdefault(unknown, []).append(photo)
@@ -104,7 +104,7 @@ def datum_of(
     *,
     held: Sequence[tuple[int, int]] | None = None,
 ) -> ResultDatum:
-    """Return the datum of what the core found: that of inner constraints or, without, what it held."""
+    """Return the datum of a solution: of inner constraints, or of fixed unknowns."""
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     for number, component in sorted(solution.datum_unknowns):  # Of coefficients of trajectories
@@ -130,7 +130,7 @@ def datum_of(
 
 
 def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:
-    """Remark on what a block without control rests on: its datum, or the weights of its photos."""
+    """Return messages on the datum, or the weights of photos, of a block without control."""
     messages = []
     if datum.lost > NOTABLE_LOSS:
         messages.append(Message(phrase("free.rounding", share=datum.lost)))
@@ -149,7 +149,7 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
 
 
 def _levelled(block: Block, held: int) -> Phrase | None:
-    """Return the motions that a plumb line, or equal heights, without other datum leave open."""
+    """Return the motions that a plumb line or equal heights leave undetermined without other datum."""
     kinds = {type(each) for each in block.observations}
     scale = [] if Distance in kinds else ["scale"]
     beyond, kinds = held - 4 - len(scale), kinds - {Distance}
@@ -166,7 +166,7 @@ def inner_datum(datum: object) -> InnerConstraints:
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:
-    """Return what cofactors are to be relative to, as the core knows it."""
+    """Return the reference of relative cofactors for the core."""
     if (photo is None) == (points is None):
         raise InputError(phrase("error.exclusive", first="photo", second="points"))
     if photo is not None:

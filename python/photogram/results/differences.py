@@ -1,4 +1,4 @@
-"""How far two results differ: values in standard deviations, and the standard deviations themselves."""
+"""Differences of two results: values in standard deviations, and standard deviations."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _KINDS = ("photo", "point", "camera", "unknown")
 
 @dataclass(frozen=True)
 class Largest:
-    size: float = 0.0  # 0 if nothing differs
-    # Empty if nothing differs
+    size: float = 0.0  # 0 without differences
+    # Empty without differences
     kind: str = ""
     name: str = ""
     component: str = ""
@@ -33,20 +33,20 @@ class Largest:
 
 @dataclass(frozen=True)
 class Differences:
-    """How far a second result differs from a first one, in what both have.
+    """Differences of a second result from a first one, for their common unknowns.
 
     Attributes
     ----------
     values
         The largest difference of adjusted values, in standard deviations of the first result.
     deviations
-        The largest difference of standard deviations, as a part of those of the first result.
+        The largest difference of standard deviations, relative to the first result.
     variance
-        Ratio of the variances of unit weight, second to first; None where one has none.
+        Ratio of the variances of unit weight, second to first; None if one is missing.
     alone
-        What only one of the two has, or adjusted, by kind.
+        Items that only one result contains or has adjusted, by type.
     compared
-        How many unknowns were compared.
+        The number of compared unknowns.
     """
 
     values: Largest
@@ -68,21 +68,20 @@ class Differences:
 
 
 def differences(first: Result, second: Result) -> Differences:
-    """Return by how much a result differs from another one of the same things, by their names.
+    """Return the differences between two results for items with equal names.
 
-    Attitudes may differ by whole turns. What has no standard deviation in the first result, or is held there,
-    is compared in nothing but its standard deviation.
+    Attitudes may differ by full rotations. For unknowns that have no standard deviation or are fixed in the
+    first result, only standard deviations are compared.
 
     Parameters
     ----------
     first, second
-        Results of blocks: of one block, or of different ones that have photos, points, cameras or unknowns
-        of the same names.
+        Results of one block, or of different blocks with photos, points, cameras or unknowns of equal names.
 
     Raises
     ------
     InputError
-        What is no result of a block, or results that have nothing in common.
+        If an argument is not a result of a block, or the results have nothing in common.
     """
     for each in (first, second):
         if not isinstance(each, Result):
@@ -119,7 +118,7 @@ def differences(first: Result, second: Result) -> Differences:
 
 
 def _by_name(things: Things) -> dict[tuple[str, str], list[float]]:
-    """Return values and standard deviations by names of things and components."""
+    """Return values and standard deviations by names of items and components."""
     rows = zip(things.ids, things.components, things.values, things.sd, strict=True)
     return {
         (name, component): pair

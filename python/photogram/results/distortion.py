@@ -1,16 +1,16 @@
-"""The distortion of an adjusted camera, radial and other, with what is known of it.
+"""Radial and other distortion of an adjusted camera, with standard deviations.
 
-A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the
-band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c. A forward camera
-maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a measured position to the ray
-(r + dr) / c, which moves by (J dk - (r / c) dc) / c: so the band of the mapping is that of (J, r / c) or of
-(J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
-curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
-the lens is forward.
+A curve dr(r) of the radial terms k has the partials J = d(dr)/dk. With the cofactors Q of the terms its
+standard deviation is s(r) = sigma0 sqrt(J Q J'). Measurements also depend on the principal distance c. A
+forward camera maps a ray to r + dr, which changes by J dk + (r / c) dc. A backward camera maps a measured
+position to the ray (r + dr) / c, which changes by (J dk - (r / c) dc) / c. Therefore the standard deviation
+of the mapping uses (J, r / c) or (J, -r / c) with the cofactors of k and c. For the balanced curve a part B
+r, which c can absorb, is subtracted so that the curve is zero at r0: J - r w with w = J(r0) / r0. The
+principal distance is then c / (1 + B), or c (1 + B) for forward cameras.
 
-What the other terms do to image positions (decentring, affinity and shear, the sets of Ebner and Gruen, thin
-prisms) stands on a grid: with the terms p, their partials J at a position and the block Q of their cofactors,
-the vector there has the covariance sigma0^2 J Q J'.
+The effect of the other terms (decentring, affinity and shear, the sets of Ebner and Gruen, thin prisms) is
+computed on a grid of image positions. With the terms p, their partials J at a position and their cofactors Q,
+the vector has the covariance sigma0^2 J Q J'.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
-"""Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
+"""Principal distance and point, and the beta of `eucm`, which is never 0; all others are distortion terms."""
 
 RADIAL = re.compile(r"[KkA]\d|k")  # Names of radial terms
 
@@ -49,22 +49,22 @@ class DistortionCurve:
     Attributes
     ----------
     direction
-        `backward`: what is added to measured coordinates, over the measured radius; `forward`: what is added
-        to ideal ones, over the ideal radius.
+        `backward`: corrections of measured coordinates, by measured radius; `forward`: corrections of ideal
+        coordinates, by ideal radius.
     radii
         (n,) from 0.
     values, sd
-        (n,) the curve and its standard deviations, principal distance known.
+        (n,) the curve and its standard deviations for a known principal distance.
     sd_mapping
-        (n,) standard deviations of the whole mapping: with the principal distance.
+        (n,) standard deviations of the complete mapping, including the principal distance.
     balanced, sd_balanced
-        (n,) the curve that vanishes at `balanced_at`, and its standard deviations.
+        (n,) the curve that is zero at `balanced_at`, and its standard deviations.
     balanced_at
         r0.
     balanced_distance
-        The principal distance that belongs to the balanced curve, signed.
+        The signed principal distance of the balanced curve.
     observed
-        The largest radius with an image; values beyond are extrapolated.
+        The largest radius of an image; values at larger radii are extrapolated.
     """
 
     direction: str
@@ -80,14 +80,14 @@ class DistortionCurve:
 
 
 def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:
-    """Return which images of photos with a camera took part."""
+    """Return the indices of the used images of a camera."""
     block = result.block
     row = block.camera_names.index(camera.name)
     return np.flatnonzero(result.used_images & (np.asarray(block.photo_cameras) == row)[block.image_photos])
 
 
 def _images(result: Result, camera: AdjustedCamera) -> Floats:
-    """Return (k, 2) the images of a camera that took part, in the focal plane."""
+    """Return (k, 2) used images of a camera in the focal plane."""
     return np.asarray(focal_images(result.block)[rows_of_images(result, camera)])
 
 
@@ -107,7 +107,7 @@ def _largest_radius(xy: Floats, camera: Camera) -> float:
 
 
 def partials_of(evaluate: Callable[[Camera], Floats], camera: Camera, steps: Mapping[str, float]) -> Floats:
-    """Return (k, ...) central differences of a function of a camera by k parameters, over their steps."""
+    """Return (k, ...) central differences by k parameters, divided by their steps."""
 
     def at(name: str, value: float) -> Floats:
         return evaluate(camera.replace(parameters={**camera.parameters, name: value}))
@@ -121,16 +121,17 @@ def partials_of(evaluate: Callable[[Camera], Floats], camera: Camera, steps: Map
 def distortion_curve(
     result: Result, camera: AdjustedCamera, radii: Floats | None = None
 ) -> DistortionCurve | None:
-    """Return the curve of a camera that has radial terms, None of one that has none or no images.
+    """Return the distortion curve of a camera; None without radial terms or images.
 
     Parameters
     ----------
     result
-        The result that has the camera.
+        The result with the camera.
     camera
         The camera.
     radii
-        (n,) in the unit of image coordinates; evenly to a quarter beyond the largest observed when None.
+        (n,) in the unit of image coordinates; by default equidistant to 1.25 times the largest observed
+        radius.
     """
     terms = [k for k, name in enumerate(camera.names) if RADIAL.fullmatch(name)]
     used = any(camera.values[k] != 0 or k in camera.estimated for k in terms)
@@ -162,16 +163,16 @@ def distortion_curve(
 
 
 def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> Floats:
-    """Return (r,) standard deviations of a curve whose partials by some parameters are (r, t).
+    """Return (r,) standard deviations of a curve with the (r, t) partials of some parameters.
 
-    `covariance` is that of all parameters of the camera.
+    `covariance` is the matrix of all parameters of the camera.
     """
     variances = np.einsum("ni,ij,nj->n", partials, covariance[np.ix_(terms, terms)], partials)
     return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
 
 def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the (r,) curve of the radial terms alone, and its partials by these terms.
+    """Return the (r,) curve of the radial terms, and its partials by these terms.
 
     `sd` are the (k,) standard deviations of all parameters, `terms` the indices of the radial ones.
     """
@@ -186,7 +187,7 @@ def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) ->
 
 
 def radial_part(camera: Camera) -> Camera:
-    """Return a camera without what is not radial: principal point, decentring, affinity."""
+    """Return a camera with radial terms only: without principal point, decentring, affinity."""
     keep = {"c", "f", "fx", "fy", *camera.constants, *filter(RADIAL.fullmatch, camera.names)}
     return camera.replace(
         parameters={name: value if name in keep else 0.0 for name, value in camera.parameters.items()},
@@ -196,7 +197,7 @@ def radial_part(camera: Camera) -> Camera:
 
 
 def added_along(camera: Camera, radii: Floats) -> Floats:
-    """Return what is added to a radius along x: to measured coordinates, or to ideal ones."""
+    """Return the correction of radii along x, of measured or ideal coordinates."""
     zero = np.zeros_like(radii)
     if _is_backward(camera):
         corrected = _photocore.camera_correct(camera.model, camera.values, np.column_stack([radii, zero]))
@@ -222,7 +223,7 @@ GRID = 9  # Positions along either side of the observed part of the image
 
 @dataclass(frozen=True, eq=False)
 class LensField:
-    """Vectors at n positions, in the unit of image coordinates.
+    """Distortion vectors at n positions, in the unit of image coordinates.
 
     Attributes
     ----------
@@ -231,7 +232,7 @@ class LensField:
     positions
         (n, 2) image positions.
     vectors
-        (n, 2) what the terms add: to measured coordinates where the lens is backward, else to ideal ones.
+        (n, 2) corrections by the terms: of measured coordinates if backward, of ideal ones if forward.
     covariances
         (n, 2, 2) of the vectors.
     """
@@ -243,12 +244,12 @@ class LensField:
 
     @property
     def largest(self) -> int:
-        """Where the longest vector is."""
+        """The index of the longest vector."""
         return int(np.argmax(np.hypot(*self.vectors.T)))
 
 
 def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
-    """Return the vectors of a camera; None without such terms, or without images."""
+    """Return the vectors of a camera; None without such terms or without images."""
     names = tuple(
         name
         for k, name in enumerate(camera.names)

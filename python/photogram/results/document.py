@@ -1,4 +1,4 @@
-"""The document of an adjusted block: its report, its page, and its JSON document (`docs/json.md`)."""
+"""The text report, HTML page and JSON document (`docs/json.md`) of an adjusted block."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from photogram import Result
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite
+@np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
     pictures, (head, figures) = drawings(result), bandwidths(result)
     given = [
@@ -156,7 +156,7 @@ def size_of(result: Result) -> list[tuple[str, str]]:
 
 
 def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
-    """Return the bandwidths that the 1987 program would have needed, in the order of the input and as chosen.
+    """Return the bandwidths in the 1987 program, in the order of the input and in the chosen order.
 
     A sentence, and names with values.
     """
@@ -222,7 +222,7 @@ def block_members(result: Result) -> dict[str, Any]:
 
 
 def _of_some(result: Result) -> dict[str, Any]:
-    """Return the members on what only some blocks have."""
+    """Return the members that only some blocks have."""
     found: dict[str, Any] = {}
     if result.cameras:
         found["cameras"] = [

@@ -1,4 +1,4 @@
-"""Photos and points that were entered twice: their image observations are equal to the last digit."""
+"""Duplicate photos and points: their image observations are identical."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from photogram.network.block import Block
 from photogram.words import Phrase, phrase
 
 FEWEST = 4  # Equal image observations of two photos
-SHARE = 0.5  # Share of the observations of a photo that are equal
+SHARE = 0.5  # Share of equal observations of a photo
 FEWEST_OF_POINT = 2  # Equal image observations of two points
 
 
 def duplicates(block: Block) -> list[Phrase]:
     """Return messages on photos, and on points, that have the same image observations."""
-    # Different observations have different sums: then nothing is compared.
+    # Different observations have different sums and are not compared.
     sums = np.sort(block.image_xy[:, 0] * np.pi + block.image_xy[:, 1])
     if not (np.diff(sums) == 0).any():
         return []
@@ -32,7 +32,7 @@ def duplicates(block: Block) -> list[Phrase]:
 
 
 def _equal_pairs(owners: Indices, others: Indices, block: Block, fewest: int) -> list[tuple[int, int]]:
-    """Return pairs of owners that most of their image observations have in common."""
+    """Return pairs of owners with mostly equal image observations."""
     xy = block.image_xy
     order = np.lexsort((xy[:, 1], xy[:, 0], others))
     first, second = order[:-1], order[1:]

@@ -1,4 +1,4 @@
-"""Error ellipses of positions in the horizontal plane: axes, azimuths, outlines, and a scale to see them."""
+"""Error ellipses of horizontal positions: axes, azimuths, outlines, display scale."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.95  # Default probability of an ellipse
 VERTICES = 36
-SHARE = 0.3  # Size of a typical drawn ellipse as a part of the distance between neighbours
+SHARE = 0.3  # Size of a typical drawn ellipse relative to the distance between neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,11 @@ class Ellipses:
     major: Floats  # (n,) semi-axes in the unit of the positions
     minor: Floats
     azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2
-    # The probability that the true position lies within; None: standard ellipses (39 %)
+    # Probability that the ellipse contains the true position; None: standard ellipses (39 %)
     confidence: float | None
 
     def outlines(self, centres: Floats, scale: float = 1.0) -> Floats:
-        """Return (n, 37, 2) closed outlines about (n, 2) centres, magnified: 36 vertices each."""
+        """Return (n, 37, 2) closed outlines about (n, 2) centres, enlarged; 36 vertices each."""
         around = np.linspace(0.0, math.tau, VERTICES + 1)
         along, across = (
             scale * np.outer(self.major, np.cos(around)),
@@ -47,8 +47,8 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
     """Return the error ellipses of (n, 2, 2) or larger covariance matrices, of east and north in this order.
 
     The axes are the roots of the eigenvalues, times the root of the quantile of chi-square with two degrees
-    of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. The azimuth is half of atan2(2 s_en, s_nn - s_ee).
-    NaN where a covariance is.
+    of freedom, -2 ln(1 - confidence): 2.4477 for 95 %. The azimuth is half of atan2(2 s_en, s_nn - s_ee). NaN
+    if the covariance is NaN.
     """
     factor = 1.0 if confidence is None else math.sqrt(-2.0 * math.log1p(-confidence))
     east, north, both = covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 0, 1]
@@ -62,9 +62,9 @@ def ellipses(covariances: Floats, confidence: float | None = CONFIDENCE) -> Elli
 
 
 def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
-    """Return (n, 3, 3) covariances of points, or of stations, in the linear unit.
+    """Return (n, 3, 3) covariances of points or stations in the linear unit.
 
-    They are along X, Y, Z or, in geographic space, east, north and up at each.
+    The axes are X, Y, Z, or east, north and up in geographic space.
     """
     found = result.photo_covariances[:, :3, :3] if photos else result.point_covariances
     if result.block.spheroid is None:
@@ -75,9 +75,9 @@ def metric_covariances(result: Result, *, photos: bool = False) -> Floats:
 
 
 def fitting_scale(found: Ellipses, places: Floats) -> float:
-    """Return a round magnification (1, 2, 5, 10 ...) at which ellipses at (n, 2) places are seen.
+    """Return a round display scale (1, 2, 5, 10 ...) for ellipses at (n, 2) positions.
 
-    The median major axis takes about a third of the distance between neighbours.
+    The median major axis is about a third of the distance between neighbours.
     """
     known = np.isfinite(found.major) & np.isfinite(places[:, :2]).all(axis=1)
     if not known.any():

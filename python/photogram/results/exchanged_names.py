@@ -1,12 +1,12 @@
-"""Names of two points that are exchanged on a photo: the image of each fits the place of the other.
+"""Exchanged names of two points on a photo: each image fits the position of the other point.
 
-For a point with its rays, one of them under suspicion, T is the sum of the squares of their residuals where
-they fit best, in standard deviations, given coordinates among them; photos stand where the other observations
-have put them. Images i and j of a photo are exchanged when T of both points as they are named is beyond
+For a point with its rays, one of them suspected, T is the minimum of the sum of squared residuals in standard
+deviations. Given coordinates are included, and photos are fixed at their adjustment by the other
+observations. Images i and j of a photo are exchanged if T of both points with the given names is larger than
 
     T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
 
-(:mod:`photogram.statistics.likelihood`): the factor 3 stands for what photos are uncertain by.
+(:mod:`photogram.statistics.likelihood`). The factor 3 accounts for the uncertainty of photos.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from photogram.statistics.likelihood import are_exchanged
 from photogram.words import Phrase
 
 MOST = 40  # Largest number of excluded images of a photo
-UNCERTAIN = 3.0  # Factor of T by errors of photos, which are fixed here
+UNCERTAIN = 3.0  # Factor of T for errors of photos, which are fixed here
 STEPS = 4  # Gauss-Newton steps from the intersection of the rays
 HELD = 1e-6  # Standard deviation of fixed coordinates, relative to an image at the distance of the object
 
 
 @dataclass(frozen=True)
 class Exchange:
-    photos: tuple[str, ...]  # several if the images do not show on which photo
+    photos: tuple[str, ...]  # several if the images do not determine the photo
     points: tuple[str, str]
-    # as_named, exchanged: T of both points as they are named, and with the names exchanged on the first of
-    # the photos
+    # as_named, exchanged: T of both points with the given names, and with exchanged names on the first of the
+    # photos
     as_named: float
     exchanged: float
     dimension: int  # degrees of freedom of both
@@ -48,7 +48,7 @@ class Exchange:
 
     @property
     def probable(self) -> Phrase:
-        """The same of a network that has not been adjusted without it."""
+        """The sentence for a network that was not adjusted without it."""
         one, other = self.points
         return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
 
@@ -59,10 +59,10 @@ class Exchange:
 
 
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
-    """Find exchanged names among the images that a snooped network does without.
+    """Find exchanged names among the excluded images of a network after data snooping.
 
-    `block` has all images, with photos where the adjustment without gross errors has put them; (m,) `used`
-    take part in that, and `variance` is its variance of unit weight.
+    `block` has all images, with photos from the adjustment without gross errors. This adjustment contains the
+    (m,) `used` images and has the `variance` of unit weight.
     """
     plain, seen = seen_without_lenses(block)
     mounted = {each.photo for each in block.mounts}
@@ -91,7 +91,7 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
 def _surest(
     block: Block, passing: dict[tuple[int, int], list[tuple[float, float, int, int]]]
 ) -> list[Exchange]:
-    """Return the pairs, the surest first; a point is in one of them."""
+    """Return the most certain pairs first; each point is in one pair only."""
     order = sorted(passing.items(), key=lambda each: min(each[1])[0] - min(each[1])[1])
     taken: set[int] = set()
     found = []
@@ -107,7 +107,7 @@ def _surest(
 
 
 def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]:
-    """Return images that are out and on one photo, two by two."""
+    """Return pairs of excluded images on the same photo."""
     out = np.flatnonzero(~used & ~on_frames[block.image_photos])
     out = out[np.argsort(block.image_photos[out], kind="stable")]
     bounds = np.flatnonzero(np.diff(block.image_photos[out], prepend=-1, append=-1))
@@ -129,9 +129,9 @@ class _Fit:
         self.start = np.concatenate([[0], np.cumsum(counts)])
 
     def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
-        """Return T and its dimension of points with a ray through another image of the same photo.
+        """Return T and its dimension for points with a ray through another image of the photo.
 
-        Each of `wanted` is an image of the point, whose place the second image takes.
+        Each pair of `wanted` is an image of the point, and the image that replaces it.
         """
         of_images = [np.append(self._others(image), place) for image, place in wanted]
         sizes = [len(each) for each in of_images]
@@ -143,7 +143,7 @@ class _Fit:
         return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
 
     def _others(self, image: int) -> Indices:
-        """Return the images of an image's point on other photos: those that take part, where there are."""
+        """Return the other images of a point, on other photos: used ones, if any."""
         block, point = self.block, self.block.image_points[image]
         own = self.order[self.start[point] : self.start[point + 1]]
         own = own[block.image_photos[own] != block.image_photos[image]]
@@ -152,16 +152,16 @@ class _Fit:
         return found
 
     def _prior_sd(self, points: Indices) -> Floats:
-        """(n, 3) standard deviations of given coordinates; in geographic space images decide alone."""
+        """(n, 3) standard deviations of given coordinates; not used in geographic space."""
         sd = self.block.point_sd[points]
         if self.block.geographic:
             return np.full(sd.shape, np.inf)
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
     def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) least sums of squares of (n,) points; infinite if rays do not meet before the cameras.
+        """(n,) minimum sums of squares of points; infinite if rays do not intersect in front of the cameras.
 
-        Images `rows` are those of the points `own` among these.
+        `rows` are the images of the points `own`.
         """
         block, rays, count = self.block, self.rays, len(points)
         sd = block.image_sd[rows]
@@ -176,7 +176,7 @@ class _Fit:
         position = meet(
             total(across[rows]), total(right[rows]), np.bincount(own, minlength=count).astype(float)
         )
-        # Axes are those of the block where priors count, and a component may be unknown.
+        # The axes are those of the block if priors are used, and a component may be unknown.
         given = block.point_positions[points] - self.rays.axes.origin
         prior_sd = self._prior_sd(points)
         held = np.isfinite(prior_sd)

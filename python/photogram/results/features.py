@@ -1,4 +1,4 @@
-"""Features through adjusted points, distances to cylinders: values, tables, documents (docs/features.md)."""
+"""Features through adjusted points and distances to cylinders (docs/features.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _EXPANDED = "expanded uncertainty, k times the standard deviation"
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
 Definition = tuple[str, str | Sequence[str]]
-"""A kind with the points that it goes through: names, or patterns such as `hole-*`."""
+"""A type with its points: names, or patterns such as `hole-*`."""
 
 
 @dataclass(frozen=True)
@@ -46,25 +46,25 @@ class Quantity:
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A feature through n adjusted points; `feature["diameter"]` is one of its quantities.
+    """A feature through n adjusted points; `feature["diameter"]` returns a quantity.
 
     Attributes
     ----------
     name, kind
-        What it is called, and one of `distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`.
+        Its name, and one of `distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`.
     points
         The names of the points.
     quantities
-        What is said of it, q quantities.
+        Its q quantities.
     covariance
         (q, q) their joint covariance.
     deviations, deviation_sd
-        (n, d) distances of the points from it, and their standard deviations: outside positive; of a plane on
-        the side of its normal. Of a circle two: in its plane, and out of it. (0, 1) for a distance.
+        (n, d) distances of the points from the feature, and their standard deviations: positive outside, or
+        on the side of the normal of a plane. Circles have two: in the plane, and perpendicular to it. (0, 1)
+        for a distance.
     statistic, freedom, probability
-        Whether the deviations together are more than errors of the points: d' C_d^- d, the deviations that
-        count in it, and the probability of a sum as large where the form is perfect. None where that cannot
-        be tested.
+        The test whether point errors explain the deviations: d' C_d^- d, the number of independent
+        deviations, and the probability of a larger sum for a perfect form. None if a test is not possible.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Feature:
 
     @property
     def form(self) -> str:
-        """What the test says of the deviations, in words; empty if there is none."""
+        """The result of the test of form; empty without a test."""
         if self.probability is None:
             return ""
         if self.probability < LEVEL:
@@ -95,21 +95,21 @@ class Feature:
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Features of an adjusted block; `features["bore"]` is one of them.
+    """Features of an adjusted block; `features["bore"]` returns a feature.
 
     Attributes
     ----------
     features
-        All of them.
+        All features.
     k
         The coverage factor: U = k sd.
     coverage
-        The probability from which k comes; None where k was given.
+        The probability that defines k; None if k was given.
     freedom
-        Degrees of freedom of the variance of unit weight, with which k follows from the probability; infinite
-        where it is known.
+        Degrees of freedom of the variance of unit weight, which define k with the probability; infinite if
+        the variance is known.
     remarks
-        What values and standard deviations rest on, where that has to be known.
+        Necessary assumptions of values and standard deviations.
     """
 
     features: tuple[Feature, ...]
@@ -124,24 +124,24 @@ class Features:
         return found
 
     def __iter__(self) -> Iterator[Feature]:
-        """Go through the features."""
+        """Iterate over the features."""
         return iter(self.features)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of features."""
         return len(self.features)
 
     @property
     def definitions(self) -> dict[str, Definition]:
-        """What they go through, as :func:`photogram.features` takes it."""
+        """Definitions of the features, the argument of :func:`photogram.features`."""
         return {each.name: (each.kind, each.points) for each in self}
 
     def columns(self) -> dict[str, Any]:
-        """Return a row for each quantity, as named columns."""
+        """Return the quantities as named columns."""
         return quantity.frame(quantity_columns(self))
 
     def deviation_columns(self) -> dict[str, Any]:
-        """Return a row for each deviation of a point, as named columns."""
+        """Return the deviations of points as named columns."""
         return quantity.frame(deviation_quantities(self))
 
     def table(self) -> pd.DataFrame:
@@ -158,7 +158,6 @@ class Features:
 
 
 def quantity_columns(features: Features) -> list[quantity.Quantity]:
-    """Return a row for each quantity."""
     every = [(each, own) for each in features for own in each.quantities]
     axes, of = tuple(Axis.of(own.name, own.unit) for _, own in every), np.arange(len(every))
     text, number = (partial(quantity.Quantity, kind=kind) for kind in ("name", "number"))
@@ -178,7 +177,7 @@ def quantity_columns(features: Features) -> list[quantity.Quantity]:
 
 
 def unit_deviations(features: Features) -> Floats:
-    """(1, q) the smallest standard deviation among the quantities of a feature with the same unit."""
+    """(1, q) smallest standard deviation among the quantities with the same unit."""
     smallest = [
         min((one.sd for one in each.quantities if one.unit == own.unit and one.sd > 0), default=math.nan)
         for each in features
@@ -188,7 +187,6 @@ def unit_deviations(features: Features) -> Floats:
 
 
 def deviation_quantities(features: Features) -> list[quantity.Quantity]:
-    """Return a row for each deviation of a point."""
     rows = [
         (each.name, point, across, each.quantities[0].unit, *numbers)
         for each in features
@@ -212,12 +210,12 @@ def deviation_quantities(features: Features) -> list[quantity.Quantity]:
 
 
 def directions(kind: str) -> tuple[str, ...]:
-    """Return in which directions points deviate from a feature."""
+    """Return the names of the deviations of points from a feature."""
     return {"circle": ("outward", "axial"), "plane": ("axial",)}.get(kind, ("outward",))
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order of the request."""
+    """Return points by names and patterns, without repetition, in the order of the request."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:

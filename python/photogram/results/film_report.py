@@ -1,4 +1,4 @@
-"""Films, their marks and scanners as tables, as a section and as members of JSON documents."""
+"""Films, fiducial marks and scanners as tables, a section and members of JSON documents."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from photogram.show.quantity import Axis, Kind, Quantity, Table, members_of_each
 if TYPE_CHECKING:
     from photogram import Result
 
-STEPS = 9  # Places of a pattern along a side of the format
+STEPS = 9  # Positions of a pattern along a side of the format
 
 
 @dataclass(frozen=True, eq=False)
 class MarkResiduals:
-    """The residuals of k readings of marks, brought back to the frame of the camera, and their tests."""
+    """Residuals of k readings of marks in the frame of the camera, and their tests."""
 
     photos: Indices  # (k,) row of the photo of each reading
     marks: tuple[str, ...]  # (k,) the name of its mark
-    # (k, 2) observed minus computed, mm in the camera's frame: so those of turned and mirrored films
-    # are alike
+    # (k, 2) observed minus computed, mm in the camera's frame, also for rotated and mirrored films
     xy: Floats
-    tests: Floats  # (k,) T of both coordinates together; NaN where it was not tested
+    tests: Floats  # (k,) T of both coordinates; NaN without a test
 
 
 def mark_residuals(result: Result) -> MarkResiduals:
@@ -65,7 +64,7 @@ def mark_residuals(result: Result) -> MarkResiduals:
 
 
 def mean_mark_residuals(result: Result) -> list[VectorField]:
-    """Return residuals of marks, mean over the photos of each camera, where these were read."""
+    """Return mean residuals of the read marks of each camera."""
     residuals, block, marks = mark_residuals(result), result.block, result.fiducials
     of = np.zeros(len(block.photo_ids), dtype=np.int64)
     if block.photo_cameras is not None:
@@ -90,7 +89,7 @@ def mean_mark_residuals(result: Result) -> list[VectorField]:
 
 
 def film_patterns(result: Result) -> list[VectorField]:
-    """Return the systematic deformation of each film that has a pattern, over its format."""
+    """Return the systematic deformation of each film with a pattern, over its format."""
     found: dict[int, VectorField] = {}
     for _, film in result.films:
         pattern = film.pattern
@@ -100,7 +99,7 @@ def film_patterns(result: Result) -> list[VectorField]:
 
 
 def _deformation(result: Result, pattern: Pattern) -> VectorField:
-    """Return D(q) over the format: what a film that has changed in no other way reads, less q."""
+    """Return D(q) over the format: the reading of an otherwise unchanged film, minus q."""
     own = {id(each.given): each.position for each in result.unknowns}
     numbers = np.asarray(pattern.numbers)
     low, high = np.full(2, -numbers[0]), np.full(2, numbers[0])
@@ -151,9 +150,9 @@ def _photos(result: Result) -> Quantity:
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
-    """Return the marks that were read on other photos of a camera, by the row of the photo.
+    """Return the marks that were read only on other photos of a camera, by photo row.
 
-    The halves of a joined scan are one photo in this.
+    The halves of a joined scan count as one photo.
     """
     cameras, names = result.block.photo_cameras, result.block.camera_names
     of = {row: 0 if cameras is None else int(cameras[row]) for row, _ in result.films}
@@ -175,7 +174,7 @@ def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
 
 
 def form_table(result: Result) -> list[Quantity]:
-    """Return the forms of six numbers, `reading = a0 + a1 x + a2 y`, and what they say, with deviations."""
+    """Return the affine forms, `reading = a0 + a1 x + a2 y`, and derived values with deviations."""
     forms = list(result.film_forms.values())
     unit = "px" if any(film.readings.pitch != 1.0 for _, film in result.films) else "mm"
     names = [f"{which}{k}" for which in "xy" for k in range(3)]

@@ -1,4 +1,4 @@
-"""Films of photos and their fiducial marks after an adjustment; `film_report` makes tables of them."""
+"""Adjusted films of photos and fiducial marks; `film_report` contains their tables."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from photogram.results.unknowns import AdjustedUnknown
 
 
 class OnFilm:
-    """What a result says of scanned films and plates, and of their fiducial marks."""
+    """Results for scanned films and plates, and their fiducial marks."""
 
     block: Block
     kinds: Mapping[str, ObservedKind]
@@ -32,13 +32,13 @@ class OnFilm:
 
     @property
     def films(self) -> list[tuple[int, Film]]:
-        """The films of scanned photos, with the rows of these."""
+        """The films of scanned photos, with the rows of these photos."""
         rows = {name: row for row, name in enumerate(self.block.photo_ids)}
         return [(rows[each.photo], each.film) for each in self.block.passages if isinstance(each, Scan)]
 
     @property
     def film(self) -> Floats:
-        """(P, 6) t1, t2 (mm), theta (radians), m, b1, b2 of the photos; NaN of those that are no films."""
+        """(P, 6) t1, t2 (mm), theta (radians), m, b1, b2 of the photos; NaN for photos without film."""
         own = self._by_given
         found = np.full((len(self.block.photo_ids), 6), np.nan)
         for row, film in self.films:
@@ -49,7 +49,7 @@ class OnFilm:
 
     @property
     def film_cofactors(self) -> Floats:
-        """(P, 6, 6) cofactors of the same; of an m that is its roll's, with the others, NaN."""
+        """(P, 6, 6) cofactors of `film`; NaN for an m that is common to a roll."""
         own = self._by_given
         found = np.full((len(self.block.photo_ids), 6, 6), np.nan)
         for row, film in self.films:
@@ -64,14 +64,14 @@ class OnFilm:
 
     @property
     def film_sd(self) -> Floats:
-        """(P, 6) standard deviations of the same; 0 of what is held."""
+        """(P, 6) standard deviations of `film`; 0 if fixed."""
         with np.errstate(invalid="ignore"):
             variances = np.diagonal(self.film_cofactors, axis1=1, axis2=2) * self.covariance_scale
             return frozen(np.sqrt(variances))
 
     @property
     def fiducials(self) -> dict[str, AdjustedUnknown]:
-        """The fiducial marks by their names, camera and mark: places in the camera's frame, mm."""
+        """The fiducial marks by name of camera and mark: positions in the camera's frame, mm."""
         return {each.name: each for each in self.unknowns if isinstance(each.given, Mark)}
 
     @property
@@ -81,12 +81,12 @@ class OnFilm:
 
     @property
     def fiducial_redundancy(self) -> Floats:
-        """(k, 2) their redundancy numbers."""
+        """(k, 2) redundancy numbers of the readings."""
         return self._of_readings("redundancy")
 
     @property
     def fiducial_standardized(self) -> Floats:
-        """(k, 2) their standardized residuals."""
+        """(k, 2) standardized residuals of the readings."""
         return self._of_readings("standardized")
 
     def _of_readings(self, what: str) -> Floats:
@@ -96,10 +96,10 @@ class OnFilm:
 
     @property
     def refined(self) -> tuple[Floats, Floats]:
-        """(m, 2) images in the frame of their cameras by the adjusted films, mm, and standard deviations.
+        """(m, 2) images in the frames of their cameras by the adjusted films, mm, and standard deviations.
 
-        The lens is in them. Standard deviations are those of readings alone: what images have in common by
-        their film, marks and scanner is not in them. NaN of photos that are no films.
+        Distortion is not removed. Standard deviations are those of the readings only, without the common
+        errors of film, marks and scanner. NaN for photos without film.
         """
         block = self.block
         places, sd = np.full(block.image_xy.shape, np.nan), np.full(block.image_xy.shape, np.nan)
@@ -114,10 +114,10 @@ class OnFilm:
 
     @property
     def film_forms(self) -> dict[str, Affine]:
-        """The form of six numbers of the film of each photo, `reading = a0 + a1 x + a2 y`, by its name.
+        """The affine form of the film of each photo, `reading = a0 + a1 x + a2 y`, by name of photo.
 
-        What is not affine in films is left out, and the scanner is taken as errorless. Standard deviations
-        are NaN where an m is that of its roll.
+        Other deformations of films are omitted, and the scanner is assumed to be without error. Standard
+        deviations are NaN if m is common to a roll.
         """
         cofactors = self.film_cofactors * self.covariance_scale
         return {
@@ -127,6 +127,6 @@ class OnFilm:
 
 
 def numbers_of_film(result: OnFilm, film: Film) -> list[Floats]:
-    """Return (3,) the adjusted numbers of each of the unknowns of a film."""
+    """Return (3,) adjusted numbers of each unknown of a film."""
     own = result._by_given
     return [own[id(each)].position for each in film.unknowns]

@@ -1,4 +1,4 @@
-"""What the verdict on an adjusted block rests on."""
+"""The findings for the verdict of an adjusted block."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ HARMFUL = {
     "given at the place of a station that sees it": Phrase("harmful.at-station"),
     "given beside a station that sees it, and its images do not fit": Phrase("harmful.near-station"),
 }
-"""Reasons of the core for leaving out a point that would distort the others, and messages on its images."""
+"""Reasons of the core for excluding points that would distort others, and messages on their images."""
 
 
 DISTANCES = frozenset({"c", "f", "fx", "fy"})  # Names of principal distances
-UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, as a part of it
+UNKNOWN = 1 / 3  # Largest standard deviation of a determined principal distance, relative to it
 
 
 def network_findings(
@@ -41,7 +41,7 @@ def network_findings(
     fixed: Iterable[Tested],
     systematic: Sequence[Systematic],
 ) -> Findings:
-    """Return the findings that every network has, with tests of fixed values and of patterns."""
+    """Return the findings of all networks, with tests of fixed values and of patterns."""
     tests, summary = Tests(result), result.reliability_summary
     return Findings(
         status=result.status,
@@ -64,10 +64,10 @@ def network_findings(
 
 
 def block_findings(result: Result) -> Findings:
-    """Return the tests of a block: standard deviations are given, so the unit weight is known."""
-    # Held to look for blunders before the photos are adjusted: nobody takes these places for true.
+    """Return the tests of a block; standard deviations are given, so the unit weight is known."""
+    # Fixed temporarily to find gross errors before the adjustment of photos.
     intersected = not result.photo_given_sd.any()
-    # Data snooping needs the whole block and adjusted photos.
+    # Data snooping requires the complete block and adjusted photos.
     tests_more = result.WHOLE and not intersected
     fixed, systematic = ([], []) if intersected else (held_tested(result), _patterns(result))
     found = network_findings(result, fixed, systematic)
@@ -93,7 +93,7 @@ def block_findings(result: Result) -> Findings:
 
 
 def _iterated(result: Result) -> Phrase | None:
-    """Return how to end iterations that ran out; None for other ends."""
+    """Return the remedy for an exceeded number of iterations; None for other terminations."""
     if result.status != "not converged":
         return None
     weak = any(isinstance(each, Undetermined) for each in result.messages)
@@ -103,7 +103,7 @@ def _iterated(result: Result) -> Phrase | None:
 
 
 def _unproved(result: Result) -> list[Phrase]:
-    """Return what nothing proves of a block: its accuracy without check points, points with two rays."""
+    """Return the unverified properties of a block: no check points, points with two rays."""
     found = []
     if not (result.used_points & (result.point_kinds == "check")).any():
         found.append(Phrase("advice.check-points"))
@@ -113,7 +113,7 @@ def _unproved(result: Result) -> list[Phrase]:
 
 
 def left_open(result: AdjustedNetwork) -> list[str]:
-    """Name what the adjusted values leave undetermined, or determine no better than that it is there."""
+    """Return the names of undetermined or poorly determined adjusted values."""
     said = [each.what for each in result.messages if isinstance(each, Undetermined)]
     lengths = [
         f"{name} of {camera.name}, {value:.6g} with a standard deviation of {sd:.3g}"
@@ -125,7 +125,7 @@ def left_open(result: AdjustedNetwork) -> list[str]:
 
 
 def _set_aside(result: Result) -> Removed | None:
-    """Return what the first values took out and has not returned; none of the images left is among it."""
+    """Return the images that the initial values removed and did not reinstate."""
     if not result.set_aside:
         return None
     images = sum(getattr(name, "code", "") == "named.image" for name in result.set_aside)
@@ -135,7 +135,7 @@ def _set_aside(result: Result) -> Removed | None:
 
 
 def _left_out(result: Result) -> list[Phrase]:
-    """Return the points that were left out because one of their images must be wrong."""
+    """Return the points that were excluded because one of their images must be wrong."""
     return [
         Phrase("line.point-left-out", {"point": str(point), "reason": HARMFUL[reason]})
         for point, reason in result.dropped.items()
@@ -144,7 +144,7 @@ def _left_out(result: Result) -> list[Phrase]:
 
 
 def _on_checks(result: Result) -> list[Phrase]:
-    """Return which check points are tested with assumed standard deviations, and why they are not tested."""
+    """Return check points with assumed standard deviations, and reasons for missing tests."""
     checks, axes = result.check_points, point_axes(result.block)
     if not len(checks.rows):
         return []
@@ -171,14 +171,14 @@ def _patterns(result: Result) -> list[Systematic]:
 
 
 def _assumptions(result: AdjustedNetwork) -> list[Phrase]:
-    """Return which errors of the datum no independent observation checks."""
+    """Return the errors of the datum that independent observations do not check."""
     summary = result.reliability_summary
     names = [] if summary is None else summary.hypotheses.assumptions
     return [Phrase("line.datum-assumed", {"errors": names})] if names else []
 
 
 def unseen(result: AdjustedNetwork) -> list[Phrase]:
-    """Return how many image coordinates no other observation checks."""
+    """Return the number of image coordinates without check by other observations."""
     redundancy = result.redundancy[chosen(result.used_images)]
     hidden = int(np.count_nonzero(redundancy <= TESTABLE))
     if not hidden:

@@ -33,29 +33,28 @@ def features(
 ) -> Features:
     """Fit features to adjusted points: distances, lines, planes, circles, spheres, cylinders.
 
-    A feature is the one from which the squares of the distances of its points sum to the least (Gaussian
-    associated feature); everything has the standard deviation that follows from the joint covariance of the
-    points (docs/features.md).
+    A feature has the minimum sum of squared distances to its points (Gaussian associated feature). All
+    standard deviations follow from the joint covariance of the points (docs/features.md).
 
     Parameters
     ----------
     result
         An adjusted block with rectangular coordinates.
     definitions
-        By the names of features a kind (`distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`) with
+        By the names of features a type (`distance`, `line`, `plane`, `circle`, `sphere`, `cylinder`) with
         names of points, or patterns of names: `{"bore": ("circle", ["hole-*"])}`.
     k
         The coverage factor of U = k sd.
     coverage
-        A probability, 0.95 for example, in place of k: k is Student's with the degrees of freedom of the
-        variance of unit weight, normal where that is known.
+        A probability, for example 0.95, instead of k: k is from Student's distribution with the degrees of
+        freedom of the variance of unit weight, or from the normal distribution if this variance is known.
 
     Raises
     ------
     InputError
-        Kinds or points that are not there, too few points, points that do not determine a feature.
+        If a type or point does not exist, or the points are too few or do not determine a feature.
     AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-        As :meth:`Result.covariances`.
+        As in :meth:`Result.covariances`.
     """
     fitted, empty = _fitting(result, k, coverage)
     found = []
@@ -68,7 +67,7 @@ def features(
 
 
 def with_features(result: Result, definitions: Mapping[str, Definition]) -> Result:
-    """Return a result with features; its messages say why others were not fitted."""
+    """Return a result with features; its messages explain missing features."""
     if not definitions:
         return result
     found, messages = [], []
@@ -93,7 +92,7 @@ def _of_feature(name: str, error: Exception) -> Phrase:
 def _fitting(
     result: Result, k: float, coverage: float | None
 ) -> tuple[Callable[[str, Definition], Feature], Features]:
-    """Return what fits a feature, and all that features have in common."""
+    """Return the fitting function, and the common data of all features."""
     if result.geographic:
         raise InputError(phrase("fit.geographic"))
     freedom = result.freedom_of_scale

@@ -1,9 +1,9 @@
-"""What is held and may be wrong: fixed stations and points, and lenses, tested by scores.
+"""Score tests of fixed stations, points and lens models, which may be wrong.
 
-They are no observations: an error of theirs lies in no residual of its own, and good observations around are
-named for it. B the partials of the images by the held coordinates, in standard deviations, and ~v the
-residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T = c' C^-1 c if they were free
-(Rao's score, :func:`photogram.score_test`), chi-square with as many degrees of freedom as coordinates.
+Fixed values are not observations: their errors have no residuals, and appear as errors of good observations
+nearby. B are the partials of the images by the fixed coordinates, in standard deviations; ~v are the
+residuals. With c = B' ~v and C = B' R B, the weighted sum of squares would decrease by T = c' C^-1 c if they
+were free (Rao's score, :func:`photogram.score_test`). T is chi-square with the number of coordinates.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 HELD = Phrase("test.held")  # Type of these tests
 SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images
-LEAST_IMAGES = 3  # Of a tested station
+LEAST_IMAGES = 3  # Smallest number of images of a tested station
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Something that is held: its name, its images, and which of the partials concern it."""
+    """A fixed item: its name, its images, and the indices of its partials."""
 
     named: Phrase
     images: Indices
@@ -48,9 +48,9 @@ class Held:
 
 
 def held_tested(result: Result) -> list[Tested]:
-    """Return tests of the fixed stations and points with the worst images, where residuals are too large.
+    """Return tests of the fixed stations and points with the worst images, if residuals are too large.
 
-    None if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
+    Empty if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
     if not result.WHOLE:
         return []
@@ -64,10 +64,10 @@ def held_tests(
     suspected_by: Callable[[Floats], Sequence[Held]],
     partials_of: Callable[[], Floats],
 ) -> list[Tested]:
-    """Return the tests of what is held, T each, where residuals are too large and covariances there.
+    """Return the test T of each fixed item, if residuals are too large and covariances exist.
 
-    `suspected_by` says what is to be tested, by (m,) the weighted squares of the images; `partials_of` gives
-    (p, m, 2) partials of these by the unknowns of their photos, to which each has its places.
+    `suspected_by` returns the items to test for (m,) weighted squares of the images. `partials_of` returns
+    (p, m, 2) partials of the images by the unknowns of their photos; each item has indices of these.
     """
     if result.loss or not is_suspected(result):
         return []
@@ -82,7 +82,7 @@ def held_tests(
     for each in suspected:
         columns = np.zeros((len(each.partials), *residuals.shape))
         columns[:, each.images] = partials[np.ix_(each.partials, each.images)] / image_sd[each.images]
-        # What is free may take it up.
+        # Free unknowns may absorb it.
         value = score(factor, columns, residuals) if np.isfinite(columns).all() else None
         if value is not None:
             found.append((each.name, value, float(len(each.partials))))
@@ -96,7 +96,7 @@ def held_tests(
 
 
 def is_suspected(result: AdjustedNetwork) -> bool:
-    """Return whether residuals are too large, and covariances there to ask for the reason."""
+    """Return whether residuals are too large and covariances exist for tests."""
     test = result.global_test
     if test is None or not test.rejected_high or not result.converged:
         return False
@@ -104,9 +104,9 @@ def is_suspected(result: AdjustedNetwork) -> bool:
 
 
 def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
-    """Return that a fixed value explains more than any removed observation.
+    """Return a message if a fixed value explains more than any removed observation.
 
-    `found` are its tests, in the adjustment of everything, `largest` is the largest T of what was taken out.
+    `found` are its tests in the adjustment of all observations, `largest` is the largest T of removed ones.
     """
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
@@ -116,7 +116,7 @@ def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
 
 
 def _suspected(result: Result, of_images: Floats) -> list[Held]:
-    """Return what is held and has the worst images, the worst first."""
+    """Return the fixed items with the worst images, the worst first."""
     block, used = result.block, result.used_images
     given = result.photo_given_sd
     photos, points = len(block.photo_ids), len(block.point_ids)
@@ -127,7 +127,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     rows: list[tuple[float, Held]] = []
     for what, sd, shift in zip(("position", "attitude"), (given[:, :3], given[:, 3:]), (0, 3), strict=True):
         held = np.asarray(sd == 0)
-        if shift or block.geographic:  # Partials are by other axes than those of the components.
+        if shift or block.geographic:  # Partials have other axes than the components.
             held = held & held.all(axis=1, keepdims=True)
         own = np.flatnonzero(held.any(axis=1) & (counts >= LEAST_IMAGES))
         for photo in own[np.argsort(-of_photos[own], kind="stable")][:SUSPECTED].tolist():
@@ -148,10 +148,10 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
 
 
 def station_partials(result: Result) -> Floats:
-    """(6, m, 2) partials of the images by three coordinates and three small turns of their stations.
+    """(6, m, 2) partials of the images by three coordinates and three small rotations of stations.
 
-    Those by the coordinates of a point are the same with the other sign. NaN of scanners, which have no one
-    station; photos with a rolling shutter are taken where they began.
+    Partials by point coordinates have the opposite sign. NaN for scanners, which have several stations.
+    Photos with a rolling shutter are used at their first line.
     """
     plain, seen = seen_without_lenses(as_adjusted(result))
     block = result.block
@@ -165,7 +165,7 @@ def station_partials(result: Result) -> Floats:
     by_turn = by_position @ turned.transpose(0, 2, 1)
     found = np.full((6, len(block.image_xy), 2), np.nan)
     found[:, seen] = np.concatenate([by_position, by_turn], axis=2).transpose(2, 0, 1)
-    # Without lenses y counts upwards.
+    # Without lens models y is positive upwards.
     down = np.array([each.image_y == "down" for each in block.cameras], dtype=bool)
     if down.any():
         found[:, down[np.asarray(block.photo_cameras)[block.image_photos]], 1] *= -1.0
@@ -173,13 +173,13 @@ def station_partials(result: Result) -> Floats:
 
 
 def as_adjusted(result: Result, *, free: bool = False) -> Block:
-    """Return a block whose photos are where its adjustment has put them, `free` or as they were given."""
+    """Return a block with photos at their adjusted poses, `free` or weighted as given."""
     changes: dict[str, Any] = {
         "photo_positions": result.photo_positions,
         "photo_attitudes": result.photo_attitudes,
     }
     if free or result.block.timed:
-        # What is held of poses on trajectories is held of coefficients.
+        # Fixed coefficients replace fixed poses on trajectories.
         sd = np.full((len(result.block.photo_ids), 3), np.inf)
         changes |= {"photo_positions_observed": None, "photo_attitudes_observed": None}
         changes |= {"photo_position_sd": sd, "photo_attitude_sd": sd}
@@ -187,11 +187,11 @@ def as_adjusted(result: Result, *, free: bool = False) -> Block:
 
 
 def fall_by_lens(result: Result, images: Bools) -> float:
-    """Return by how much the weighted sum of squares would fall with a lens of their own for (m,) `images`.
+    """Return the decrease of the weighted sum of squares with a separate lens model for (m,) `images`.
 
     Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
-    about the middle of the frame, whatever the model of the camera has; of the radial terms alone where
-    unknowns take up others. 0 if it is not known.
+    about the centre of the frame, for any camera model; of the radial terms only if unknowns absorb others. 0
+    if it is not known.
     """
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
@@ -207,7 +207,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
 
 
 def lens_partials(result: Result, own: Bools) -> Floats:
-    """(7, m, 2) partials of the images that are `own` by what a lens may have, in standard deviations."""
+    """(7, m, 2) partials of the `own` images by typical lens parameters, in standard deviations."""
     block = result.block
     xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)
@@ -224,7 +224,7 @@ def lens_partials(result: Result, own: Bools) -> Floats:
 
 
 def how_to_calibrate(block: Block) -> Phrase | None:
-    """Return how the cameras of a block are estimated; None if all of their parameters are."""
+    """Return a message on estimating the cameras of a block; None if all parameters are estimated."""
     if not block.cameras:
         return Phrase("how.camera")
     names = dict.fromkeys(name for camera in block.cameras for name in calibration_words(camera))

@@ -1,4 +1,4 @@
-"""Footprints: what photos show of the ground."""
+"""Footprints of photos on the ground."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ from photogram.results.fixed_tests import as_adjusted
 if TYPE_CHECKING:
     from photogram import Result
 
-SIDE = 4  # Vertices of an outline on each side of the picture
+SIDE = 4  # Vertices of an outline on each side of the image
 HORIZON = math.radians(80.0)  # Limit of footprints from the vertical
 
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
-    """What P photos show of the ground."""
+    """Footprints of P photos."""
 
-    # (P, 17, 3) closed outlines in metric axes, counter-clockwise as the corners of the picture are
-    # from the lower left; NaN for photos at or below the ground, where the lens has no ray, and for
-    # scanners, which show no picture with one pose
+    # (P, 17, 3) closed outlines in metric axes, counter-clockwise like the image corners from the lower left;
+    # NaN for photos at or below the ground, beyond the field of the lens, and for scanners, which have
+    # several poses
     outlines: Floats
-    # The metric axes: those of a rectangular block, else east, north and up amid the stations
+    # The metric axes of a rectangular block, else east, north and up at the centre of the stations
     axes: LocalAxes
-    grounds: Floats  # (P,) heights in these axes of the level planes on which they lie
-    # (P,) what a unit of the image covers on the ground along the axis, in the linear unit: the ground
-    # sample distance where image coordinates are pixels
+    grounds: Floats  # (P,) heights of the level ground planes in these axes
+    # (P,) size of an image unit on the ground along the axis, in the linear unit: the ground sample distance
+    # if image coordinates are pixels
     size: Floats
-    # (P,) whether a picture reaches beyond 80 degrees from the vertical, where its outline is cut off
+    # (P,) whether an image extends beyond 80 degrees from the vertical, the limit of its outline
     cut: Bools
 
     def positions(self) -> Floats:
-        """Return (P, 17, 3) the outlines as positions of the block's own kind."""
+        """Return (P, 17, 3) outlines as positions in the coordinate system of the block."""
         found = self.axes.from_local(self.outlines.reshape(-1, 3))
         return found.reshape(self.outlines.shape)
 
 
 def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ()) -> Footprints:
-    """Return the footprints of the adjusted photos on level planes, each at the height of its own points.
+    """Return the footprints of the adjusted photos on level planes at the heights of their points.
 
-    `sizes` are width and height of the images of each camera in the unit of image coordinates. Without these
-    the images reach as far as the measurements on all photos of the camera.
+    `sizes` are widths and heights of the images of each camera in the unit of image coordinates. The default
+    is the extent of the measurements on all photos of the camera.
     """
     block = as_adjusted(result, free=True)
     axes = local_axes(block)
@@ -82,7 +82,7 @@ def footprints(result: Result, sizes: Sequence[tuple[float, float] | None] = ())
 
 
 def grounds(result: Result, heights: Floats) -> Floats:
-    """Return (P,) median heights of the points in each photo, of all points for a photo without points."""
+    """Return (P,) median heights of the points in each photo; of all points for photos without points."""
     block = result.block
     own = np.flatnonzero(result.used_images)
     photos, seen = block.image_photos[own], heights[block.image_points[own]]
@@ -99,10 +99,10 @@ def grounds(result: Result, heights: Floats) -> Floats:
 
 
 def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = ()) -> Floats:
-    """Return (k, 4) least x and y, largest x and y of the pictures of the cameras of a block, as its images.
+    """Return (k, 4) minimum x and y, maximum x and y of the frames of the cameras of a block.
 
-    Pixels of cameras whose y counts down count from the corner, all other coordinates from the middle. Strips
-    of scanners are no pictures.
+    Pixels of cameras with y downwards are measured from the corner, all other coordinates from the centre.
+    Strips of scanners are not frames.
     """
     cameras, photo_cameras = block.core_cameras()
     block = of_pictures(block)
@@ -123,7 +123,7 @@ def picture_frames(block: Block, sizes: Sequence[tuple[float, float] | None] = (
 
 
 def _outline(frame: Floats) -> Floats:
-    """Return (17, 2) places around a picture, the first one again at the end."""
+    """Return (17, 2) positions around a frame; the last one repeats the first."""
     left, low, right, high = frame
     corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
     steps = np.arange(4 * SIDE + 1) / SIDE

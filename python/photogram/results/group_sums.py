@@ -1,10 +1,9 @@
-"""Sums of squares and redundancy numbers over groups of observations, and their tests.
+"""Sums of squares and redundancy numbers of groups of observations, and their tests.
 
-q_g, the weighted sum of squares of a group, is a mixture of chi-square variables with the expectation r_g,
-the sum of its redundancy numbers, and the variance 2 s_g, s_g the sum of R_ij^2 within the group. With
-c = s_g / r_g, q_g / c has nearly the chi-square distribution with r_g^2 / s_g degrees of freedom
-(Satterthwaite 1946). Taking q_g itself for chi-square with r_g is conservative where there is little
-redundancy.
+q_g, the weighted sum of squares of a group, is a mixture of chi-square variables. Its expectation r_g is the
+sum of its redundancy numbers, its variance is 2 s_g, and s_g is the sum of R_ij^2 within the group. With c =
+s_g / r_g, q_g / c is approximately chi-square with r_g^2 / s_g degrees of freedom (Satterthwaite 1946). A
+chi-square test of q_g with r_g degrees of freedom is conservative for small redundancy.
 """
 
 from __future__ import annotations
@@ -43,22 +42,22 @@ if TYPE_CHECKING:
 TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05
 SMALL = 1000  # Largest number of observations with exact sums
-TOGETHER = 32  # Largest number of groups with columns of their own
+TOGETHER = 32  # Largest number of groups with separate columns
 
 
 @dataclass(frozen=True)
 class Probing:
-    """How sums over R are found."""
+    """Settings for the computation of sums over R."""
 
-    # Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
-    # network of 1,000 observations
+    # Largest number of observations of groups computed by column; None: 64, and all groups of a network of
+    # 1,000 observations
     exact: int | None = None
-    # Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that
+    # Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that error
     vectors: int = 32
-    seed: int = 1  # of the signs; equal seeds give equal bits
+    seed: int = 1  # equal seeds give identical results
 
     def options(self, observations: int) -> dict[str, Any]:
-        """Return what the core takes, for a network of so many observations."""
+        """Return the options of the core for a number of observations."""
         exact = (observations if observations <= SMALL else 64) if self.exact is None else self.exact
         return {"exact": exact, "vectors": self.vectors, "seed": self.seed, "threads": 0, "progress": None}
 
@@ -79,7 +78,7 @@ class GroupSum:
 
     @property
     def scale(self) -> float:
-        """What q is divided by to be tested: c = s / r."""
+        """The divisor of q in the test: c = s / r."""
         return self.spread / self.redundancy if self.redundancy > 0 else math.nan
 
     @property
@@ -89,7 +88,7 @@ class GroupSum:
 
     @property
     def factor(self) -> float:
-        """By which residuals are larger than their standard deviations allow; NaN without redundancy."""
+        """Ratio of residuals to their expectation from the standard deviations; NaN without redundancy."""
         return math.sqrt(self.squares / self.redundancy) if self.redundancy > 0 else math.nan
 
 
@@ -97,15 +96,15 @@ class GroupSum:
 class GroupSums(Documented, Brief):
     """Groups of the observations of an adjusted network, with their tests.
 
-    A group is judged after gross errors are out, and jointly with the others by variance components: its sum
-    contains the errors of the others.
+    A group should be tested after the removal of gross errors, and jointly with the others by variance
+    components, because its sum contains the errors of the others.
 
     Attributes
     ----------
     groups
         The groups.
     level
-        Of all tests together; each has it divided by their number (Bonferroni), half on each side.
+        The level of all tests together, divided by their number (Bonferroni), half on each side.
     """
 
     groups: tuple[GroupSum, ...]
@@ -113,13 +112,13 @@ class GroupSums(Documented, Brief):
 
     @property
     def rejected(self) -> list[GroupSum]:
-        """Groups whose residuals are larger or smaller than their standard deviations allow."""
+        """Groups with residuals that are too large or too small for their standard deviations."""
         return [
             each for each in self.groups if each.test and (each.test.rejected_high or each.test.rejected_low)
         ]
 
     def __getitem__(self, name: str) -> GroupSum:
-        """Return the group of a name."""
+        """Return a group by its name."""
         found: GroupSum = by_name(self.groups, name, "group")
         return found
 
@@ -157,7 +156,7 @@ class GroupSums(Documented, Brief):
 
 
 class Left:
-    """What an adjustment leaves of groups of its observations, and of all others as one more group."""
+    """Residual statistics of groups of observations, and of all others as another group."""
 
     def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
@@ -212,7 +211,7 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
 
 
 def observables(network: object) -> Observables:
-    """Return what a block, a collection or an adjusted one has observations of."""
+    """Return the observations of a block, a collection or an adjusted one."""
     given = network.given if isinstance(network, AdjustedNetwork) else network
     if isinstance(given, Block):
         return block_observables(given)
@@ -225,7 +224,7 @@ def observables(network: object) -> Observables:
 def block_observables(block: Block) -> Observables:
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
-    # What is given of a photo with a trajectory of its own is given of common unknowns.
+    # Observations of a photo with its own trajectory are observations of common unknowns.
     mounted = {each.photo for each in block.mounts} | {each.photo for each in block.timed}
     observed[[row for row, name in enumerate(block.photo_ids) if name in mounted]] = False
     cameras, photo_cameras = block.core_cameras()
@@ -244,7 +243,7 @@ def block_observables(block: Block) -> Observables:
 
 
 def _strips(block: Block) -> list[Indices]:
-    """Return the photos of each strip: those on one trajectory, and others by where they were taken."""
+    """Return the photos of each strip: by trajectory, or by position."""
     own = {each.photo: each.trajectory for each in block.timed if each.trajectory is not None}
     flown: dict[int, list[int]] = {}
     for row, name in enumerate(block.photo_ids):
@@ -273,17 +272,17 @@ def group_sums(
     result
         The adjusted block or collection, with covariances.
     groups
-        `kind`, `camera`, `strip`, `photo`, `point class`, `rays`, `component`, several of these, or labels of
-        one's own (docs/weights.md).
+        `kind`, `camera`, `strip`, `photo`, `point class`, `rays`, `component`, several of these, or own
+        labels (docs/weights.md).
     level
-        Probability that any of the groups is rejected though all standard deviations are right.
+        Probability of rejecting any of the groups if all standard deviations are right.
     probing
-        How sums over R are found.
+        Settings for the computation of sums over R.
 
     Raises
     ------
     InputError
-        No adjusted network, none with covariances, groups that there are not.
+        If the argument is not an adjusted network with covariances, or the groups do not exist.
     """
     if not isinstance(result, AdjustedNetwork):
         raise argument_error("result", "kind", kind=phrase("groups.result"), value=value_field(result))
@@ -291,7 +290,7 @@ def group_sums(
         raise InputError(phrase("groups.no-redundancy"))
     grouping = grouped(observables(result), groups)
     counts, squares, redundancy = sums_of(result, grouping)
-    # The groups beyond some share columns.
+    # The other groups share columns.
     classes = TOGETHER if grouping.count > TOGETHER else None
     options = (probing or Probing()).options(int(counts.sum()))
     _, spread, _ = factored(result).group_squares(grouping.core(), classes=classes, **options)

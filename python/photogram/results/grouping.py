@@ -1,4 +1,4 @@
-"""Groups of the observations of a network: by kind, camera, strip, photo ..., or by the user's labels."""
+"""Groups of the observations of a network: by type, camera, strip, photo ..., or user labels."""
 
 from __future__ import annotations
 
@@ -26,18 +26,17 @@ _Labels = NDArray[np.object_]
 
 @dataclass(frozen=True, eq=False)
 class Observables:
-    """What a network of P photos, n points and m images has observations of."""
+    """Possible groups of the observations of a network of P photos, n points and m images."""
 
     given: Given  # The network
     photo_cameras: Indices  # (P,) the camera of each photo, and their names
     camera_names: Sequence[str]
-    strips: Callable[[], list[Indices]]  # Tells the strips of the photos
+    strips: Callable[[], list[Indices]]  # Returns the strips of the photos
     point_classes: NDArray[np.str_]  # (n,) `control`, `check` or `pass`
-    photo_observed: Bools  # (P, k) whether an unknown of a photo is
-    stations: tuple[str, ...]  # (k,) what the unknowns of a photo are called as observations
-    commons: int  # How many common unknowns there are
-    # How many times on trajectories the observations are of: the core has them behind the photos, with
-    # a camera
+    photo_observed: Bools  # (P, k) whether an unknown of a photo is observed
+    stations: tuple[str, ...]  # (k,) names of the unknowns of a photo as observations
+    commons: int  # Number of common unknowns
+    # Number of observed times on trajectories: the core has them after the photos, with a camera
     records: int = 0
 
     @property
@@ -54,8 +53,8 @@ class Grouping:
     images: Indices  # (m, 2), (n, 3), (P, k)
     points: Indices
     photos: Indices
-    observations: Indices  # (o,) of those beside images
-    commons: int = 0  # How many there are: they are in no group
+    observations: Indices  # (o,) of additional observations
+    commons: int = 0  # Number of common unknowns, which are in no group
     cameras: int = 0
     records: int = 0
 
@@ -77,7 +76,7 @@ class Grouping:
         )
 
     def factors(self, factors: Floats, labels: Indices) -> Floats:
-        """Return what each observation with a label has of (G,) factors; 1 for those in no group."""
+        """Return the factor of each labelled observation from (G,) factors; 1 without group."""
         return np.append(factors, 1.0)[labels]
 
     def summed(self, parts: Mapping[str, Floats]) -> Floats:
@@ -91,14 +90,14 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of the observations of a network; refuse other bases, and labels that do not fit.
+    """Return groups of the observations of a network; refuse other bases and invalid labels.
 
     Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
-    together), or `component` (x and y, plan and height of control, positions and attitudes of stations): all
-    but `kind` and `component` part the images only, the rest goes by kind. Several of these: a group for each
-    combination. Or they are labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control`
-    (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
-    keeps its weight, and parts that are not named go by kind.
+    together), or `component` (x and y, plan and height of control, positions and attitudes of stations). All
+    except `kind` and `component` divide the images only; others are grouped by type. Several bases define a
+    group for each combination. Alternatively, user labels: a mapping with arrays of `images` (m,) or (m, 2),
+    `control` (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,). Observations without a label
+    (None or an empty text) keep their weights. Parts without labels are grouped by type.
     """
     if isinstance(groups, Mapping):
         labels = _own(of, groups)
@@ -112,7 +111,7 @@ def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
 
 
 _Labelled = tuple[dict[str, _Labels], dict[str, str]]
-"""Labels of images, points, photos and observations, and of each label the larger group."""
+"""Labels of images, points, photos and observations, and the larger group of each label."""
 
 
 def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
@@ -181,7 +180,7 @@ def _text(label: object) -> str:
 
 
 def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, str]) -> Grouping:
-    """Give the groups numbers: those of images first."""
+    """Assign numbers to the groups, first those of images."""
     numbers: dict[str, int] = {"": -1}
 
     def enter(found: list[str]) -> None:
@@ -194,7 +193,7 @@ def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, st
         found[used] = np.fromiter(map(numbers.__getitem__, flat), np.int64).reshape(part[used].shape)
         return found
 
-    # In the order of the photos, whatever that of the images is.
+    # In the order of the photos, independent of the order of the images.
     enter(labels["images"][np.argsort(of.given.image_photos, kind="stable")].ravel().tolist())
     images = number(labels["images"])
     of_images = len(numbers) - 1

@@ -1,7 +1,7 @@
-"""Hypotheses: errors that sets of observations have in common, and errors of single ones.
+"""Hypotheses: common errors of sets of observations, and errors of single ones.
 
-For each the test, the estimate, the minimal detectable bias (MDB), and what an undetected error would change:
-internal and external reliability (Baarda 1968). The core computes them (`photocore::network::hypotheses`).
+Each has a test, an estimate, a minimal detectable bias (MDB), and the effect of an undetected error: internal
+and external reliability (Baarda 1968). The core computes them (`photocore::network::hypotheses`).
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from photogram.results.network_trial import NamedSuspects
     from photogram.results.reliability import Reliability
 
-Facts = dict[str, Any]  # That hypotheses require beside the network; see `NetworkTrial.hypotheses`
+Facts = dict[str, Any]  # Additional facts for hypotheses; see `NetworkTrial.hypotheses`
 
 LIMIT = 6.0  # Standard deviations from which on an undetected error of a point counts
 SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
-FEWEST = 2  # Points beside the suspect that it moves at least
+FEWEST = 2  # Smallest number of other points that it moves
 UNTESTED = 1e-6  # Redundancy below which an error of any size remains undetected
 EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise ratios
 RARE = 0.1  # Plausible errors of a set that may remain undetected
@@ -56,7 +56,7 @@ DATUM = frozenset(
         "scale",
     }
 )
-"""Errors that change the datum only: assumptions, unless an independent source tests them."""
+"""Errors that only change the datum: assumptions, unless an independent source tests them."""
 
 UNGRADED = frozenset({"attitude", "camera", "unknown", "bending"})
 """Undetected errors that are no reason for a reservation: of single photos, of weighted parameters; bending,
@@ -67,7 +67,7 @@ MOST_SETS = 8  # Largest number of sets of positions or control that are tested
 
 @dataclass(frozen=True)
 class Effect:
-    """What an undetected error changes of the points, by the coordinate of each that changes most."""
+    """Effects of an undetected error on points, by the coordinate of each that changes most."""
 
     points: int  # beyond the limit
     others: int  # the same without the points that the error belongs to

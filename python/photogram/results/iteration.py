@@ -1,4 +1,4 @@
-"""The iterations of an adjustment, and sums of squares and of redundancy numbers by kinds of observations."""
+"""Iterations of an adjustment, and sums of squares and redundancy numbers by types."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class Iteration:
 
 @dataclass(frozen=True)
 class SumsByKind:
-    # Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras
+    # Weighted positions and attitudes of the photos, and weighted parameters of cameras
     camera: float
-    ground: float  # Of the held components of control
-    plates: float  # Of the image coordinates
-    observations: float = 0.0  # Of the observations beside images
+    ground: float  # Weighted and fixed components of control
+    plates: float  # Image coordinates
+    observations: float = 0.0  # Additional observations
 
     @property
     def measured(self) -> float:
-        """Of all but photos."""
+        """The sum without photos."""
         return self.ground + self.plates + self.observations
 
     @property

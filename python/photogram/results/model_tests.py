@@ -1,13 +1,13 @@
-"""Which unknowns of cameras are worth having: terms that are there, terms that are not, models side by side.
+"""Tests of camera unknowns: terms of the model, other terms, and comparisons of models.
 
-* Terms that are estimated, k of them with the cofactors Q_kk (a priori unit weight): T = x' Q_kk^-1 x is by
-  how much the weighted sum of squares would rise without them (Wald; exact where the model is linear).
-* Terms that are held: B the partials of the images by them, in standard deviations, and ~v the residuals,
-  c = B' ~v and C = B' R B, T = c' C^-1 c is by how much it would fall with them (Rao's score; no adjustment).
-* T is chi-square with k where the unit weight is known; (T / k) / (Omega' / f') is F(k, f') where it is not,
-  Omega' and f' being those with the terms.
-* Models that are not nested: BIC = Omega + k ln n or, unit weight not known, n ln(Omega / n) + k ln n, with
-  n = f + k, since points take as many observations as they have coordinates (Schwarz 1978).
+* Estimated terms, k with the cofactors Q_kk (a priori unit weight): T = x' Q_kk^-1 x is the increase of the
+  weighted sum of squares without them (Wald; exact for linear models).
+* Fixed terms: B are the partials of the images by them, in standard deviations, and ~v the residuals. With c
+  = B' ~v and C = B' R B, T = c' C^-1 c is the decrease with them (Rao's score; no adjustment).
+* T is chi-square with k if the unit weight is known. Otherwise (T / k) / (Omega' / f') is F(k, f'); Omega'
+  and f' belong to the model with the terms.
+* Models that are not nested: BIC = Omega + k ln n or, for an unknown unit weight, n ln(Omega / n) + k ln n. n
+  = f + k, because points use as many observations as they have coordinates (Schwarz 1978).
 """
 
 from __future__ import annotations
@@ -53,22 +53,22 @@ SEEN = 2000  # Number of images for the effect of terms
 
 @dataclass(frozen=True)
 class TermsTest:
-    """A test of terms of a camera, all together."""
+    """A joint test of terms of a camera."""
 
     camera: str  # camera and its parameters
     names: tuple[str, ...]
-    statistic: float  # T: by how much the weighted sum of squares rises without them, or falls with them
-    # dimension, freedom: k, and the degrees of freedom of the unit variance with the terms; infinite where
-    # that is known
+    statistic: float  # T: increase of the weighted sum of squares without them, or decrease with them
+    # dimension, freedom: k, and the degrees of freedom of the unit variance with the terms; infinite if it is
+    # known
     dimension: int
     freedom: float
-    probability: float  # Of a value as large where the terms are what they are held to
-    # How far they move an image at the most, in standard deviations of it; NaN for terms that are held
+    probability: float  # Probability of a larger value under the null hypothesis
+    # Their largest effect on an image, in its standard deviations; NaN for fixed terms
     effect: float
 
     @property
     def worth_keeping(self) -> bool:
-        """Whether they are significant at 1 percent, and move some image by a fifth of its deviation."""
+        """Whether they are significant at 1 percent and move an image by 0.2 standard deviations."""
         return self.probability < KEPT and not self.effect <= EFFECT
 
 
@@ -81,12 +81,12 @@ class Model:
     freedom: int
     parameters: int  # Estimated parameters of cameras
     bic: float  # The criterion; the least is the best
-    checks: float  # Root mean square of ten check points or more, linear unit; NaN otherwise
+    checks: float  # Root mean square of ten or more check points, linear unit; NaN otherwise
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Documented, Brief):
-    """Models of the same observations side by side."""
+    """A comparison of models of the same observations."""
 
     models: tuple[Model, ...]  # The best first
     known: bool  # Whether the unit weight is known
@@ -96,15 +96,15 @@ class Comparison(Documented, Brief):
 
     @property
     def best(self) -> Model:
-        """The model with the least criterion."""
+        """The model with the minimum criterion."""
         return self.models[0]
 
     def difference(self, name: str) -> float:
-        """Return by how much the criterion of a model is larger than the least."""
+        """Return the difference between the criterion of a model and the minimum."""
         return float(by_name(self.models, name, "model").bic - self.best.bic)
 
     def statement(self) -> str:
-        """Return what the criterion says, in words."""
+        """Return a statement on the criterion."""
         if len(self.models) < 2:
             return f"{self.best.name} is the only model"
         rival = self.models[1]
@@ -133,7 +133,7 @@ class Comparison(Documented, Brief):
         return Table("models", "Models", columns, self.statement())
 
     def document(self) -> Document:
-        """Return the document: the models, and tests of each against larger ones."""
+        """Return the document: models, and tests against larger models."""
         nested = [
             f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
             for small, large, value, dimension, probability in self.nested
@@ -143,21 +143,21 @@ class Comparison(Documented, Brief):
 
 
 def terms_test(result: Result, names: Sequence[str], *, camera: str | None = None) -> TermsTest:
-    """Test estimated terms of a camera together, without another adjustment (Wald).
+    """Test estimated terms of a camera jointly, without another adjustment (Wald).
 
     Parameters
     ----------
     result
         The adjusted block, with covariances.
     names
-        Free or weighted parameters, tested against 0: terms of the lens.
+        Free or weighted distortion parameters, tested against 0.
     camera
-        The name of the camera; may be left out where there is one.
+        The name of the camera; optional if there is only one.
 
     Raises
     ------
     InputError
-        No such camera, terms that are not estimated, no covariances.
+        If the camera does not exist, the terms are not estimated, or covariances are missing.
     """
     found = _camera(result, camera)
     rows = _rows(found, names)
@@ -176,26 +176,26 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
 def score_test(
     result: Result, names: Sequence[str] = (), *, camera: str | None = None, partials: ArrayLike | None = None
 ) -> TermsTest:
-    """Test terms that are held, or effects that the model has not, without adjusting with them (Rao).
+    """Test fixed terms, or effects outside the model, without an adjustment (Rao).
 
     Parameters
     ----------
     result
         The adjusted block.
     names
-        Held parameters of a camera; or what the `partials` are called.
+        Fixed parameters of a camera, or names of the `partials`.
     camera
-        The name of the camera; may be left out where there is one.
+        The name of the camera; optional if there is only one.
     partials
-        (k, m, 2) partials of the image coordinates by k effects of one's own, in the unit of the image
-        coordinates (of cameras whose terms correct what was measured, of corrected ones); None for those of
-        the held parameters.
+        (k, m, 2) partials of the image coordinates by k user-defined effects, in the unit of the image
+        coordinates; for cameras with terms that correct measurements, of corrected coordinates. The default
+        is the partials by the fixed parameters.
 
     Raises
     ------
     InputError
-        No such camera, terms that are estimated, partials of another shape, effects that the unknowns of the
-        block take up altogether.
+        If the camera does not exist, the terms are estimated, the partials have another shape, or the
+        unknowns of the block absorb the effects completely.
     """
     _require_block(result)
     block = result.block
@@ -226,20 +226,20 @@ def score_test(
 
 
 def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comparison:
-    """Compare models of the same observations, nested or not.
+    """Compare nested or other models of the same observations.
 
     Parameters
     ----------
     results
-        Adjusted blocks by the names of their models. They must have the same images with the same standard
-        deviations, all of them used: take gross errors out of all that any of them rejects.
+        Adjusted blocks by the names of their models. They must use the same images with the same standard
+        deviations: remove gross errors that one of them rejects from all of them.
     known
-        Whether the unit weight is known; None: unless covariances are scaled by its estimate.
+        Whether the unit weight is known; by default, unless its estimate scales covariances.
 
     Raises
     ------
     InputError
-        Fewer than two results, other observations, no degrees of freedom.
+        If there are fewer than two results, or they have different observations or no degrees of freedom.
     """
     if not isinstance(results, Mapping) or len(results) < 2:
         raise InputError(phrase("models.few"))
@@ -270,7 +270,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
 
 
 def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> float:
-    """Return how far terms of a camera move an image at the most, in standard deviations of the image."""
+    """Return the largest effect of terms of a camera on an image, in its standard deviations."""
     block, own = result.block, rows_of_images(result, camera)
     if not own.size:
         return math.nan
@@ -284,10 +284,10 @@ def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int])
 
 
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
-    """Return the estimated terms of a lens as they are kept or left out together.
+    """Return groups of estimated distortion terms that are used together.
 
-    Terms of the radial series one by one, the highest power first; all others by their letter (P1 and P2,
-    B1 and B2).
+    Radial terms are separate, the highest power first; all others are grouped by letter (P1 and P2, B1 and
+    B2).
     """
     radial, others = [], dict[str, list[str]]()
     for k in camera.estimated:
@@ -302,7 +302,7 @@ def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
 
 
 def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Floats:
-    """Return (k, m, 2) partials of what images are compared with by parameters of a camera, by differences.
+    """Return (k, m, 2) numerical partials of the compared coordinates by camera parameters.
 
     Forward cameras compare measured with computed images, backward ones corrected with ideal images.
     """
@@ -325,7 +325,7 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
 
 
 def _corrected(camera: Camera, measured: Floats) -> Floats:
-    """Return what the lens of a backward camera makes of measured positions: c (u1, u2) / u3 of rays."""
+    """Return measured positions corrected by a backward camera: c (u1, u2) / u3 of rays."""
     u = camera.rays(measured)
     return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
 
@@ -387,14 +387,14 @@ def _model(name: str, result: Result, known: bool) -> Model:
 
 
 def _all_freedom(result: Result) -> int:
-    """Return observations minus unknowns, whatever the unit variance is based on."""
+    """Return observations minus unknowns, for any basis of the unit variance."""
     if result.redundancies is not None:
         return round(result.redundancies.total)
     return round(result.degrees_of_freedom)
 
 
 def _is_within(small: Result, large: Result) -> bool:
-    """Whether a model has the cameras of another with some of its parameters held, where they started."""
+    """Whether a model is the other model with some parameters fixed at their initial values."""
     if len(small.cameras) != len(large.cameras) or _count(small) >= _count(large):
         return False
     return all(

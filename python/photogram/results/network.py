@@ -1,4 +1,4 @@
-"""What every adjustment of photos and points gives: arrays with their covariances and test values."""
+"""Results of all adjustments of photos and points: arrays, covariances, test values."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ if TYPE_CHECKING:
     from photogram.statistics.findings import Removed
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
-REMARKS = 5  # Of a `repr`
+REMARKS = 5  # Number of messages of a `repr`
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations of one kind, each with k components."""
+    """Observations of one type, each with k components."""
 
-    rows: Indices  # (r,) the points or photos that they are of
+    rows: Indices  # (r,) their points or photos
     residuals: Floats  # (r, k) observed minus adjusted; 0 if fixed, NaN if not observed
     sd: Floats  # (r, k) standard deviations: 0 if fixed, infinite if not observed
     # (r, k) redundancy numbers, and residual / (sd x root of redundancy number)
@@ -61,7 +61,7 @@ class Observed:
 
     @property
     def differences(self) -> Floats:
-        """(r, k) adjusted minus given: the residuals with the sign of check points, as tables have them."""
+        """(r, k) adjusted minus given: residuals with the sign of check points, as in tables."""
         return 0.0 - self.residuals
 
     @property
@@ -74,23 +74,23 @@ class Observed:
 class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     """An adjusted network of P photos with k unknowns each, n points and m image points.
 
-    All are in the order in which they were given; what was left out of the adjustment is NaN. Residuals are
-    observed minus computed. Cofactors hold for a priori unit weight; covariances are cofactors times the
-    variance of unit weight. Arrays cannot be written.
+    All arrays are in the order of the input. Values that were excluded from the adjustment are NaN. Residuals
+    are observed minus computed. Cofactors refer to a priori unit weight; covariances are cofactors times the
+    variance of unit weight. Arrays are read-only.
 
     Attributes
     ----------
     status
         `converged`, `not converged` or `diverged`.
     messages
-        Remarks that did not stop the adjustment.
+        Messages that did not stop the adjustment.
     loss
         Name and scale of the robust loss of the image points; None for least squares.
     initial_weighted_sum_of_squares, iterations
         The history; with a loss, sums of losses.
     degrees_of_freedom, variance_of_unit_weight
-        The variance is None without degrees of freedom; covariances are then scaled by 1. They are a whole
-        number unless the unit variance is based on redundancy numbers.
+        The variance is None without degrees of freedom; covariances are then scaled by 1. Degrees of freedom
+        are a whole number unless the unit variance is based on redundancy numbers.
     photo_cofactors
         (P, k, k).
     photo_redundancy
@@ -102,7 +102,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     point_redundancy
         (n, 3) redundancy numbers of weighted coordinates as observations; 0 unless weighted.
     point_rays
-        (n,) number of images; 0 for points left out.
+        (n,) number of images; 0 for excluded points.
     residuals
         (m, 2) in the unit of the image coordinates.
     redundancy
@@ -111,15 +111,15 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         (m, 2) residual / (standard deviation x root of redundancy number), a priori unit weight (Baarda's w);
         NaN without redundancy.
     image_weights
-        (m,) factor by which the loss has changed the weight of an image point; 1 without a loss.
+        (m,) weight factors of image points by the loss; 1 without a loss.
     ordering, predictions
-        The ordering of photos in force, and the predicted multiply-adds of one factorisation in each ordering
-        that was tried; NaN if the network is too large for an ordering.
+        The used ordering of photos, and the predicted multiply-adds of one factorisation for each tested
+        ordering; NaN if the network is too large for an ordering.
     operations, formations, seconds
-        Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
-        spent in each phase.
+        Predicted multiply-adds of each phase, the number of formations of the normal equations, and the
+        duration of each phase in seconds.
     options, state
-        How the core adjusted the network, and where that ended: what covariances are computed from.
+        Options and final state of the core, from which covariances are computed.
     snooped
         The observations that data snooping removed before; None without data snooping.
     """
@@ -161,7 +161,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     )
 
     def brief(self) -> tuple[str, Rows]:
-        """Return how the adjustment ended in a few lines, as its `repr` and notebooks show it."""
+        """Return a summary of the adjustment for its `repr` and notebooks."""
         used = self.used_images
         rms = np.sqrt((self.residuals[used] ** 2).mean(axis=0)) if used.any() else np.zeros(2)
         s0 = self.variance_of_unit_weight
@@ -174,7 +174,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
             ("freedom", f"{self.degrees_of_freedom:,.6g}"),
             ("sigma0", "a priori: there are no degrees of freedom" if s0 is None else f"{math.sqrt(s0):.4g}"),
         ]
-        # Tests of all observations take a while where they are many.
+        # Tests of many observations require some time.
         if len(used) <= JUDGED:
             rows.insert(0, ("verdict", self.verdict.headline))
         if self.loss is not None:
@@ -190,7 +190,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def _members(self) -> dict[str, Any]: ...
 
     def to_json(self) -> bytes:
-        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
+        """Return the complete result as a JSON document (UTF-8); `docs/json.md` lists its members."""
         return json.to_json(self._members())
 
     @property
@@ -199,7 +199,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @classmethod
     def taken_over(cls, solution: _photocore._NetworkSolution, **found: Any) -> Self:
-        """Take over what the core found: under the same names, but for what is put otherwise in `found`."""
+        """Copy the attributes of a solution of the core, except those in `found`."""
         found["initial_weighted_sum_of_squares"] = solution.initial_sum_of_squares
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
         given = [each.name for each in fields(cls) if each.name not in found and each.default is MISSING]
@@ -237,23 +237,23 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def reliability(
         self, *, level: float = 0.001, power: float = 0.80, unit_weight: str = "known"
     ) -> Reliability:
-        """Return which gross errors of every observation are found, and what others do (docs/blunders.md).
+        """Return the detectable gross errors of all observations and their effects (docs/blunders.md).
 
-        It takes a factorisation and a selected inverse at the adjusted values.
+        The computation requires a factorisation and a selected inverse at the adjusted values.
 
         Parameters
         ----------
         level, power
-            Of the test of an observation: alpha0, beta0.
+            Significance level and power of the test of an observation: alpha0, beta0.
         unit_weight
-            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to find.
+            `known`, or `unknown`: estimated by the adjustment, which makes errors harder to detect.
 
         Raises
         ------
         InputError
-            Options that cannot be.
+            If an option is invalid.
         OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariances`.
+            As in :meth:`covariances`.
         """
         from photogram.results.reliability import Reliability
 
@@ -261,9 +261,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
-        """What the report says of reliability, with the tests of all groups of observations.
+        """The summary of reliability in reports, with the tests of all groups of observations.
 
-        None where there are no redundancy numbers, or the adjustment has not converged or has a loss.
+        None without redundancy numbers or convergence, or with a loss.
         """
         computed = bool(finite_rows(self.redundancy)[self.used_images].all())
         if not (computed and self.converged and self.loss is None and self.degrees_of_freedom > 0):
@@ -275,7 +275,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         try:
             found = self.reliability(unit_weight="known" if self.KNOWN else "unknown")
         except (LostSupportError, _photocore.BlockError, _photocore.CollectionError):
-            # Everything else stands; a network that rounding makes singular here has said so before.
+            # Other results remain valid; a network that is singular by rounding has a message already.
             return None
         estimated = None if self.KNOWN else self.sum_and_freedom
         axes, facts = self._terms().point_axes, self._hypothesis_facts()
@@ -283,7 +283,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return reliability_summary(found, own, heights=self.geographic)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
-        """Return what hypotheses need to know beside the network; nothing if they are not about it."""
+        """Return additional facts for hypotheses; empty by default."""
         return {}
 
     def _hypotheses(self) -> Hypotheses:
@@ -293,7 +293,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         return summary.hypotheses
 
     def hypotheses(self) -> pd.DataFrame:
-        """Return errors of sets and of single observations as a data frame, with their tests (docs/tests.md).
+        """Return errors of sets and single observations with their tests as a data frame (docs/tests.md).
 
         A row for each hypothesis: code, name, number of parameters, statistic T, p, log odds against no
         error, and the estimated error in the units of the observations.
@@ -301,21 +301,21 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         Raises
         ------
         AdjustmentError
-            The adjustment has not converged, has a robust loss or no redundancy.
+            If the adjustment has not converged, has a robust loss or has no redundancy.
         """
         return self._hypotheses().tests().frame()
 
     def external_reliability(self) -> pd.DataFrame:
-        """Return what undetected errors would change, as a data frame with a row for each hypothesis.
+        """Return the effects of undetected errors as a data frame with a row for each hypothesis.
 
-        Columns are the redundancy, the minimal detectable bias (MDB), the largest effect of an error of that
-        size on any function of the unknowns in its standard deviations, the number of points that it moves by
-        more than 4 standard deviations, and the largest change of a point.
+        Columns are the redundancy, the minimal detectable bias (MDB), and its largest effect on any function
+        of the unknowns in standard deviations. They also include the number of points that it moves by more
+        than 4 standard deviations, and the largest change of a point.
 
         Raises
         ------
         AdjustmentError
-            As of :meth:`hypotheses`.
+            As in :meth:`hypotheses`.
         """
         return self._hypotheses().external_reliability().frame()
 
@@ -343,7 +343,7 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def point_given_sd(self) -> Floats:
-        """(n, 3) standard deviations of coordinates as observations: infinite not held, zero fixed."""
+        """(n, 3) standard deviations of coordinates as observations: infinite if free, zero if fixed."""
         return self.given.point_sd
 
     @property
@@ -365,19 +365,19 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def control(self) -> Observed:
-        """Points that took part and have a coordinate that is weighted or fixed, as observations."""
+        """Used points with a weighted or fixed coordinate, as observations."""
         rows = np.flatnonzero(self.used_points & np.isfinite(self.point_given_sd).any(axis=1))
         parts = (self.point_residuals, self.point_given_sd, self.point_redundancy, self.point_standardized)
         return Observed(rows, *(part[rows] for part in parts))
 
     @property
     def used_points(self) -> NDArray[np.bool_]:
-        """(n,) whether a point took part."""
+        """(n,) whether a point was used."""
         return self.point_rays > 0
 
     @cached_property
     def used_images(self) -> NDArray[np.bool_]:
-        """(m,) whether an image took part."""
+        """(m,) whether an image was used."""
         taken: NDArray[np.bool_] = self.used_points[self.image_points] & finite_rows(self.residuals)
         taken.flags.writeable = False
         return taken
@@ -389,17 +389,17 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def covariance_scale(self) -> float:
-        """What cofactors are multiplied by: the variance of unit weight, or 1 where there is none."""
+        """The scale of covariances: the variance of unit weight, or 1 without one."""
         return 1.0 if self.variance_of_unit_weight is None else self.variance_of_unit_weight
 
     @property
     def photo_covariances(self) -> Floats:
         """(P, k, k) covariances of the unknowns of photos, scaled by the variance of unit weight.
 
-        Of a block, k = 6: X, Y, Z in its linear unit (longitude and latitude in radians, height), then omega,
-        phi, kappa in radians. These angles are the numbers of `photo_attitudes`, in the sense that
-        `block.photo_to_ground` names; `Result.photo_rotation_covariances` has rotation vectors instead. Of a
-        collection: `collection.parameters`, in their order.
+        Blocks have k = 6: X, Y, Z in the linear unit (longitude and latitude in radians, height), then omega,
+        phi, kappa in radians. These angles are the numbers of `photo_attitudes` with the definition by
+        `block.photo_to_ground`; `Result.photo_rotation_covariances` uses rotation vectors. Collections have
+        the parameters `collection.parameters`, in their order.
         """
         return self.photo_cofactors * self.covariance_scale
 
@@ -425,19 +425,19 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     def _refused(self, error: Failure) -> Exception: ...
 
     def covariances(self) -> Covariances:
-        """Return an object that answers for covariances of anything with anything, from one factor.
+        """Return an object that computes covariances between any unknowns from one factor.
 
-        The normal equations are formed and factored once, at the adjusted values; the object keeps the
-        factor, as long as you keep the object.
+        The normal equations are formed and factored once, at the adjusted values. The object contains the
+        factor, and deleting the object releases its memory.
 
         Raises
         ------
         AdjustmentError
-            Unknowns are not determined.
+            If unknowns are not determined.
         OutOfMemoryError
-            The factor would take more memory than there is.
+            If the memory is not sufficient for the factor.
         KeyboardInterrupt
-            Ctrl-C.
+            If the user presses Ctrl-C.
         """
         network = self._core_network()
         return Covariances(
@@ -448,10 +448,9 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         )
 
     def covariance(self, a: Selection, b: Selection | None = None) -> Floats:
-        """Return the joint covariance matrix of a selection, or that of one with another.
+        """Return the covariance matrix of a selection, or between two selections.
 
-        For several questions ask one object: :meth:`covariances`, which says what a selection is and what
-        errors there are.
+        For several selections use one object of :meth:`covariances`, which describes selections and errors.
         """
         return self.covariances().covariance(a, b)
 
@@ -463,34 +462,34 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
 
     @property
     def plot(self) -> Plots:
-        """Pictures: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
+        """Plots: `plot.network()`, `.residuals()`, `.redundancy()`, `.tests()` ... (docs/pictures.md)."""
         from photogram.plots import Plots
 
         return Plots(self)
 
     def to_parquet(self, directory: str | PathLike[str]) -> None:
-        """Write the result as data: tables in Parquet, from which `photogram.read_result` makes it again.
+        """Write the result as tables in Parquet for `photogram.read_result`.
 
-        `docs/results.md` lists files and columns. Either all files are there in the end or none has changed.
+        `docs/results.md` lists files and columns. Either all files are written or none is changed.
 
         Raises
         ------
         ModuleNotFoundError
-            pyarrow is not installed.
+            If pyarrow is not installed.
         OSError
-            A file cannot be written.
+            If a file cannot be written.
         """
         folder = Path(directory)
-        from photogram.io.writing import write_whole  # what is only adjusted is not written
+        from photogram.io.writing import write_whole  # only required for writing
 
         write_whole({folder / name: content for name, content in self._files().items()})
 
     def _files(self) -> Mapping[str, Content]:
-        """Return the result as files of a folder, by their names, from which it can be read again."""
+        """Return the result as files of a folder, by name."""
         raise NotImplementedError
 
     def _table(self, what: str) -> pd.DataFrame:
-        """Return the table of one kind of thing as a data frame."""
+        """Return a table by the type of its items."""
         raise NotImplementedError
 
     def photo_table(self) -> pd.DataFrame:
@@ -509,14 +508,14 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         """Return the tests of all observations as a data frame, a row for each component.
 
         Columns are the type (`image`, `control`, `station`, ...), row, photo and point of the observation,
-        component and unit, residual, standard deviation, redundancy number, smallest error that the test
-        detects (level 0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) with its
-        probability `p`, and whether the verdict considers the observation an outlier.
+        component and unit, residual, standard deviation, redundancy number, smallest detectable error (level
+        0.001, power 0.8), test value `w` (or `t` if the unit weight is estimated) with its probability `p`,
+        and whether the verdict considers the observation an outlier.
         """
         return self._table("test")
 
     def control_table(self) -> pd.DataFrame:
-        """Return control as a data frame: residuals of held components, redundancy numbers, test values."""
+        """Return control as a data frame: residuals of components, redundancy numbers, test values."""
         return self._table("control")
 
     def station_table(self) -> pd.DataFrame:

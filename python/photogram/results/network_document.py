@@ -1,4 +1,4 @@
-"""The document of every adjusted network, block or collection: how good it is, how it went, remarks."""
+"""The document of an adjusted block or collection: accuracy, process, messages."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ def network_document(
     work: Sequence[Fact] = (),
     details: Sequence[Section] = (),
 ) -> Document:
-    """Return the document of a network: its number of `photos`, sections on its `size` and what was `given`.
+    """Return the document of a network: its number of `photos`, sections on its `size` and its `given` data.
 
-    `more` are further highlights, `redundancy` tables below the plot of redundancy numbers, `beside` sections
-    below the plan. `datum` describes the reference of coordinates, `poses` the meaning of the poses of
-    photos, `work` are further figures on the normal equations, `details` sections of the text report alone.
+    `more` are additional highlights, `redundancy` tables below the plot of redundancy numbers, `beside`
+    sections below the plan. `datum` describes the reference of coordinates, `poses` the meaning of photo
+    poses, `work` other facts on the normal equations, `details` sections of the text report only.
     """
     pictures, tests = drawings(result), Tests(result)
     worst = tests.largest(WORST)
@@ -112,9 +112,9 @@ def network_document(
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
-    """Return the reasons against the use of the values, the gravest first, then all other remarks.
+    """Return the reasons against the use of the values, the most serious first, then other messages.
 
-    They begin with missing convergence, a rejecting global test and the outliers of the verdict.
+    The first reasons are missing convergence, a rejecting global test and the outliers of the verdict.
     """
     test = result.global_test
     problems = []
@@ -155,7 +155,7 @@ def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> 
 def size_section(
     result: AdjustedNetwork, much: Sequence[tuple[str, str]], more: Sequence[Fact], good: Sequence[Fact]
 ) -> Section:
-    """Return how much there is, `more` of it, and how good it is."""
+    """Return the sizes of the network, `more` facts, and its accuracy."""
     facts = [Fact(f"{name[:1].upper()}{name[1:]}", value) for name, value in much]
     facts.append(Fact("Degrees of freedom", f"{result.degrees_of_freedom:.8g}"))
     parts: list[Part] = [
@@ -216,7 +216,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
-    """Return how the standard deviations of adjusted values are spread; none where none were computed."""
+    """Return the distribution of standard deviations of adjusted values; empty without any."""
     terms, rows = result._terms(), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
@@ -241,7 +241,7 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
 
 
 def _work(result: AdjustedNetwork) -> list[Fact]:
-    """Return the order of elimination, and numbers of operations, also of other orders."""
+    """Return the elimination order, and numbers of operations, also of other orders."""
     return [
         Fact("Photos eliminated", about(f"ordering.{result.ordering}")),
         Fact("Normal equations formed", f"{result.formations}", note="times"),
@@ -258,7 +258,7 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
 
 
 def _worst_table(tests: Tests, places: Indices) -> list[quantity.Table]:
-    """Return the table of the observations at the places of the largest test values; none without these."""
+    """Return the table of the largest test values, which have indices `places`; empty without any."""
     if not len(places):
         return []
     names = []
@@ -277,7 +277,7 @@ PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "dist
 
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
-    """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
+    """Return the drawings of a result by name; those without data are empty."""
     return {
         name: Drawing(
             f"picture-{name}",

@@ -1,4 +1,4 @@
-"""Sections of networks: control, check points, other observations, photos, points, the weakest of them."""
+"""Sections on control, check points, other observations, photos, points and weakest items."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from photogram import Result
 
 WORST = 10
-NEAR = 1e-3  # Points closer to a station, as a part of the median distance, are listed first
+NEAR = 1e-3  # Distance of points listed first from a station, relative to the median distance
 
 
 @np.errstate(all="ignore")
 def weakest_points(result: AdjustedNetwork) -> Table:
-    """Return the points of the largest ratios of standard deviations, and those nearest to a station.
+    """Return the points with the largest ratios of standard deviations, and the nearest to a station.
 
-    The ratio is that of the largest to the smallest standard deviation in any directions: the root of the
-    ratio of the eigenvalues of the covariance matrix, 1 if a component is held. The table has no rows without
+    The ratio of the largest to the smallest standard deviation in any direction is the root of the ratio of
+    the eigenvalues of the covariance matrix, or 1 with a fixed component. The table is empty without
     cofactors.
     """
     network = result._determined()
@@ -65,10 +65,10 @@ def weakest_points(result: AdjustedNetwork) -> Table:
 
 @np.errstate(all="ignore")
 def weakest_photos(result: AdjustedNetwork) -> Table:
-    """Return the photos of the largest conditions of their poses, the worst first.
+    """Return the photos with the largest condition numbers of their poses, the worst first.
 
-    Fixed unknowns of a photo do not count; those of which all are fixed are left out. Points on a line leave
-    a photo free to turn about it: then the condition has no bound.
+    Fixed unknowns of a photo do not count; photos without free unknowns are omitted. If all points are on a
+    line, a photo can rotate about it, and the condition number is unlimited.
     """
     network, count = result._determined(), len(result.given.photo_ids)
     images = np.bincount(result.given.image_photos[result.used_images], minlength=count)
@@ -88,9 +88,9 @@ def weakest_photos(result: AdjustedNetwork) -> Table:
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
-    """Return largest over smallest eigenvalue of (n, k, k) matrices; infinite where rounding has taken it.
+    """Return largest over smallest eigenvalue of (n, k, k) matrices; infinite by loss of precision.
 
-    Of the smaller ranks only so many eigenvalues count: the others belong to what is fixed.
+    For smaller ranks only the largest eigenvalues count: the others belong to fixed unknowns.
     """
     values = np.linalg.eigvalsh(matrices)
     largest = values[:, -1]
@@ -100,7 +100,7 @@ def _condition(matrices: Floats, ranks: Indices | int) -> Floats:
 
 
 def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
-    """Return the distances of all points from the nearest station that sees them, in their median."""
+    """Return the distances of all points from the nearest station that sees them, over their median."""
     used = result.used_images
     if network.moving is not None:
         used = used & ~network.moving[result.given.image_photos]
@@ -114,7 +114,7 @@ def _distances(result: AdjustedNetwork, network: Determined) -> Floats:
 
 
 ALL = 200  # Number up to which all photos or points are listed
-SOME = 100  # Rows of longer tables, besides those that other tables mention
+SOME = 100  # Rows of longer tables, in addition to items in other tables
 COMPONENTS = 120  # Rows of a table of components
 IMAGES = 1_000  # Image observations of a text report
 
@@ -127,9 +127,9 @@ def component_table(
     tests: Floats,
     deviations: Floats | None = None,
 ) -> list[Table]:
-    """Return a table that shows the components with the largest test values; none without components.
+    """Return a table of the components with the largest test values; empty without components.
 
-    Components are the (n, k) that are `there`, `tests` their test values, NaN where there is none.
+    `there` are the (n, k) existing components, `tests` their test values, NaN if missing.
     """
     places = np.argwhere(there)
     if not len(places):
@@ -142,9 +142,9 @@ def component_table(
 
 
 def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
-    """Return control: prior, posterior, difference, test; what is held has none.
+    """Return control: prior, posterior, difference, test; fixed components have no test.
 
-    `free` are the columns of components of control that are not held.
+    `free` are the columns of free components of control.
     """
     columns, own = control(result), result.control
     held = (own.sd == 0).all(axis=1)
@@ -257,9 +257,9 @@ def images_section(result: AdjustedNetwork) -> Section:
 def _chosen_rows(
     kind: str, every: Indices, others: Iterable[int], orders: Sequence[Indices]
 ) -> tuple[Indices, str]:
-    """Return which photos or points have a row, and the note on those without one.
+    """Return the listed photos or points, and a note on the others.
 
-    Those that other tables name come first, then by turns the worst in each order.
+    Items of other tables are first, then the worst in each order alternately.
     """
     if len(every) <= ALL:
         return every, ""
@@ -271,7 +271,7 @@ def _chosen_rows(
 
 
 def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
-    """Return photos, those of `others` first: their unknowns, and how their images fit, in layers."""
+    """Return photos, first `others`: unknowns, and the fit of their images, in layers."""
     terms = result._terms()
     fit = fit_of_images(result, result.given.image_photos, len(terms.photos))
     orders = [np.argsort(-np.nan_to_num(column, nan=-1.0), kind="stable") for column in fit.T[[3, 4]]]
@@ -283,7 +283,7 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
         columns += plan_deviations(terms, result.photo_sd) if of.start == 0 else []
         by = result.photo_sd[:, of] if terms.split else None
         tables.append(Table(f"photos-{caption.lower()}", caption, columns, note, "", by, rows))
-        own = replace(own, link=None)  # a name leads to one row only
+        own = replace(own, link=None)  # each name has one link target
     x, y = terms.image_axes
     columns = [
         own,
@@ -299,7 +299,7 @@ def photos_section(result: AdjustedNetwork, others: Iterable[int], intro: str = 
 
 @np.errstate(all="ignore")
 def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
-    """Return (n, 6) of n photos or points, `of` which the (m,) images are, how these fit.
+    """Return (n, 6) statistics of the fit of images of n photos or points; `of` is the owner of each image.
 
     Columns are rms x and y, mean redundancy, longest residual, largest |w|, number of images.
     """
@@ -323,11 +323,11 @@ def fit_of_images(result: AdjustedNetwork, of: Indices, count: int) -> Floats:
 
 
 def points_section(result: AdjustedNetwork, others: Iterable[int], intro: str = "") -> Section:
-    """Return points with their standard deviations, those of `others` first."""
+    """Return points with their standard deviations, first `others`."""
     terms, used = result._terms(), np.flatnonzero(result.used_points)
     if not len(used):
         return Section("points", "Points", [])
-    # Metres of a radian are near enough to sort by.
+    # An approximate number of metres per radian is sufficient for sorting.
     lengths = np.array([6.4e6 if axis.angle else 1.0 for axis in terms.point_axes])
     size = np.where(result.used_points, np.linalg.norm(result.point_sd * lengths, axis=1), np.nan)
     order = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")

@@ -1,4 +1,4 @@
-"""What is known of the photos, points and images of every network, quantity by quantity."""
+"""Quantities of the photos, points and images of every network."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FREE = {np.inf: "free", 0.0: "fixed"}
 
 
 def names(terms: Terms, kind: str, rows: Indices, member: str = "", *, here: bool = False) -> Quantity:
-    """Return the names of photos or points, which lead to their rows on a page, or are these."""
+    """Return names of photos or points with links to their rows on a page, or as link targets."""
     every = terms.photos if kind == "photo" else terms.points
     return Quantity(
         every[rows],
@@ -38,7 +38,6 @@ def part(each: Quantity, of: slice) -> Quantity:
 
 
 def photos(result: AdjustedNetwork) -> list[Quantity]:
-    """Return adjusted photos: names, values, standard deviations."""
     terms = result._terms()
     rows = np.arange(len(terms.photos))
     return [
@@ -52,7 +51,7 @@ def photos(result: AdjustedNetwork) -> list[Quantity]:
 
 
 def points(result: AdjustedNetwork) -> list[Quantity]:
-    """Return the points that took part: names, rays, coordinates, standard deviations."""
+    """Return the used points: names, rays, coordinates, standard deviations."""
     terms, used = result._terms(), np.flatnonzero(result.used_points)
     rays, places, sd = result.point_rays[used], result.point_positions[used], result.point_sd[used]
     return [
@@ -65,7 +64,7 @@ def points(result: AdjustedNetwork) -> list[Quantity]:
 
 
 def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantity]:
-    """Return the images that took part, or some: residuals, redundancy numbers, test values."""
+    """Return the used images, or some of them: residuals, redundancy numbers, test values."""
     terms, used = result._terms(), np.flatnonzero(result.used_images) if rows is None else rows
     axes = terms.image_axes
     return [
@@ -80,7 +79,7 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
 
 
 def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
-    """Return standard deviations (n, 3 or more) in plan as lengths, if coordinates are angles."""
+    """Return standard deviations (n, 3 or more) in plan as lengths if coordinates are angles."""
     if terms.lengths is None:
         return []
     axes = tuple(Axis.of(name, terms.linear_unit) for name in ("east", "north"))
@@ -148,7 +147,7 @@ test_value = partial(
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
-    """Return numbers, sums after the corrections, largest changes, damping; first the start, if given."""
+    """Return numbers, sums after the corrections, largest changes, damping; optionally the start first."""
     first = [] if start is None else [(0, start, np.nan, np.nan)]
     rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
     number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T

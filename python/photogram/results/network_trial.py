@@ -1,4 +1,4 @@
-"""A network as snooping asks it: what the core finds without some observations, and what falls with them."""
+"""The network for data snooping: solutions without some observations, decided by the core."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from photogram.statistics.snooping.suspects import (
 from photogram.words import Phrase
 
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
-"""What the suspects of the core are of, by their numbers."""
+"""Items of the suspects of the core by number."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
-WHOLE = 1500  # Largest number of rows with R of all of them; an exact round has as many solutions
+WHOLE = 1500  # Largest number of rows for the complete R; an exact round has this number of solutions
 SUPPORT = 3  # Smallest number of images of a photo with a free pose
 HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
 ROBUST_ITERATIONS = 20
@@ -43,7 +43,7 @@ T = TypeVar("T")
 
 
 class NetworkTrial:
-    """A network tried without some of its observations."""
+    """A network that can be adjusted without some of its observations."""
 
     def __init__(
         self, core: _photocore.NetworkTrial, suspects: Suspects, supported: Bools, rough: float, exact: float
@@ -60,12 +60,12 @@ class NetworkTrial:
         self._tests: dict[str, np.ndarray] = {}
 
     def restart(self, core: _photocore.NetworkTrial) -> None:
-        """Go on with the same network from other initial values; its groups are the same."""
+        """Continue the same network from other initial values; its groups are unchanged."""
         self.core, self._tests = core, {}
 
     @property
     def whole(self) -> bool:
-        """Whether R of all rows together is small enough to be had."""
+        """Whether the network is small enough for R of all rows."""
         return int(self.suspects.row_starts[-1]) <= WHOLE
 
     def adjust(self, out: Out) -> Standing:
@@ -84,7 +84,7 @@ class NetworkTrial:
         return Standing(status, omega, freedom)
 
     def _asked(self, ask: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Ask the core; what is undetermined is a LostSupportError."""
+        """Call the core; undetermined unknowns are a LostSupportError."""
         try:
             return ask(*arguments, **options)
         except (_photocore.BlockError, _photocore.CollectionError) as error:
@@ -95,13 +95,13 @@ class NetworkTrial:
                 raise LostSupportError([], []) from error
             if kind == "undetermined photos":
                 photos = {photo for combination in combinations for photo in combination[0]}
-                # Behind the photos the core has times on trajectories.
+                # In the core, times on trajectories follow the photos.
                 own = sorted(photo for photo in photos if photo < len(self._supported))
                 raise LostSupportError([], own) from error
             raise
 
     def stand(self) -> Standing:
-        """Take the network as its adjustment has ended."""
+        """Use the final state of the adjustment of the network."""
         status, _, omega, freedom, _ = self.core.stand()
         return Standing(status, omega, freedom)
 
@@ -136,7 +136,7 @@ class NetworkTrial:
         ]
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for the points of some groups, all groups there with residuals and R."""
+        """Return, for the points of some groups, all their groups with residuals and R."""
         points = [int(self.suspects.points[group]) for group in groups]
         on_points = iter(self.core.on_points([point for point in points if point >= 0]))
         found = []
@@ -155,10 +155,9 @@ class NetworkTrial:
         return found
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
-        """Return, for points that are out, all groups there with residuals and R as if they took part.
+        """Return, for excluded points, all their groups with residuals and R as if they were used.
 
-        Empty for points that observations beside images touch, and for those whose rays do not determine
-        them.
+        Empty for points with additional observations, and for those that their rays do not determine.
         """
         return self.core.on_points(list(points), gone=True)
 
@@ -169,7 +168,7 @@ class NetworkTrial:
         return np.asarray(self._tests["cofactors"][start:end].reshape(size, size))
 
     def response(self) -> tuple[Floats, Floats]:
-        """Return residuals of unit weight and R of all rows; zero for those that are out."""
+        """Return residuals of unit weight and R of all rows; zero for excluded ones."""
         residuals = self._tests["residual"]
         out = np.isnan(residuals)
         response = self.core.responses(list(range(len(self.suspects))))
@@ -178,9 +177,9 @@ class NetworkTrial:
         return np.where(out, 0.0, residuals), response
 
     def resist(self, scale: float) -> Floats | None:
-        """Adjust by Huber's loss, then by Cauchy's from there: (G,) lengths of residuals of unit weight.
+        """Adjust by Huber's loss, then by Cauchy's loss: (G,) lengths of residuals of unit weight.
 
-        None where either diverges; the next trial then begins where the last good one has ended.
+        None if either diverges; the next trial then begins at the last valid state.
         """
         weights: Floats | None = None
         for loss, limit in (("huber", HUBER), ("cauchy", CAUCHY)):
@@ -194,7 +193,7 @@ class NetworkTrial:
         return np.asarray(CAUCHY * scale * np.sqrt(np.maximum(1.0 / least - 1.0, 0.0)))
 
     def consequences(self, out: Out, group: int) -> tuple[set[int], set[int]]:
-        """Return points left with too few rays, and photos left without support, when a group is out."""
+        """Return points left with too few rays, and photos without support, if a group is removed."""
         suspects = self.suspects
         point, photo = int(suspects.points[group]), int(suspects.photos[group])
         points: set[int] = set()
@@ -215,7 +214,7 @@ class NetworkTrial:
         return np.asarray(~out.rows[self.suspects.row_starts[images]])
 
     def _falls(self, out: Out, photo: int, leaving: Indices) -> bool:
-        """Whether a photo is left with too few images; those of points that are out are out themselves."""
+        """Whether a photo is left with too few images, excluding those of removed points."""
         if self._supported[photo] or photo in out.photos:
             return False
         own = self.suspects.on_photo(photo)
@@ -225,10 +224,10 @@ class NetworkTrial:
 
 
 class NamedSuspects(Suspects):
-    """The groups of observations of a network as the core has them.
+    """Observation groups of a network with their names.
 
-    They contain arrays, not the core, so that names outlast the tests. Subclasses return the parts of groups,
-    and names of observations that are not images, control or poses.
+    They contain arrays, not the core, so that names remain available after the tests. Subclasses return the
+    parts of groups, and names of observations that are not images, control or poses.
     """
 
     def __init__(
@@ -236,7 +235,7 @@ class NamedSuspects(Suspects):
         given: Given,
         core: _photocore.NetworkSuspects,
         *,
-        apart: bool,  # Whether parts of a control point or of a station may go alone
+        apart: bool,  # Whether parts of a control point or of a station may be removed separately
         # Components of coordinates of points, positions and attitudes; units of the first two
         components: tuple[Sequence[str], Sequence[str], Sequence[str]],
         lengths: Sequence[str],
@@ -261,7 +260,7 @@ class NamedSuspects(Suspects):
         return np.asarray(self.photos[groups[self.kinds[groups] == IMAGE]])
 
     def loads(self, group: int) -> Indices:
-        """Return the photos that a group has to do with."""
+        """Return the photos that a group affects."""
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
         if kind == IMAGE:
             return self.photos_of_point(int(self.points[group]))
@@ -314,15 +313,15 @@ ANGLES = ("omega", "phi", "kappa")
 
 
 ROUGH = 2.0
-"""Standard deviations: a step after which the next would move no unknown by more is the last of a round. The
-rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
-EXACT = 1e-7  # The same if R of all rows is used
+"""Standard deviations: a round ends if the next step would not move any unknown by more. The following rounds
+start there. The last round removes nothing, so its tests are practically exact."""
+EXACT = 1e-7  # Value for R of all rows
 LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
     deviations = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
-    # What others are on as well does not need the images of one photo.
+    # Photos with other observations do not need their images.
     shared = {each.photo for each in block.timed if each.trajectory is not None}
     on_shared = np.array([name in shared for name in block.photo_ids], dtype=bool)
     return NetworkTrial(
@@ -335,10 +334,10 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
 
 
 def _datum_is_loose(block: Block) -> bool:
-    """Whether nothing but loose weights of photos places a block.
+    """Whether only weak weights of photos define the datum of a block.
 
-    Standard deviations of its unknowns are those of the datum then: a step may be small beside them and leave
-    partials that contradict the cofactors by hundreds.
+    The standard deviations of its unknowns are then those of the datum. A step may be small relative to them
+    and leave partials that contradict the cofactors by hundreds.
     """
     position_sd = block.photo_position_sd[:, :2]
     extent = np.ptp(block.photo_positions[:, :2], axis=0).max(initial=0.0)
@@ -347,12 +346,12 @@ def _datum_is_loose(block: Block) -> bool:
 
 
 def observations_of_core(block: Block) -> list[Observation]:
-    """Return the observations beside images in the order of the core: kind by kind."""
+    """Return the additional observations in the order of the core: by type."""
     return [block.observations[row] for rows, _ in block.observation_groups for row in rows]
 
 
 class BlockSuspects(NamedSuspects):
-    """The groups of observations of a block; `parts` of some may go alone."""
+    """The groups of observations of a block; `parts` of some may be removed separately."""
 
     def __init__(self, block: Block, core: _photocore.NetworkSuspects, parts: bool = True) -> None:
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
@@ -365,7 +364,7 @@ class BlockSuspects(NamedSuspects):
 
     @cached_property
     def point_row(self) -> dict[str, int]:
-        """The row of each point: of large blocks it is made only where it is asked for."""
+        """The row of each point; computed on demand because blocks may be large."""
         return {name: row for row, name in enumerate(self.block.point_ids)}
 
     @cached_property
@@ -373,7 +372,7 @@ class BlockSuspects(NamedSuspects):
         return {name: row for row, name in enumerate(self.block.photo_ids)}
 
     def parts(self, group: int) -> Sequence[Sequence[int]] | None:
-        """Return what may go alone: plan, height or all of control, single components of stations."""
+        """Return separately removable parts: plan, height or all of control, components of stations."""
         if not self.apart:
             return None
         kind = int(self.kinds[group])
@@ -385,7 +384,7 @@ class BlockSuspects(NamedSuspects):
         return None
 
     def other_loads(self, kind: int, subject: int) -> Indices:
-        """Return the photos that an observation beside images has to do with; of what is common, all."""
+        """Return the photos that an additional observation affects; all for common observations."""
         if kind != OBSERVATION:
             return np.arange(len(self.block.photo_ids))
         observation = self.observations[subject]

@@ -1,4 +1,4 @@
-"""Observations beside images after the adjustment, kind by kind."""
+"""Additional observations after the adjustment, by type."""
 
 from __future__ import annotations
 
@@ -19,15 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ObservedKind:
-    """The k observations of one kind, of r components each.
+    """The k additional observations of one type, with r components each.
 
-    Components that were not observed are NaN, and so are observations of points that were left out. Arrays
-    cannot be written.
+    Unobserved components and observations of excluded points are NaN. Arrays are read-only.
     """
 
     kind: str
-    rows: Indices  # (k,) which observations of the block they are
-    names: list[str]  # What each is of
+    rows: Indices  # (k,) their indices in the block
+    names: list[str]  # names of the observed items
     # components, units: Names and units of the r components: the linear unit of the object space, or radians
     components: tuple[str, ...]
     units: tuple[str, ...]
@@ -39,25 +38,25 @@ class ObservedKind:
     # observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
     # redundancy
     standardized: Floats
-    squares: Floats  # (k,) v' W v, weights as the loss has changed them
-    weights: Floats  # (k,) factor by which the loss has changed the weight; 1 without a loss
+    squares: Floats  # (k,) v' W v, weights after the loss
+    weights: Floats  # (k,) weight factors by the loss; 1 without a loss
 
     def __post_init__(self) -> None:
         freeze_fields(self)
 
     @property
     def used(self) -> int:
-        """How many took part."""
+        """The number of used observations."""
         return int(np.isfinite(self.squares).sum())
 
     @property
     def sum_of_squares(self) -> float:
-        """Of those that took part, weighted."""
+        """The weighted sum of squares of used observations."""
         return float(np.nansum(self.squares))
 
 
 def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
-    """Return what has become of the observations of a block, by the names of their kinds."""
+    """Return the adjusted observations of a block by the names of their types."""
     found = iter(solution.adjusted_observations)
     kinds: dict[str, ObservedKind] = {}
     for rows, (*_, covariances) in block.observation_groups:
@@ -95,7 +94,7 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
 
 
 def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
-    """Return observations of one kind, of different numbers of unknowns, in the order of the block."""
+    """Return observations of one type with different numbers of unknowns, in the order of the block."""
     rows = np.concatenate([first.rows, second.rows])
     order = np.argsort(rows)
     names = [*first.names, *second.names]
@@ -116,12 +115,12 @@ def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
 
 
 def named_observation(kind: str, of: str) -> Phrase:
-    """Return the name of an observation: its kind, and the names of its points, photos or unknowns."""
+    """Return the name of an observation: its type, and the names of its points, photos or unknowns."""
     return Phrase("named.observation", {"one": kind_words(kind), "of": of})
 
 
 def kind_words(kind: str) -> list[Phrase]:
-    """Return the words of a kind, such as `prior, lever arm`."""
+    """Return the words of a type, such as `prior, lever arm`."""
     return [Phrase(f"one.{each}") for each in kind.split(", ")]
 
 

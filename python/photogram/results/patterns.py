@@ -1,16 +1,16 @@
-"""Whether the residuals of a network show a pattern: over the frame, by photo, along the strip, over control.
+"""Tests for patterns of residuals over the frame, photos, strips and control.
 
-Outliers are clipped and a common factor of all standard deviations is taken out first, by the median of the
-test values: what is left of them would be taken for a pattern.
+Outliers are first clipped, and a common factor of all standard deviations is removed by the median of the
+test values, because both would appear as patterns.
 
-Residuals are not independent: ~v = R ~e. So a permutation of residuals is no null, and sums of r for the
-variances of sums make tests conservative. Here errors e of all images are drawn, and R e computed: what the
-network itself makes of errors that have no pattern. A statistic of the residuals is compared with that of
-each draw:
+Residuals are not independent: ~v = R ~e. Therefore permutations of residuals do not represent the null
+hypothesis, and sums of r as variances of sums make tests conservative. Instead, errors e of all images are
+drawn and R e computed: the residuals of the network for errors without patterns. A statistic of the residuals
+is compared with each draw:
 
     p = (1 + number of draws with a statistic as large) / (1 + number of draws)
 
-which is exact for any number of draws (Barnard 1963), but cannot be below 1 / (1 + draws).
+This is exact for any number of draws (Barnard 1963), but cannot be below 1 / (1 + draws).
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ LEVEL_OF_PATTERNS = 0.001  # Low, because several patterns are tested
 NOTABLE = 0.3  # Smallest mean residual that matters, in standard deviations
 CLIPPED = 3.0  # Limit of test values
 VISIBLE = 0.1  # Smallest redundancy number in the test of normality
-TOGETHER = 20  # Draws that are projected at a time
+TOGETHER = 20  # Number of draws that are projected together
 KURTOSIS = (-0.7, 1.0)  # Limits of excess kurtosis without a message
 
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    name: str  # Of the camera
-    photos: Bools  # (P,) which photos have it
-    estimated: int  # How many of its parameters are estimated
+    name: str  # Name of the camera
+    photos: Bools  # (P,) its photos
+    estimated: int  # Number of its estimated parameters
 
 
 def patterns(
@@ -68,11 +68,11 @@ def patterns(
     axes: Sequence[str] = (),
     fall: Callable[[Bools], float] = lambda _: 0.0,
 ) -> list[Systematic]:
-    """Return the tests of patterns of a network, where there is enough to test.
+    """Return the tests of patterns of a network with sufficient data.
 
-    `axes` are what the coordinates of stations and points are called, the height last; none where they mean
-    nothing on the ground. `fall` gives by how much the weighted sum of squares would fall with a lens for
-    (m,) images of a camera; it is asked for where the pattern is large.
+    `axes` are the names of the coordinates of stations and points, the height last; empty without meaning on
+    the ground. `fall` returns the decrease of the weighted sum of squares with a separate lens model for (m,)
+    images of a camera; it is called for large patterns.
     """
     used = chosen(result.used_images & finite_rows(result.redundancy))
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
@@ -81,11 +81,11 @@ def patterns(
     factor = float(np.nanmedian(np.abs(w))) / MEDIAN
     if not factor > 0:
         return []
-    # ~v = w sqrt(r), of clipped w; 0 if nothing is tested.
+    # ~v = w sqrt(r) of clipped w; 0 if untested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = _clipped(w, redundancy, factor)
     given, (axis, _) = result.given, result._terms().image_axes
-    # By photo the coordinates are those that were measured: of a scanner, samples and lines.
+    # Tests by photo use measured coordinates: samples and lines for scanners.
     image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
     scale = factor * given.image_sd[used].mean(axis=0) * axis.factor
     found: list[Systematic | None] = [
@@ -98,7 +98,7 @@ def patterns(
     found.append(_of_photos(image_photos[used], given.photo_ids, measured[used], residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:
-        # Observed positions that have a weight may drift along the order of the photos.
+        # Weighted observed positions may drift along the order of the photos.
         w = np.where(result.photo_redundancy > TESTABLE, result.photo_standardized, math.nan)
         w = np.where(np.abs(np.nan_to_num(w)).max(axis=0) > SPEAKING, w, math.nan)
         design = np.vander(np.linspace(-1.0, 1.0, len(w)), 3, increasing=True)
@@ -165,9 +165,9 @@ def _of_photos(
 
 
 def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | None:
-    """Test whether residuals are normal, one value of each visible direction.
+    """Test the normal distribution of residuals, with one value of each redundant direction.
 
-    The coordinates of a point on two photos repeat each other: the one with most redundancy is taken.
+    The coordinates of a point on two photos repeat each other: the one with most redundancy is used.
     """
     redundancy, w = result.redundancy[used], result.standardized[used]
     single = result.point_rays[result.image_points[used]] <= 2
@@ -186,7 +186,7 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
 
 
 def _of_heights(result: AdjustedNetwork) -> Systematic | None:
-    """Test whether the heights of control bend over the area."""
+    """Test the heights of control for bending over the area."""
     w = np.where(result.point_redundancy > TESTABLE, result.point_standardized, math.nan)[:, 2]
     tested = np.isfinite(w)
     if not tested.any():
@@ -210,22 +210,22 @@ def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | N
 
 @dataclass(frozen=True)
 class DrawnPattern:
-    """A pattern of residuals, and how often chance makes as strong a one.
+    """A pattern of residuals, with the probability of a stronger random pattern.
 
     Attributes
     ----------
     name
-        What is looked for.
+        The name of the pattern.
     statistic
         `B` of the bins of the frame, Moran's `I`, Durbin and Watson's `d`.
     value
-        Of the residuals.
+        The statistic of the residuals.
     expected, sd
         Mean and standard deviation over the draws.
     probability
-        Share of draws with a pattern as strong; see the module.
+        Share of draws with an equal or stronger pattern; see the module.
     draws
-        How many there were.
+        The number of draws.
     """
 
     name: str
@@ -238,30 +238,31 @@ class DrawnPattern:
 
 
 _Pattern = tuple[str, str, Callable[[Floats], float]]
-"""What is looked for, its statistic, and the value of this of (m, 2) residuals ~v."""
+"""Name, statistic, and function that computes it from (m, 2) residuals ~v."""
 
 
 def drawn_patterns(result: Result, *, draws: int = 200, seed: int = 1) -> list[DrawnPattern]:
-    """Test the residuals of the images of a block for patterns, against draws of residuals without any.
+    """Test the image residuals of a block for patterns by simulated residuals without patterns.
 
-    For every camera: mean residuals over the frame (B, as the verdict tests it), and whether residuals of
-    images near each other in the frame, on other photos, are alike (Moran's I 1950). Over the photos in
-    their order: whether the mean residuals of one and the next are alike (Durbin and Watson's d 1950).
-    Outliers are clipped at three standard deviations, in residuals and draws.
+    For every camera: mean residuals over the frame (B, as in the verdict), and the similarity of residuals
+    of adjacent images in the frame on other photos (Moran's I 1950). For the sequence of photos: the
+    similarity of the mean residuals of consecutive photos (Durbin and Watson's d 1950). Outliers are clipped
+    at three standard deviations, in residuals and draws.
 
     Parameters
     ----------
     result
         An adjusted block, with redundancy numbers.
     draws, seed
-        How many draws, and where their random numbers start. Each takes a solution with the factor.
+        The number of draws, and the seed of their random numbers. Each draw requires a solution with the
+        factor.
 
     Raises
     ------
     InputError
-        A result without redundancy numbers or with a robust loss; options that cannot be.
+        If the result is without redundancy numbers or with a robust loss, or an option is invalid.
     OutOfMemoryError, KeyboardInterrupt
-        As :meth:`photogram.Result.covariances`.
+        As in :meth:`photogram.Result.covariances`.
     """
     if whole_number("draws", draws) < 1:
         raise argument_error("draws", "positive", value=draws)

@@ -1,4 +1,4 @@
-"""The data of the pictures of an adjusted block, and pictures of its cameras."""
+"""The plot data of an adjusted block, and plots of its cameras."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ if TYPE_CHECKING:
 
 
 class PicturedNetwork(Pictured):
-    """What is drawn alike of all adjusted networks."""
+    """The plot data of all adjusted networks."""
 
     result: AdjustedNetwork
 
     @property
     @abstractmethod
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
-        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
+        """(P,) cameras of the photos, their names, and whether y is downwards in their images."""
 
     @cached_property
     def images(self) -> Images:
@@ -72,7 +72,7 @@ class PicturedNetwork(Pictured):
 
     @property
     def scanned(self) -> Bools:
-        """(P,) which photos are strips of a scanner, whose images are samples and lines."""
+        """(P,) photos that are scanner strips, with samples and lines as image coordinates."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
 
     @cached_property
@@ -86,7 +86,7 @@ class PicturedNetwork(Pictured):
 
     @property
     def outlying(self) -> list[Bools]:
-        """Which of them are outliers of the verdict."""
+        """Components that are outliers of the verdict."""
         return self._tests.outliers
 
     @property
@@ -95,7 +95,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """The data of an adjusted block: geographic space in axes to east, north and up amid its stations."""
+    """The data of an adjusted block; geographic space in axes to east, north and up at its centre."""
 
     result: Result
 
@@ -109,7 +109,7 @@ class PicturedBlock(PicturedNetwork):
     @cached_property
     def plan(self) -> Plan:
         result, block = self.result, self.result.block
-        # Differences as lengths: those of angles are too small to be taken of positions.
+        # Differences as lengths: differences of angles are too small to be computed from positions.
         lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
         return Plan(
             axes=("E", "N", "h") if block.geographic else ("X", "Y", "Z"),
@@ -149,7 +149,7 @@ class PicturedBlock(PicturedNetwork):
         down = bool(block.cameras) and block.cameras[0].image_y == "down"
         if not self.scanned.any():
             return cameras, names, down
-        # Samples and lines are no places of a frame: they have a picture of their own.
+        # Samples and lines are not frame coordinates: they have a separate plot.
         cameras = np.where(self.scanned, cameras + len(names), cameras)
         return cameras, [*names, *(f"{name}, scanned" for name in names)], down
 
@@ -196,14 +196,14 @@ class PicturedBlock(PicturedNetwork):
 
 
 def _bands(**sds: Floats) -> dict[str, Floats]:
-    """Return standard deviations by what they are of, where there are any: a camera that is held has none."""
+    """Return existing standard deviations by name; fixed cameras have none."""
     return {
         name.replace("_", " "): sd for name, sd in sds.items() if np.isfinite(sd).all() and np.any(sd != 0)
     }
 
 
 def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
-    """Return what is drawn of the distortion of a camera: the curve, and its balanced form."""
+    """Return the plotted distortion of a camera: the curve, and its balanced form."""
     unit = str(camera.camera.unit)
     balanced = (
         f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
@@ -221,7 +221,7 @@ def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
 
 
 def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:
-    """Plot a camera's distortion: the curve, its balanced form, and the standard deviations of both.
+    """Plot the distortion of a camera: curve, balanced form, standard deviations.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:
     Raises
     ------
     InputError
-        The camera has no radial terms, or no images.
+        If the camera is without radial terms or images.
     """
     curve = distortion_curve(result, camera)
     if curve is None:
@@ -250,7 +250,7 @@ def plot_lens_field(result: Result, camera: AdjustedCamera) -> Plot:
     Raises
     ------
     InputError
-        The camera has no such terms, or no images.
+        If the camera is without such terms or images.
     """
     field = lens_field(result, camera)
     if field is None:

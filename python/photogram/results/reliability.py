@@ -1,14 +1,14 @@
-"""Reliability of every observation of a network: which gross errors are found, and what others do.
+"""Reliability of observations: detectable gross errors and effects of undetected ones.
 
 With R the cofactors of the residuals of unit weight, r = R_ii and lambda0 the noncentrality of the test
 (Baarda 1968):
 
-    MDB_i = sd_i sqrt(lambda0 / r_i)             the error that is found with the power of the test
-    sqrt(lambda0 (1 - r_i) / r_i)                it moves nothing by more than so many standard deviations
+    MDB_i = sd_i sqrt(lambda0 / r_i)             the error detected with the power of the test sqrt(lambda0 (1
+    - r_i) / r_i)                its largest effect, in standard deviations
 
-For a group (x and y of an image, a control point) an error ~d is found where ~d' R_g ~d = lambda0 of its
-dimension: an ellipse, whose largest half-axis is sqrt(lambda0 / mu), mu the smallest redundancy of a
-direction that shows.
+For a group (x and y of an image, a control point) the limit of detection of an error ~d is an ellipse, ~d'
+R_g ~d = lambda0 of its dimension. Its largest semi-axis is sqrt(lambda0 / mu); mu is the smallest redundancy
+of a redundant direction.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ SEARCHED = 100  # Number of examined observations: those of the largest norm
 
 @dataclass(frozen=True)
 class Inseparable:
-    """Two groups of observations whose errors cannot be told apart."""
+    """Two groups of observations with inseparable errors."""
 
     first: str  # names
     second: str
-    groups: tuple[int, int]  # their numbers among all
+    groups: tuple[int, int]  # their indices
     # Largest canonical correlation of their residuals: an error of one moves the test of the other by this
     # share
     correlation: float
-    # How many minimal detectable errors an error must have to be attributed to the right one of the two in 95
-    # of 100 cases; infinite if nothing tells them apart
+    # Number of minimal detectable errors that an error must have to be attributed to the right one of the two
+    # in 95 of 100 cases; infinite if they are inseparable
     factor: float
 
     def __str__(self) -> str:
@@ -59,20 +59,20 @@ class Inseparable:
 
 @dataclass(frozen=True)
 class Moved:
-    """The unknown that an undetected error moves most."""
+    """The unknown with the largest effect of an undetected error."""
 
-    observation: str  # the one with the minimal detectable error
+    observation: str  # the observation with the minimal detectable error
     component: str
     unknown: tuple[str, int, int]  # Kind, number and component of the unknown
-    effect: float  # By how much it moves, in its unit
-    in_sd: float  # The same in its standard deviations (a priori unit weight)
+    effect: float  # The effect in its unit
+    in_sd: float  # The effect in its standard deviations (a priori unit weight)
 
 
 class Reliability:
-    """The reliability of an adjusted network, observation by observation, from row blocks of R.
+    """The reliability of all observations of an adjusted network, from row blocks of R.
 
-    Arrays are over G groups of observations (`suspects`), or over their M rows, which stand one group after
-    the other; rows are in the units of the observations.
+    Arrays contain G groups of observations (`suspects`), or their M rows in the order of the groups; rows are
+    in the units of the observations.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Reliability:
         *,
         level: float,  # alpha0 and beta0 of the test of one observation or group
         power: float,
-        unit_weight: str,  # `known`, or `unknown`: lambda0 is then that of the F test
+        unit_weight: str,  # `known`, or `unknown`: lambda0 of the F test
     ) -> None:
         one_of("unit_weight", unit_weight, ("known", "unknown"))
         self.level, self.power = (
@@ -101,7 +101,7 @@ class Reliability:
 
     @property
     def redundancy(self) -> Floats:
-        """(M,) redundancy numbers: the share of an error that shows in its own residual."""
+        """(M,) redundancy numbers: the share of an error in its own residual."""
         return self.tests.redundancy
 
     def lambda0(self, dimension: int) -> float:
@@ -118,60 +118,59 @@ class Reliability:
         return found
 
     def block(self, group: int) -> Floats:
-        """Return R of a group: (m, m), of unit weight; zero for what takes no part."""
+        """Return R of a group: (m, m), of unit weight; zero for unused rows."""
         return self.trial.own_block(group)
 
     @property
     def detectable(self) -> Floats:
-        """(M,) minimal detectable error of each row alone; infinite if it shows in no residual."""
+        """(M,) minimal detectable error of each single row; infinite without redundancy."""
         return minimal_detectable_error(self.sd, _shown(self.redundancy), self._delta)
 
     @property
     def external(self) -> Floats:
-        """(M,) largest effect of an undetected error on anything, in its standard deviations."""
+        """(M,) largest effect of an undetected error on any function, in its standard deviations."""
         return largest_effect(_shown(self.redundancy), self._delta)
 
     @property
     def group_detectable(self) -> Floats:
-        """(G,) largest half-axis of the minimal detectable error, in standard deviations; see `invisible`."""
+        """(G,) largest semi-axis of the minimal detectable error, in standard deviations; see `invisible`."""
         return np.asarray(np.sqrt(self._of_rank / self.tests.least))
 
     @property
     def group_external(self) -> Floats:
-        """(G,) by how many standard deviations it moves anything at the most."""
+        """(G,) largest effect of this error on any function, in its standard deviations."""
         least = np.minimum(self.tests.least, 1.0)
         return np.asarray(np.sqrt(self._of_rank * (1 - least) / least))
 
     @property
     def invisible(self) -> Bools:
-        """(G,) whether an error in some direction shows in no residual at all."""
+        """(G,) whether an error in some direction is without effect on residuals."""
         return np.asarray(self.tests.active & (self.tests.rank < np.diff(self.suspects.row_starts)))
 
     @property
     def untestable(self) -> Bools:
-        """(G,) whether no error is found by its own residual: too little redundancy in every direction."""
+        """(G,) whether all directions have too little redundancy for detection by their own residual."""
         return np.asarray(self.tests.active & ~(self.tests.least > TESTABLE))
 
     @cached_property
     def _effects(self) -> Floats:
-        """(M, 9) what an error of one standard deviation does to its own point and photo."""
+        """(M, 9) effects of an error of one standard deviation on its own point and photo."""
         return self.trial.core.effects(list(range(len(self.suspects))))
 
     @property
     def own_point_effect(self) -> Floats:
-        """(M, 3) by how much the minimal detectable error of a row moves its own point; NaN without one."""
+        """(M, 3) effect of the minimal detectable error of a row on its own point; NaN without one."""
         return np.asarray(self._effects[:, :3] * (self.detectable / self.sd)[:, np.newaxis])
 
     @property
     def own_photo_effect(self) -> Floats:
-        """(M, 6) the same of the pose of its own photo: position, omega, phi, kappa."""
+        """(M, 6) effect on the pose of its own photo: position, omega, phi, kappa."""
         return np.asarray(self._effects[:, 3:] * (self.detectable / self.sd)[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
-        """Return how far the minimal detectable error of the worst row of some groups moves their own points.
+        """Return the effects of minimal detectable errors of the worst rows of groups on their own points.
 
-        In the unit of the object space; `heights` alone, where plan coordinates are angles. NaN without a
-        point.
+        In the unit of the object space; only `heights` if plan coordinates are angles. NaN without a point.
         """
         effects = self.trial.core.effects(groups)[:, :3]
         starts, errors = self.suspects.row_starts, self.detectable / self.sd
@@ -186,41 +185,41 @@ class Reliability:
         return found
 
     def influence(self, selection: Selection) -> tuple[list[tuple[str, str, str]], Floats]:
-        """Return what minimal detectable errors do to chosen unknowns, each observation by itself.
+        """Return the effects of minimal detectable errors of single observations on chosen unknowns.
 
         One solution for each unknown serves all observations.
 
         Parameters
         ----------
         selection
-            As for :meth:`photogram.Result.covariance`.
+            As in :meth:`photogram.Result.covariance`.
 
         Returns
         -------
-        What the k unknowns are, and (k, M) by how much each moves, in its unit, when the minimal detectable
-        error of a row is not found.
+        The labels of the k unknowns, and (k, M) effects on each, in its unit, of the undetected minimal
+        detectable error of each row.
 
         Raises
         ------
         InputError
-            A selection that is not there.
+            If the selection does not exist.
         """
         labels, found = self._covariances().influences(selection, None)
         return labels, np.asarray(found * (self.detectable / self.sd))
 
     def influence_of(self, function: Callable[..., Any], unknowns: Selection) -> Floats:
-        """Return what minimal detectable errors do to a function of unknowns: (k, M) for its k values.
+        """Return the (k, M) effects of minimal detectable errors on the k values of a function.
 
-        `function` and `unknowns` are those of :meth:`photogram.Result.propagate`.
+        `function` and `unknowns` are as in :meth:`photogram.Result.propagate`.
         """
         _, found = self._covariances().influences(unknowns, function)
         return np.asarray(found * (self.detectable / self.sd))
 
     def most_moved(self, count: int = SEARCHED) -> list[Moved]:
-        """Return the unknowns that undetected errors move most, the gravest first.
+        """Return the unknowns with the largest effects of undetected errors, the largest first.
 
-        The largest effect on any unknown is at most `external`: rows are looked into in the order of this
-        norm, `count` of them at the most, until no other can do more.
+        The upper bound of the effect on any unknown is `external`. At most `count` rows are examined in
+        descending order of this bound, until no other row can have a larger effect.
         """
         testable = self.redundancy > TESTABLE
         norm = np.where(testable & np.isfinite(self.external), self.external, -math.inf)
@@ -239,28 +238,28 @@ class Reliability:
         return sorted(found, key=lambda moved: -moved.in_sd)
 
     def inseparable(self, limit: float = 0.9) -> list[Inseparable]:
-        """Return pairs of observations on one point that cannot be told apart: images, and its control."""
+        """Return pairs of inseparable observations on one point: images, and its control."""
         points = np.unique(self.suspects.points[self.suspects.points >= 0]).tolist()
         return [self.named(*pair) for pair in self.pairs_on(points, limit)]
 
     def pairs_on(self, points: list[int], limit: float) -> list[tuple[int, int, float]]:
-        """Return the same of some points by the numbers of the groups, with their correlation.
+        """Return inseparable pairs on some points by group numbers, with their correlation.
 
         Networks have thousands.
         """
         return self.trial.core.inseparable(points, limit)
 
     def partners(self, group: int, limit: float = 0.3) -> list[Inseparable]:
-        """Return all other groups whose tests are correlated with that of a group, the most first.
+        """Return other groups with correlated tests, the largest correlation first.
 
-        Exact: it takes a solution for each row of the group.
+        The exact computation requires a solution for each row of the group.
 
         Parameters
         ----------
         group
             Its number among the suspects.
         limit
-            Of the correlation.
+            The smallest correlation.
         """
         columns = self.trial.core.responses([group])
         starts = self.suspects.row_starts
@@ -275,11 +274,10 @@ class Reliability:
 
     @cached_property
     def _delta(self) -> float:
-        """Smallest error of a lone row that is found; kept, as networks have pairs by the thousand."""
+        """Smallest detectable error of a single row; cached because networks have thousands of pairs."""
         return math.sqrt(self.lambda0(1))
 
     def named(self, first: int, second: int, rho: float) -> Inseparable:
-        """Return a pair of :meth:`pairs_on` with its names."""
         factor = math.inf if rho > 1 - 1e-9 else SEPARATED / self._delta * math.sqrt(2 / (1 - rho))
         name = self.suspects.name
         return Inseparable(str(name(first)), str(name(second)), (first, second), rho, max(factor, 1.0))
@@ -288,7 +286,7 @@ class Reliability:
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
     def observations(self) -> Table:
-        """Return the declared table of all observations; people see the worst of each kind."""
+        """Return the declared table of all observations; displays show the worst of each type."""
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
         names = np.array([str(suspects.name(group)) for group in range(len(suspects))], dtype=object)
@@ -328,12 +326,12 @@ class Reliability:
         return self.observations().frame()
 
     def lines(self) -> list[str]:
-        """Return lines for a report: of every kind the observation whose undetected error does most."""
+        """Return report lines: for every type the observation with the largest undetected effect."""
         table = written(self.observations())
         return [table.note, *table_text(table)]
 
     def document(self) -> dict[str, Any]:
-        """Return what JSON documents have: every row with its unit."""
+        """Return the members of JSON documents: every row with its unit."""
         return {
             **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",
@@ -342,5 +340,5 @@ class Reliability:
 
 
 def _shown(redundancy: Floats) -> Floats:
-    """Return redundancy numbers, zero where rounding is all there is of them."""
+    """Return redundancy numbers; zero if only rounding error."""
     return np.where(redundancy < 1e-9, 0.0, np.minimum(redundancy, 1.0))

@@ -1,6 +1,6 @@
-"""What reports and JSON documents say of reliability: a summary by kind, the weakest observations, pairs.
+"""Summary of reliability in reports and JSON documents: types, weakest observations, pairs.
 
-The tests of all groups of observations, which the verdict judges, come with it: both need one factorisation
+It includes the tests of all groups of observations for the verdict, because both require one factorisation
 and selected inverse at the adjusted values.
 """
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 LISTED = 5  # Listed observations of each type
 PAIRS = 10  # Listed inseparable pairs
-LOOKED_INTO = 2_000  # Number of points with examined pairs: those of the least redundancy
+LOOKED_INTO = 2_000  # Number of points with examined pairs: those with the least redundancy
 LIMIT = 0.9  # Largest correlation of separable tests (Foerstner 1983)
 APART = 1 / (1 + LIMIT)
-"""Redundancy from which on that of a pair cannot be reached: rho^2 <= (1 - r)(1 - s) / (r s)."""
+"""Smallest redundancy that excludes this correlation of a pair: rho^2 <= (1 - r)(1 - s) / (r s)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,10 @@ class ReliabilitySummary:
     kinds: Quantities  # number, redundancy and checks of groups by type of observation
     weakest: Quantities  # of each type the groups with the largest undetected effect
     two_rays: int  # points on two photos: the wrong image cannot be identified
-    # Pairs of observations on other points that cannot be told apart, the most alike first
+    # Inseparable pairs of observations on other points, the most correlated first
     pairs: tuple[Inseparable, ...]
     pairs_found: int  # number of these pairs among the examined points
-    # Number of examined points: those of the least redundancy, at most `LOOKED_INTO`
+    # Number of examined points: those with the least redundancy, at most `LOOKED_INTO`
     points_looked_into: int
     suspects: Suspects  # all groups, and their tests
     tests: Tests
@@ -52,7 +52,7 @@ class ReliabilitySummary:
 
     @property
     def testable(self) -> Bools:
-        """(G,) which groups have a direction whose errors show notably in their own residuals."""
+        """(G,) groups with a direction of sufficient redundancy."""
         return self.tests.testable(self.suspects.row_starts)
 
     def kinds_table(self) -> Table:
@@ -60,7 +60,7 @@ class ReliabilitySummary:
         return Table("reliability-kinds", "Redundancy of groups of observations", self.kinds, note)
 
     def weakest_table(self, unit: str = "") -> Table:
-        """Return the declared table of the weakest observations; `unit` is that of the object space."""
+        """Return the declared table of the weakest observations; `unit` is the unit of the object space."""
         *columns, own_point = self.weakest
         columns.append(replace(own_point, head=f"Own point {unit}".rstrip()))
         weight = "known" if self.known else "estimated"
@@ -72,7 +72,7 @@ class ReliabilitySummary:
         return self.weakest_table().frame()
 
     def parts(self, unit: str) -> list[Part]:
-        """Return the parts of a section; `unit` is that of the object space."""
+        """Return the parts of a section; `unit` is the unit of the object space."""
         sentences = []
         if self.two_rays:
             sentences.append(
@@ -101,22 +101,16 @@ class ReliabilitySummary:
 
 
 def reliability_summary(found: Reliability, hypotheses: Hypotheses, *, heights: bool) -> ReliabilitySummary:
-    """Return what a report says of the reliability of a network.
+    """Return the summary of the reliability of a network.
 
-    Parameters
-    ----------
-    found
-        The reliability of every observation.
-    hypotheses
-        Errors of sets and single observations.
-    heights
-        Whether own points are judged by their heights alone: where plan coordinates are angles.
+    `hypotheses` are errors of sets and single observations; `heights` restricts effects on own points to
+    heights, because plan coordinates are angles.
     """
     suspects, tests = found.suspects, found.tests
     two, points = _points(suspects, tests)
     checked = tests.least > TESTABLE
     pairs = [each for each in found.pairs_on(points, LIMIT) if checked[each[0]] and checked[each[1]]]
-    # Rounding is no order: those that nothing tells apart stand as they are numbered.
+    # Rounding does not define an order: equal values remain in the order of their numbers.
     pairs.sort(key=lambda pair: (-round(pair[2], 9), pair[:2]))
     return ReliabilitySummary(
         level=found.level,
@@ -163,7 +157,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
     for kind in range(len(suspects.kind_names)):
         own = np.flatnonzero(checked & (suspects.kinds == kind) & np.isfinite(external))
         if len(own) > LISTED:
-            # Only what may be among the first is sorted.
+            # Only candidates for the first rows are sorted.
             least = np.partition(external[own], -LISTED)[-LISTED]
             own = own[external[own] >= least]
         groups += own[np.argsort(-external[own], kind="stable")[:LISTED]].tolist()
@@ -179,7 +173,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[Quantity]:
 
 
 def _points(suspects: Suspects, tests: Tests) -> tuple[int, list[int]]:
-    """Return how many points stand on two photos, and others on which a pair may be alike."""
+    """Return the number of points on two photos, and other points with possible inseparable pairs."""
     at = suspects.points
     takes_part = tests.active & (at >= 0)
     if not takes_part.any():

@@ -1,4 +1,4 @@
-"""The result of the adjustment of a block: arrays with their covariances, and the ways to show them."""
+"""The result of the adjustment of a block: arrays, covariances, tables, documents."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ if TYPE_CHECKING:
 
 NOT_PHOTOGRAPHED = "not photographed"
 REJECTED = "all its image observations are rejected"
-"""Reasons why a point without image observations is left out: it never had any, or none was used."""
+"""Reasons for excluding a point without image observations: without any, or none was used."""
 
 
 def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str, str]:
-    """Return the points that are left out by their names, with the reasons."""
+    """Return the excluded points by name, with the reasons."""
     reasons = {block.point_ids[point]: reason for point, reason in solution.dropped}
     rejected = [name for name in block.rejected_points if reasons.get(name) == NOT_PHOTOGRAPHED]
     return reasons | dict.fromkeys(rejected, REJECTED)
@@ -68,7 +68,7 @@ def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(OnFilm, AdjustedNetwork):
-    """An adjusted block; the arrays that every network has are those of `AdjustedNetwork`, with k = 6.
+    """An adjusted block; common arrays of networks are in `AdjustedNetwork`, with k = 6.
 
     The unknowns of a photo are its position and omega, phi, kappa. Positions are X, Y, Z or longitude (rad),
     latitude (rad), height; angles are radians, image coordinates millimetres or the unit of the cameras.
@@ -76,45 +76,45 @@ class Result(OnFilm, AdjustedNetwork):
     Attributes
     ----------
     block
-        What was adjusted: a copy, which later changes of the caller's lists do not reach.
+        The adjusted block: a copy, independent of later changes of the caller's lists.
     sums_of_squares
         Weighted sums by group.
     redundancies
         Sums of redundancy numbers of the same groups; None without covariances.
     unit_variance
-        What degrees of freedom and variance of unit weight are based on: `free`, `constrained`, `unity` or
+        The basis of degrees of freedom and variance of unit weight: `free`, `constrained`, `unity` or
         `redundancy`.
     photo_corrections
-        (i, P, 6) corrections of position and attitude in each of the i iterations; they lead from the initial
-        to the adjusted values.
+        (i, P, 6) corrections of position and attitude in each of the i iterations, from the initial to the
+        adjusted values.
     photo_positions, photo_attitudes
         (P, 3) adjusted.
     photo_order
-        (P,) the indices of the photos as they were eliminated.
+        (P,) indices of the photos in elimination order.
     point_last_corrections
         (n, 3) corrections in the last iteration.
     kinds
-        Observations beside images: arrays for each kind, by its name.
+        Additional observations: arrays for each type, by its name.
     cameras
-        The adjusted cameras of the block, in its order; none where it has principal distances.
+        The adjusted cameras of the block, in its order; empty for blocks with principal distances.
     unknowns
-        The adjusted unknowns that observations, and photos on frames, have in common, in the order of
+        The adjusted common unknowns of observations, and of photos on frames, in the order of
         `block.unknowns`.
     dropped
-        Points left out, with the reason.
+        Excluded points, with the reason.
     datum
-        What coordinates and standard deviations refer to.
+        The datum of coordinates and standard deviations.
     hints
-        Mistakes in conventions (units, axes, signs, angles) that would explain why images do not fit, as
-        sentences, as :func:`photogram.diagnose` finds them; none before. They head the verdict.
+        Mistakes in conventions (units, axes, signs, angles) that would explain misfitting images, as
+        sentences of :func:`photogram.diagnose`; empty without a diagnosis. They are first in the verdict.
     exchanged
-        Names of points that are probably exchanged on a photo, likewise, where there are gross errors.
+        Names of points that are probably exchanged on a photo, as sentences, if there are gross errors.
     set_aside
-        What first values took out and does not fit the adjusted block either: photos, images, by name; see
-        :func:`photogram.adjust_started`.
+        Photos and images, by name, that the initial values removed and that do not fit the adjusted block;
+        see :func:`photogram.adjust_started`.
     features
-        Features through adjusted points that reports and tables show, as :func:`photogram.features` gives
-        them, in the datum of the result; None without.
+        Features through adjusted points for reports and tables, from :func:`photogram.features`, in the datum
+        of the result; None without.
     """
 
     block: Block
@@ -137,7 +137,7 @@ class Result(OnFilm, AdjustedNetwork):
     features: Features | None = None
 
     WHOLE: ClassVar[bool] = True
-    """Whether the normal equations of all of it may be asked again."""
+    """Whether the normal equations of the complete block are available."""
 
     @classmethod
     def from_solution(
@@ -149,7 +149,7 @@ class Result(OnFilm, AdjustedNetwork):
         messages: list[Message],
         freedom: float,
     ) -> Self:
-        """Take over what the core found; `freedom` are the degrees of freedom of the unit variance."""
+        """Return the result of a solution of the core; `freedom` belongs to the unit variance."""
         variance = solution.variance_of_unit_weight
         scale = 1.0 if variance is None else variance
         return cls.taken_over(
@@ -170,7 +170,7 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def document(self) -> Document:
-        """Return the document: judgement, sections, tables."""
+        """Return the document: verdict, sections, tables."""
         from photogram.results.document import block_document
 
         return block_document(self)
@@ -192,7 +192,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def given(self) -> Block:
-        """What was adjusted: the block."""
+        """The adjusted block."""
         return self.block
 
     @property
@@ -202,7 +202,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def freedom_of_scale(self) -> float:
-        """The degrees of freedom with which `covariance_scale` is known; infinite where it is given."""
+        """The degrees of freedom of `covariance_scale`; infinite if given."""
         known = self.unit_variance == "unity" or self.variance_of_unit_weight is None
         return math.inf if known else self.degrees_of_freedom
 
@@ -245,19 +245,19 @@ class Result(OnFilm, AdjustedNetwork):
         return {**facts, "checks": checks.rows.tolist(), "check_sd": sd}
 
     def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
-        """Return the block as it was given, but with what is free where the adjustment has ended.
+        """Return the given block with adjusted values of free unknowns.
 
-        That are poses of photos, parameters of cameras, and coefficients of trajectories.
+        These are poses of photos, parameters of cameras, and coefficients of trajectories. Observed and fixed
+        values remain as given.
 
-        What was observed or held is as it was given.
-        `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
-        after :meth:`photogram.Block.replace`.
+        `photogram.adjust(result.restarted())` continues the adjustment with other options, or with other
+        weights after :meth:`photogram.Block.replace`.
 
         Parameters
         ----------
         turns
-            By names of trajectories (3,) rotation vectors about the axes of the photo, which their tables
-            take over: corrections of their rotations then begin at zero.
+            By names of trajectories (3,) rotation vectors about the axes of the photo, which are added to
+            their tables: corrections of their rotations then begin at zero.
         """
         block = self.block
         free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
@@ -270,34 +270,34 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def in_datum(self, datum: InnerConstraints) -> Self:
-        """Return the result in another datum, without adjusting again (S-transformation, docs/datum.md).
+        """Return the result in another datum without another adjustment (S-transformation, docs/datum.md).
 
-        Residuals, redundancy numbers, test values and the variance of unit weight are the same in all.
+        Residuals, redundancy numbers, test values and the variance of unit weight do not depend on the datum.
 
         Raises
         ------
         InputError
-            Points or photos that are not there, or that do not carry the datum; photos on trajectories
-            among them.
+            If points or photos do not exist or cannot define the datum, such as photos on trajectories.
         AdjustmentError
-            The block is not free: the message says what gives its datum.
+            If the block is not free: the message describes its datum.
         OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariances`.
+            As in :meth:`covariances`.
         """
         return self._in(datum_row(self.block, inner_datum(datum)))
 
     def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
-        """Return the result with covariances relative to a photo or to points, whether or not it is free.
+        """Return the result with covariances relative to a photo or to points, for any datum.
 
-        They are those that holding the pose of the photo, or the mean position and orientation of the points,
-        would give; scale stays as it is. Adjusted values stay, too.
+        The covariances are those for a fixed pose of the photo, or a fixed mean position and orientation of
+        the points. Scale and adjusted values remain unchanged.
 
         Raises
         ------
         InputError
-            Neither or both, names that are not there, points on one line; photos on trajectories.
+            If both or neither are given, names do not exist, points are on one line, or photos are on
+            trajectories.
         OutOfMemoryError, KeyboardInterrupt
-            As :meth:`covariances`.
+            As in :meth:`covariances`.
         """
         refuse_trajectories(self.block, "relative_to")
         return self._in(relative_datum(self.block, photo, points))
@@ -339,11 +339,11 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def global_test(self) -> GlobalTest | None:
-        """The test of all residuals together; None without degrees of freedom.
+        """The test of all residuals; None without degrees of freedom.
 
-        With `constrained` of all observations, every weighted value among them. Otherwise the weights of
-        photos and cameras may be nominal: of all others, over the sum of their redundancy numbers, and None
-        where there are no covariances (docs/tests.md).
+        With `constrained` it includes all observations and weighted values. Otherwise, weights of photos and
+        cameras may be nominal: the test uses all others with the sum of their redundancy numbers, and is None
+        without covariances (docs/tests.md).
         """
         if self.unit_variance == "constrained":
             return super().global_test
@@ -353,9 +353,9 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def photo_residuals(self) -> Floats:
-        """(P, 6) observed minus adjusted position and attitude; 0 where fixed, NaN where free.
+        """(P, 6) observed minus adjusted position and attitude; 0 if fixed, NaN if free.
 
-        Longitudes and attitudes differ by half a turn at the most.
+        Differences of longitudes and attitudes are at most half a rotation.
         """
         block = self.block
         positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
@@ -373,8 +373,8 @@ class Result(OnFilm, AdjustedNetwork):
         """(P, 6, 6) covariances of positions and rotation vectors of photos, scaled as `photo_covariances`.
 
         The order is X, Y, Z (longitude, latitude, height), then the three components of rho in radians. A
-        photo turns by rho about its own axes (x right, y up, z back towards the viewer): its true attitude is
-        A Exp(rho), A the adjusted one (docs/conventions.md). NaN where phi is 90 degrees.
+        photo rotates by rho about its own axes (x right, y up, z towards the viewer): its true attitude is A
+        Exp(rho), A the adjusted one (docs/conventions.md). NaN if phi is 90 degrees.
         """
         kind = "omega_phi_kappa_photo_to_ground" if self.block.photo_to_ground else "omega_phi_kappa"
         _, rates = _photocore.attitudes_from_numbers(kind, self.photo_attitudes, np.eye(3))
@@ -385,28 +385,28 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def photo_given_sd(self) -> Floats:
-        """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed.
+        """(P, 6) standard deviations of observed positions and attitudes: infinite if free, zero if fixed.
 
-        What is given of a photo with a trajectory of its own is given of the coefficients of that.
+        Given values of a photo with its own trajectory refer to the coefficients of the trajectory.
         """
         given = np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
         return np.where(timed_photos(self.block)[:, np.newaxis], np.inf, given)
 
     @property
     def point_residuals(self) -> Floats:
-        """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
+        """(n, 3) observed minus adjusted weighted components; 0 if fixed, NaN if free."""
         return np.where(np.isfinite(self.block.point_sd), -self.point_differences, np.nan)
 
     @cached_property
     def point_kinds(self) -> NDArray[np.str_]:
-        """(n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
+        """(n,) `control` with an observed component, `check` with known components only, else `pass`."""
         return point_kinds(self.block)
 
     @property
     def point_differences(self) -> Floats:
-        """(n, 3) adjusted minus supplied coordinates; NaN where none were supplied.
+        """(n, 3) adjusted minus given coordinates; NaN if not given.
 
-        Longitudes differ by half a turn at the most, on whichever side of the antimeridian they are counted.
+        Differences of longitudes are at most half a rotation, on either side of the antimeridian.
         """
         differences = self.point_positions - self.block.point_positions
         if self.block.geographic:
@@ -415,30 +415,30 @@ class Result(OnFilm, AdjustedNetwork):
 
     @cached_property
     def check_points(self) -> CheckPoints:
-        """Check points with their differences and standard deviations, tested one by one and together."""
+        """Check points with differences, standard deviations, and single and joint tests."""
         return check_points(self)
 
     def statement(self, **asked: Any) -> Any:
-        """Return the accuracy statement that one may hand over (docs/statement.md).
+        """Return the accuracy statement for a client (docs/statement.md).
 
         It has `figures`, `sentences`, `assumptions`, `exit`, `budget(..)`, `check_points`, `leave_one_out`,
-        `to_html()`, `to_pdf()` and `to_json()`; options and errors are those of :func:`photogram.statement`.
+        `to_html()`, `to_pdf()` and `to_json()`; for options and errors see :func:`photogram.statement`.
         """
-        import photogram  # the package names the function that reads results
+        import photogram  # avoids a circular import
 
         return photogram.statement(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
-        """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
+        """Return check points as a data frame: adjusted minus given coordinates, standard deviations."""
         return self._table("check")
 
     @property
     def trajectories(self) -> dict[str, AdjustedTrajectory]:
-        """The trajectories that photos and records are on, by name: coefficients, poses at any time."""
+        """The trajectories of photos and records, by name: coefficients, poses at any time."""
         return adjusted_trajectories(self)
 
     def project(self, photo: str, points: ArrayLike) -> Floats:
-        """Return where a photo on a trajectory sees points: the row or line at whose time it sees them there.
+        """Return the image coordinates of points on a photo on a trajectory, at their own row or line times.
 
         Parameters
         ----------
@@ -449,12 +449,12 @@ class Result(OnFilm, AdjustedNetwork):
 
         Returns
         -------
-        (n, 2) image coordinates, of scanners samples and lines; NaN for points that are never seen.
+        (n, 2) image coordinates, samples and lines for scanners; NaN for points outside the recorded time.
 
         Raises
         ------
         InputError
-            A photo that is on no trajectory; a scanner on a trajectory that has one record.
+            If the photo is not on a trajectory, or is a scanner on a trajectory with one record.
         """
         return project(self, photo, points)
 
@@ -467,7 +467,7 @@ class Result(OnFilm, AdjustedNetwork):
         return self._table("unknown")
 
     def observation_table(self) -> pd.DataFrame:
-        """Return observations beside images as a data frame, a row for each component, with its unit."""
+        """Return additional observations as a data frame, a row for each component, with its unit."""
         return self._table("observation")
 
 

@@ -1,7 +1,7 @@
-"""Results as files of a folder, and back: what is kept of every network, table by table.
+"""Reading and writing of results as files of a folder: the common tables of networks.
 
-`docs/results.md` describes the files. What has a row for every photo, point or image is a column of a table;
-everything else stands in `summary.json`. Classes of results declare their columns as :class:`Part`.
+`docs/results.md` describes the files. Arrays with a row for every photo, point or image are columns of a
+table; all other data are in `summary.json`. Classes of results declare their columns as :class:`Part`.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ from photogram.words import phrase
 FORMAT = 2
 SUMMARY = "summary.json"
 _STATE = "state"
-_READ = ("photos", "points", "images", _STATE)  # Tables that are read; the others are for people
+_READ = ("photos", "points", "images", _STATE)  # Tables that are read; the others are for users
 TRIANGLE = "covariances, lower triangle row by row, scaled by the variance of unit weight"
 REDUNDANCY = "redundancy number of {} as an observation; 0 unless weighted"
 GIVEN_SD = "standard deviation of {} that was given: infinite free, 0 fixed"
 _ROWS = ("photo_ids", "point_ids", "image_photos", "image_points")
-"""Fields of what was adjusted that the names in the tables give."""
+"""Fields of the given network that are defined by the names in the tables."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """An array of a result, or of what was adjusted, as columns of a table."""
+    """An array of a result, or of the given network, as columns of a table."""
 
     field: str  # Path of the attribute, such as `block.image_xy`
-    # Of columns, or of the components of a matrix or list
+    # Names of columns, or of the components of a matrix or list
     names: tuple[str, ...]
     units: tuple[str, ...]
-    description: str  # Of all columns; `{}` is the name of the component
+    description: str  # Description of all columns; `{}` is the name of the component
     # `columns`; `matrix`: lower triangles of symmetric matrices, which are cofactors in the result and scaled
     # in the table; `list`: one cell for each row; `derived`: columns that are not read again
     form: str = "columns"
-    prefix: str = ""  # Before the names of columns; the name of the one column of a matrix or list
+    prefix: str = ""  # Prefix of the names of columns; the name of the one column of a matrix or list
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
-        """Return its columns; none where the array is None."""
+        """Return the columns; empty if the array is None."""
         array: Any = attrgetter(self.field)(result)
         if array is None:
             return []
@@ -74,7 +74,7 @@ class Part:
         ]
 
     def array(self, sheet: Sheet, scale: float) -> np.ndarray | None:
-        """Return the array that a table has; None where it was None."""
+        """Return the array from a table; None if it was None."""
         if self.form == "matrix":
             k = len(self.names)
             return unpacked(_divided(sheet.numbers(self.prefix, k * (k + 1) // 2), scale))
@@ -91,7 +91,7 @@ class Part:
 
 
 def _divided(products: np.ndarray, scale: float) -> np.ndarray:
-    """Return what times the scale gives the products again to the last bit, as their factors did."""
+    """Return quotients that reproduce the products exactly when multiplied by the scale."""
     near: np.ndarray = products / scale
     found = near
     for direction in (-np.inf, np.inf):
@@ -101,13 +101,13 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
 
 
 def _products(units: Sequence[str]) -> str:
-    """Return the unit of covariances: that of all, or of the components in their order."""
+    """Return the unit of covariances: a common one, or units of the components in their order."""
     different = list(dict.fromkeys(units))
     return f"{different[0]}2" if len(different) == 1 else "products of " + " ".join(units)
 
 
 def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, last: bool) -> list[Part]:
-    """Return what is kept of the points of every network; `given` names what was adjusted."""
+    """Return the stored arrays of points; `given` is the name of the adjusted network."""
     sd = "standard deviation of {}"
     more = [Part("point_last_corrections", names, units, "last correction of {}", prefix="last_change_")]
     return [
@@ -123,7 +123,7 @@ def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, l
 
 
 def image_parts(given: str, unit: str) -> list[Part]:
-    """Return what is kept of the images of every network; `given` names what was adjusted."""
+    """Return the stored arrays of images; `given` is the name of the adjusted network."""
     both, units, plain = ("x", "y"), (unit, unit), ("1", "1")
     return [
         Part(f"{given}.image_xy", both, units, "measured {}"),
@@ -143,21 +143,21 @@ def image_parts(given: str, unit: str) -> list[Part]:
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    folder: Path  # Where it is
+    folder: Path  # Its path
     summary: Mapping[str, Any]  # The document
-    decoder: Decoder  # For what it keeps
+    decoder: Decoder  # Decoder of the document
     sheets: Mapping[str, Sheet]  # The tables of photos, points and images
 
     @property
     def scale(self) -> float:
-        """What covariances are divided by to give cofactors."""
+        """Divisor of covariances that gives cofactors."""
         variance = self.summary["variance_of_unit_weight"]
         return 1.0 if variance is None else float(variance)
 
     def arrays(
         self, parts: Mapping[str, Sequence[Part]], given: str
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the arrays of a result, and those of what was adjusted, by the names of fields."""
+        """Return the arrays of a result and of the given network, by the names of fields."""
         own: dict[str, Any] = {}
         others: dict[str, Any] = {}
         for table, each in ((table, each) for table, own_parts in parts.items() for each in own_parts):
@@ -168,11 +168,11 @@ class Saved:
         return own, others
 
     def members(self, name: str, kind: type) -> dict[str, Any]:
-        """Return the fields of a class that stand in the document: of `result`, or of what was adjusted."""
+        """Return the fields of a class from the document: of `result`, or of the given network."""
         return self.decoder.fields(self.summary["kept"][name], kind)
 
     def state(self) -> _photocore.BlockState:
-        """Return where the core has ended."""
+        """Return the final state of the core."""
         unknowns = read_sheet(self.folder / f"{_STATE}.parquet").numbers("unknown")
         rest = self.decoder.value(self.summary["kept"][_STATE])
         try:
@@ -188,7 +188,7 @@ _RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet
 
 
 def sheet(table: Quantities) -> list[Column]:
-    """Return the columns of Parquet: angles in radians, names in small letters, units beside them."""
+    """Return the columns of Parquet: angles in radians, names in small letters, units separate."""
     found = []
     for each in table:
         if each.name is None:
@@ -208,7 +208,7 @@ def sheet(table: Quantities) -> list[Column]:
 
 
 def _repeated(names: Any) -> Any:
-    """Return names as a column of few different ones; numbers of photos and points as they are."""
+    """Return names as a categorical column; numbers of photos and points unchanged."""
     values = np.asarray(names)
     if values.dtype.kind in "iu":
         return values
@@ -229,10 +229,10 @@ def written(
 ) -> dict[str, Content]:
     """Return the files of a result.
 
-    `kind` says what reads it again, `given` is the field that holds what was adjusted. `parts` are those of
-    the tables `photos`, `points` and `images`, `leading` the columns before them: names; `tables` are further
-    ones, for people alone. `frame` is where on the earth its coordinates are, `summary` what a reader wants
-    first, and `stands` what is written for objects of some classes.
+    `kind` identifies the reader, `given` is the field of the adjusted network. `parts` belong to the tables
+    `photos`, `points` and `images`, `leading` are the columns before them: names. `tables` are additional
+    ones for users. `frame` is the position of coordinates on the earth, `summary` the first data for a
+    reader, and `stands` the substitutes for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
     place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}
@@ -277,13 +277,13 @@ def written(
         document[SEAL] = seal(document)
         file.write(orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
 
-    # The last one that is written: it knows the checksums of all others.
+    # It is written last, because it contains the checksums of all other files.
     files[SUMMARY] = last
     return files
 
 
 def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Part]], rest: Any) -> str:
-    """Return what tells what was adjusted from anything else."""
+    """Return a checksum that identifies the given network."""
     digest = hashlib.sha256(orjson.dumps(rest))
     adjusted = getattr(result, given)
     own = [each.field for one in parts.values() for each in one if each.field.startswith(f"{given}.")]
@@ -295,7 +295,7 @@ def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Pa
 
 
 def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any]) -> Saved:
-    """Read the tables of a folder; refuse one that is missing, damaged, or of another result."""
+    """Read the tables of a folder; refuse missing, damaged or other tables."""
     tables = document["tables"]
     for name in dict.fromkeys((*_READ, *tables)):
         check_seal(folder / f"{name}.parquet", tables.get(name), SUMMARY)
@@ -304,7 +304,7 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
 
 
 def read_summary(folder: Path) -> Mapping[str, Any]:
-    """Read the document of a folder; refuse none, and that of another program or version."""
+    """Read the document of a folder; refuse missing documents and other programs or versions."""
     path = folder / SUMMARY
     try:
         document = orjson.loads(read_bytes(path))
@@ -321,7 +321,7 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
 
 
 def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
-    """Return which of the known names each row of a column has; refuse others."""
+    """Return the index of the known name in each row of a column; refuse others."""
     places = {name: row for row, name in enumerate(known)}
     try:
         codes = np.array([places[name] for name in names.names], dtype=np.int64)

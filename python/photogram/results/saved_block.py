@@ -1,4 +1,4 @@
-"""The result of a block from the files of a folder (`docs/results.md`)."""
+"""Reading the result of a block from the files of a folder (`docs/results.md`)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from photogram.results.result_files import read_saved, rows_of
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
+    """Return the result of a block from a folder; refuse missing, damaged or inconsistent files."""
     saved = read_saved(folder, saved_classes(), document)
     given = saved.members("block", Block)
     images, names = saved.sheets["images"], {}
@@ -41,7 +41,7 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     block = Block(**given, **block_arrays)
     members = saved.members("result", Result)
     if block.timed or any(each.knot_unknowns for each in block.cameras):
-        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
+        # Coefficients of photos with their own trajectories, and knots, are created with their block.
         pairs = zip(members["unknowns"], block.unknowns, strict=True)
         members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
     return Result(**members, **own_arrays, block=block, state=saved.state())

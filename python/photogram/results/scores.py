@@ -1,4 +1,4 @@
-"""By how much the weighted sum of squares would fall with further unknowns (Rao's score; no adjustment)."""
+"""Decrease of the weighted sum of squares by additional unknowns (Rao's score)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Scores:
 
     partials: Floats  # (k, m, 2) B, in standard deviations of the images
     projected: Floats  # (k, m, 2) R B
-    residuals: Floats  # (m, 2) v, in standard deviations; zero if an image takes no part
+    residuals: Floats  # (m, 2) v, in standard deviations; zero for unused images
 
     @classmethod
     def of(cls, factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> Scores:
@@ -48,19 +48,19 @@ class Scores:
 
     @property
     def taken_up(self) -> bool:
-        """Whether the unknowns of the network take some of these up, or no image has them."""
+        """Whether the unknowns of the network absorb some scores, or images do not depend on them."""
         if not (self.sizes > 0).all():
             return True
         scaled = self.matrix / np.outer(self.sizes, self.sizes)
         return not (np.linalg.eigvalsh(scaled) > TAKEN_UP).all()
 
     def estimate(self, groups: Indices) -> tuple[float, float]:
-        """Return what the first would be alone, to first order, and its standard deviation.
+        """Return the first-order estimate of the first unknown only, and its standard deviation.
 
-        That is from how (m,) groups of images differ in it, c_g - x C_g: whatever bends each of them its own
-        way is in it. Where unknowns take it up it may be anything.
+        It follows from the differences of (m,) groups of images in it, c_g - x C_g, which include individual
+        deformations of each group. It is arbitrary if unknowns absorb it.
         """
-        # R v = v: what unknowns take up of B has no part in either sum.
+        # R v = v: the absorbed part of B does not contribute to either sum.
         of_images = [(self.projected[0] * each).sum(axis=1) for each in (self.residuals, self.projected[0])]
         c, own = (np.bincount(groups, each) for each in of_images)
         total = float(own.sum())
@@ -70,7 +70,7 @@ class Scores:
         return value, float(np.sqrt(((c - value * own) ** 2).sum())) / total
 
     def fall(self, first: int = 0) -> float:
-        """Return T = c' C^-1 c of those from a place on, but for what the network takes up of them."""
+        """Return T = c' C^-1 c of the scores from index `first` on, without parts absorbed by the network."""
         own = np.flatnonzero(self.sizes[first:] > 0) + first
         values, vectors = np.linalg.eigh(
             self.matrix[np.ix_(own, own)] / np.outer(self.sizes[own], self.sizes[own])
@@ -81,13 +81,13 @@ class Scores:
 
 
 def score(factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> float | None:
-    """Return T = c' C^-1 c; None if the unknowns take the partials up; see :meth:`Scores.of`."""
+    """Return T = c' C^-1 c; None if the unknowns absorb the partials; see :meth:`Scores.of`."""
     found = Scores.of(factor, partials, residuals)
     return None if found.taken_up else quadratic(found.matrix, found.vector)
 
 
 def quadratic(matrix: Floats, vector: Floats) -> float:
-    """Return x' M^-1 x, M scaled to unit diagonal before."""
+    """Return x' M^-1 x after scaling M to unit diagonal."""
     scale = np.sqrt(np.diag(matrix))
     scaled = vector / scale
     return float(scaled @ np.linalg.solve(matrix / np.outer(scale, scale), scaled))

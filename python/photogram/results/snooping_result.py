@@ -1,4 +1,4 @@
-"""What data snooping gives: the adjusted network without gross errors, and the log of what was taken out."""
+"""The result of data snooping: the adjusted network without gross errors, and the log."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ class Snooped(Brief, Documented):
     Attributes
     ----------
     result
-        The adjusted network without what was taken out. Its standard deviations and its variance of unit
-        weight hold after selection: the largest residuals are gone.
+        The adjusted network without the removed observations. Its standard deviations and its variance of
+        unit weight are conditional on the selection: the largest residuals are removed.
     outcome
-        The log with all that belongs to it.
+        The log with its data.
     suspects
         The groups of observations that were tested.
     settings
-        How.
+        The settings of data snooping.
     exchanged
-        Names of points that are exchanged, among the images that are out.
+        Names of points that are exchanged, among the excluded images.
     """
 
     result: AdjustedNetwork
@@ -55,7 +55,7 @@ class Snooped(Brief, Documented):
     exchanged: tuple[Exchange, ...] = ()
 
     def brief(self) -> tuple[str, Rows]:
-        """Return what was taken out of what, in a few lines."""
+        """Return a summary of the removed observations."""
         title, rows = self.result.brief()
         own = [
             ("verdict", self.verdict.headline),
@@ -71,21 +71,21 @@ class Snooped(Brief, Documented):
 
     @property
     def log(self) -> list[Removal]:
-        """Everything that was taken out, in order, also what came back or had to stay."""
+        """All removals in order, including reinstated and retained observations."""
         return self.outcome.log
 
     @property
     def removed(self) -> list[Removal]:
-        """What is out at the end, in order."""
+        """The removed observations at the end, in order."""
         return [entry for entry in self.outcome.log if entry.is_out]
 
     @property
     def rivals(self) -> list[Phrase]:
-        """Messages on removed groups and their rivals."""
+        """Messages on removed groups and their alternatives."""
         return [entry.sentence for entry in self.removed if entry.in_dispute]
 
     def share_removed(self, kind: str) -> float:
-        """Return the share of the groups of a kind that are out, with what went with them."""
+        """Return the share of the removed groups of a type, with dependent groups."""
         own = [group for group in range(len(self.suspects)) if self.suspects.kind(group) == kind]
         if not own:
             return 0.0
@@ -93,7 +93,7 @@ class Snooped(Brief, Documented):
         return gone / len(own)
 
     def table(self) -> pd.DataFrame:
-        """Return the log as a data frame, a row for each component that was taken out, with its unit."""
+        """Return the log as a data frame, a row for each removed component, with its unit."""
         import pandas as pd
 
         entries = zip(self.log, records(log_table(self.log).columns), strict=True)
@@ -124,7 +124,7 @@ class Snooped(Brief, Documented):
         }
 
     def to_json(self) -> bytes:
-        """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
+        """Return the complete result, its verdict and the log, `snooping`, as JSON document (UTF-8)."""
         return json.to_json({**self.result._members(), "snooping": self.members()})
 
     def document(self) -> Document:
@@ -163,7 +163,7 @@ class Snooped(Brief, Documented):
 
 
 def recorded(found: Snooped) -> Snooped:
-    """Return the same with the removed observations as part of its result."""
+    """Return a copy with the removed observations in its result."""
     record = Removed(
         [
             record | {"subject": entry.subject}
@@ -280,12 +280,12 @@ def _said(standing: Standing) -> str:
 
 
 def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
-    """Return what else may be wrong in the place of what was taken out, with so many figures of the odds."""
+    """Return alternatives to a removed group, with significant figures of their odds."""
     return "; ".join(f"{rival.name} ({rival.odds:.{figures}g} : 1)" for rival in rivals)
 
 
 def estimated_errors(entry: Removal) -> str:
-    """Return by how much the components of what was taken out are wrong."""
+    """Return the estimated errors of the components of a removed group."""
     rows = zip(entry.components, entry.error, entry.units, entry.error_sd, strict=True)
     return ", ".join(
         f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")

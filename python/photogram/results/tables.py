@@ -47,7 +47,7 @@ def check_points(result: Result) -> list[Quantity]:
 
 
 def unheld(result: Result) -> list[Quantity]:
-    """Return those components of control that are not held, but have a value to compare with."""
+    """Return the free components of control with a given value."""
     held = np.isfinite(result.block.point_sd)
     there = held.any(axis=1, keepdims=True) & ~held & result.used_points[:, np.newaxis]
     differences = np.where(there, result.point_differences, np.nan)
@@ -92,7 +92,7 @@ def observations(kind: ObservedKind) -> list[Quantity]:
 
 
 def observed_components(kinds: Iterable[ObservedKind]) -> list[Quantity]:
-    """Return the components of observations, one under the other; not what was not observed or left out."""
+    """Return the observed and used components of observations as rows."""
     every = [long(observations(each), np.argwhere(~np.isnan(each.residuals))) for each in kinds]
     return joined(every or [long(observations(_NOTHING), np.argwhere(_EMPTY))])
 
@@ -104,9 +104,9 @@ _NOTHING = ObservedKind(
 
 
 def redundancy_by_kind(result: Result) -> list[Quantity]:
-    """Return number, redundancy and weighted sum of squares of every kind, and the factor of its deviations.
+    """Return number, redundancy, weighted sum of squares and standard deviation factor of every type.
 
-    The redundancies sum to the degrees of freedom; nothing without them, or with a loss.
+    The redundancies sum to the degrees of freedom; empty without them, or with a loss.
     """
     names, numbers = list[str](), np.zeros((0, 3))
     if result.redundancies is not None and result.loss is None:
@@ -134,7 +134,7 @@ def redundancy_by_kind(result: Result) -> list[Quantity]:
 
 
 def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
-    """Return the components of common unknowns: standard deviations given are infinite for free ones."""
+    """Return the components of common unknowns; given standard deviations are infinite if free."""
     axes = tuple(
         component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
     )
@@ -154,7 +154,7 @@ def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
 
 
 def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
-    """Return the parameters of cameras: standard deviations given are infinite for free ones, 0 for held."""
+    """Return camera parameters; given standard deviations are infinite if free, 0 if fixed."""
     axes = tuple(Axis(name, each.camera.unit_of(name)) for each in every for name in each.names)
     rows: dict[str, Any] = {"of": np.arange(len(axes))}
     names, units = component(axes, **rows)

@@ -44,7 +44,7 @@ class ComponentTests(Tested):
 
 
 class Tests:
-    """The tests of an adjusted network: of single components, and of groups that may err together."""
+    """The tests of an adjusted network: of single components, and of groups."""
 
     def __init__(self, result: AdjustedNetwork) -> None:
         self._result, self._terms = result, result._terms()
@@ -134,7 +134,7 @@ class Tests:
 
     @cached_property
     def outliers(self) -> list[Bools]:
-        """The components of each type that are outliers of the verdict, or belong to groups that are."""
+        """The components of each type that are outliers of the verdict, or belong to such groups."""
         verdict, found = self._result.verdict, []
         for tests in self.normal:
             marks = verdict.marks(tests.kind, tests.values.shape)
@@ -144,7 +144,7 @@ class Tests:
         return found
 
     def largest(self, count: int) -> Indices:
-        """Return the (n, 3) places of the largest test values: type, observation and component."""
+        """Return the (n, 3) indices of the largest test values: type, observation and component."""
         found = []
         for order, tests in enumerate(self.components):
             sizes = np.nan_to_num(np.abs(tests.values)).ravel()
@@ -158,7 +158,7 @@ class Tests:
         return np.array(places, dtype=np.int64).reshape(-1, 3)
 
     def columns(self, places: Indices | None = None) -> list[Quantity]:
-        """Return the columns of all observed components, or of those at (n, 3) places."""
+        """Return the columns of all observed components, or of the (n, 3) indices `places`."""
         types = self.components
         if places is None:
             observed = [np.argwhere(tests.observed) for tests in types]
@@ -235,4 +235,4 @@ TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
     **network_tables.TABLES,
     "test": lambda result: Tests(result).columns(),
 }
-"""The tables of every network by the type of the things that have their rows."""
+"""The tables of every network by the type of the items in their rows."""

@@ -1,4 +1,4 @@
-"""Trajectories after the adjustment: poses at any time, their covariance, images, the start of another."""
+"""Adjusted trajectories: poses at any time, covariances, images, restarts."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPoses:
-    """Poses of a trajectory at n times. Arrays cannot be written."""
+    """Poses of a trajectory at n times. Arrays are read-only."""
 
     times: Floats  # (n,) seconds
-    # (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is
+    # (n, 3) projection centres in the object space (X, Y, Z; geocentric if it is
     # geographic), and (n, 3, 3) matrices whose columns are the axes of the photo there
     positions: Floats
     attitudes: Floats
@@ -50,13 +50,13 @@ class TrajectoryPoses:
 
     @property
     def sd(self) -> Floats:
-        """(n, 6) standard deviations of the same."""
+        """(n, 6) standard deviations of the poses."""
         return standard_deviations(self.covariances)
 
 
 @dataclass(frozen=True, eq=False)
 class AdjustedTrajectory:
-    """A trajectory after the adjustment. Arrays cannot be written."""
+    """A trajectory after the adjustment. Arrays are read-only."""
 
     given: Trajectory
     # (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians
@@ -68,7 +68,7 @@ class AdjustedTrajectory:
     # weighted
     position_redundancy: Floats
     rotation_redundancy: Floats
-    joint: Joint  # Gives covariances of common unknowns, by their names, all with all
+    joint: Joint  # Returns the joint covariance of common unknowns by name
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -78,14 +78,14 @@ class AdjustedTrajectory:
         return self.given.name
 
     def restarted(self, observed: Collection[int] = (), turn: Floats | None = None) -> Trajectory:
-        """Return the trajectory as it was given, but with adjusted values of free coefficients.
+        """Return the given trajectory with adjusted values of free coefficients.
 
         Parameters
         ----------
         observed
-            Identities of coefficients whose given values are observations all the same.
+            Identifiers of coefficients whose given values are also observations.
         turn
-            (3,) rotation vector about the axes of the photo that the table takes over; corrections of
+            (3,) rotation vector about the axes of the photo that is added to the table; corrections of
             rotations are then zero.
         """
         changes: dict[str, Any] = {}
@@ -110,9 +110,9 @@ class AdjustedTrajectory:
         Raises
         ------
         InputError
-            Times that are not finite, or outside what the table and the knots reach.
+            If times are not finite, or outside the range of the table and the knots.
         AdjustmentError, OutOfMemoryError
-            As :meth:`photogram.Result.covariance`.
+            As in :meth:`photogram.Result.covariance`.
         """
         times = self._inside(times)
         positions, attitudes, axes, jacobians, of_position, of_rotation = self.given.flown(
@@ -141,7 +141,7 @@ class AdjustedTrajectory:
         Raises
         ------
         InputError
-            As :meth:`poses`.
+            As in :meth:`poses`.
         """
         times = self._inside(times)
         return corrections(self.given, times, self.position, self.rotation)
@@ -159,7 +159,7 @@ class AdjustedTrajectory:
 def corrections(
     trajectory: Trajectory, times: Floats, position: Floats, rotation: Floats
 ) -> tuple[Floats, Floats]:
-    """Return (n, 3) sums of coefficients (K, 3) of positions, and of rotations, at times that are inside."""
+    """Return (n, 3) sums of coefficients (K, 3) of positions, and of rotations, at valid times."""
     *_, of_position, of_rotation = trajectory.flown(times, position, rotation)
 
     def sums(active: list[tuple[int, list[float]]], own: Floats) -> Floats:
@@ -189,7 +189,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
         places = geographic_to_geocentric(places, block.spheroid)
     own = block.timed[row]
     if own.rate is not None:
-        # It counts from where the adjustment has it count from.
+        # Its time origin is the adjusted one.
         own = replace(own, time=own.images(block.image_xy[block.image_photos == index])[0])
     return projected(own, block.trajectories[row], camera, places, lambda each: adjusted[id(each)])
 
@@ -197,7 +197,7 @@ def project(result: Result, photo: str, points: ArrayLike) -> Floats:
 def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
     """Return the trajectories of photos and records of a block, by their names.
 
-    They ask for covariances once, and not before poses are asked for.
+    They compute covariances once, at the first request for poses.
     """
     found = {id(each.given): each for each in result.unknowns}
     once = cache(result.covariances)
@@ -230,10 +230,10 @@ def adjusted_trajectories(result: Result) -> dict[str, AdjustedTrajectory]:
 def restarted_motion(
     block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
 ) -> Block:
-    """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given."""
+    """Return a block with adjusted free coefficients of trajectories; others remain as given."""
     turns = turns or {}
     found = {id(each.given): each for each in adjusted}
-    # A prior observes the value that its unknown was given.
+    # A prior observes the given value of its unknown.
     observed = {id(each.unknown) for each in block.observations if isinstance(each, Prior)}
     moved = {key: each.restarted(observed, turns.get(each.name)) for key, each in found.items()}
     coefficients: dict[int, Coefficient] = {}
@@ -273,21 +273,21 @@ def _observed(
     return own
 
 
-STEPS = 8  # Places in each interval of knots, or for each coefficient of a polynomial
+STEPS = 8  # Positions in each interval of knots, or for each coefficient of a polynomial
 COEFFICIENTS = 24  # Number up to which all coefficients are listed
 NOTABLE = 3.0  # Test value from which coefficients of longer lists are listed
 LISTED = 20  # Rows of longer lists of coefficients and trajectories
 
 
 def trajectories_table(result: Result) -> Table:
-    """Return positions and rotations of trajectories: their largest corrections, the largest test values.
+    """Return positions and rotations of trajectories: their largest corrections and test values.
 
-    They are in the order of the block, of many those with the largest test values.
+    They are in the order of the block; if there are many, those with the largest test values.
     """
-    from photogram.show.page import about  # an adjustment needs no tables
+    from photogram.show.page import about  # only required for tables
     from photogram.show.quantity import Axis, Quantity, Table
 
-    # By names: those of photos of their own are made anew with their block.
+    # By name: photos with their own trajectories are recreated with their block.
     adjusted = {(each.kind, each.name): each for each in result.unknowns}
     rows = [
         (each.name, part, *_correction(each, part, basis, [adjusted[one.KIND, one.name] for one in own]))
@@ -324,10 +324,10 @@ def trajectories_table(result: Result) -> Table:
 def _correction(
     trajectory: Trajectory, part: int, basis: Basis, own: Sequence[AdjustedUnknown]
 ) -> tuple[str, int, float, float, float, float, float]:
-    """Return basis, number of coefficients, span, largest correction with its time, largest test value."""
+    """Return basis, number of coefficients, span, largest correction with time, largest test value."""
     first, last = trajectory.table.span
     times, values = _times(basis, first, last), np.array([each.position for each in own])
-    # The others count for nothing.
+    # The others do not count.
     none = [np.zeros((len(each), 3)) for each in trajectory.coefficients]
     none[part] = values
     sizes = np.linalg.norm(corrections(trajectory, times, *none)[part], axis=1)
@@ -352,10 +352,10 @@ _MANY = (Coefficient, Knot)  # Types with thousands of unknowns
 
 
 def notable(every: Sequence[AdjustedUnknown]) -> tuple[list[AdjustedUnknown], str]:
-    """Return the common unknowns that reports list, and what they say of the others.
+    """Return the common unknowns in reports, and a note on the others.
 
-    All but coefficients of trajectories and knots of lenses, and these where they are few, or have large test
-    values.
+    All except coefficients of trajectories and knots of lens models; these if they are few, or have large
+    test values.
     """
     own = [each for each in every if isinstance(each.given, _MANY)]
     if len(own) <= COEFFICIENTS:

@@ -1,4 +1,4 @@
-"""Adjusted unknowns that observations have in common, in the order of the block."""
+"""Adjusted common unknowns of observations, in the order of the block."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _ARRAYS = ("change", "position", "attitude", "cofactors", "covariance", "with_fo
 
 @dataclass(frozen=True, eq=False)
 class AdjustedUnknown:
-    """An adjusted unknown of several observations with k components. Arrays cannot be written."""
+    """A common adjusted unknown of observations with k components. Arrays are read-only."""
 
     given: Unknown
     # (k,) names and units: the linear unit, the linear unit a second, radians, radians a
@@ -38,22 +38,22 @@ class AdjustedUnknown:
     change: Floats
     # (3,) adjusted: l, s, d, (m, k, 0) of an instrument, c of a sensor, a coefficient of a trajectory, a
     # gyroscope's bias, (d, 0, 0) of a clock, (T, 0, 0) of a readout time or a factor of line rates; of
-    # levels, planes and lines a place on them
+    # levels, planes and lines a position on them
     position: Floats
     # (3, 3) adjusted: the axes of a boresight, sensor, line or plane (the third along it, or its normal)
     attitude: Floats
-    # (k, k) for a priori unit weight, of rotations about the adjusted axes and a line's place along these;
-    # zero for held ones, NaN without covariances
+    # (k, k) for a priori unit weight, of rotations about the adjusted axes and a line's position along these;
+    # zero for fixed ones, NaN without covariances
     cofactors: Floats
     covariance: Floats  # (k, k) cofactors times the variance of unit weight
-    # (k, j) cofactors with the unknown before it where both are adjusted as one: the size of a film with its
-    # placement; j is 0 of all others
+    # (k, j) cofactors with the unknown before it if both are adjusted as one: the size of a film with its
+    # placement; j is 0 for all others
     with_former: Floats
     redundancy: Floats  # (k,) redundancy numbers of weighted components as observations; 0 unless weighted
-    observations: int  # How many observations, and images of photos on frames or trajectories, are of it
+    observations: int  # Number of its observations, and of its images of photos on frames or trajectories
 
     def __post_init__(self) -> None:
-        # There may be as many as four times the photos: their fields are not looked for in each.
+        # There may be four times as many as photos: their fields are not searched in each.
         for name in _ARRAYS:
             getattr(self, name).flags.writeable = False
 
@@ -67,12 +67,12 @@ class AdjustedUnknown:
 
     @property
     def sd(self) -> Floats:
-        """(k,) standard deviations; 0 where held."""
+        """(k,) standard deviations; 0 if fixed."""
         return np.asarray(standard_deviations(self.covariance[np.newaxis])[0])
 
     @property
     def values(self) -> Floats:
-        """(k,) components of `position` where they are its own, else `change`."""
+        """(k,) its components of `position`, or else `change`."""
         own = {"x": 0, "y": 1, "z": 2, "scale": 0, "constant": 1, "height": 2}
         own |= {"offset": 0, "time": 0, "factor": 0}
         if self.kind in _NUMBERS:
@@ -98,9 +98,9 @@ class AdjustedUnknown:
 def adjusted_unknowns(
     block: Block, solution: _photocore.BlockSolution, scale: float
 ) -> tuple[AdjustedUnknown, ...]:
-    """Return the adjusted unknowns of a block, covariances scaled."""
+    """Return the adjusted unknowns of a block with scaled covariances."""
     found = []
-    # What line rates are multiplied by is of the type of readout times, but a plain number.
+    # Factors of line rates have the type of readout times, but are plain numbers.
     factors = {id(each.rate) for each in block.timed if each.rate is not None}
     for given, row in zip(block.unknowns, solution.adjusted_unknowns, strict=True):
         change, position, attitude, cofactors, with_former, redundancy, observations = row

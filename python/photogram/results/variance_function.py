@@ -1,4 +1,4 @@
-"""A variance function of image coordinates, and the ways to show it."""
+"""A variance function of image coordinates, with plots, tables and documents."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ OUTSIDE = 0.025  # Probability on each side of an interval
 
 @dataclass(frozen=True)
 class Bin:
-    """Images of about the same radius."""
+    """Images with similar radii."""
 
     value: float  # Their mean radius
     count: int  # number of coordinates, sum of redundancy numbers
     redundancy: float
-    factor: float  # Of the variance as their residuals have it: the function's, times q / r with its weights
-    # In which it lies with 95 percent (Satterthwaite); NaN with too little redundancy
+    factor: float  # Factor of the variance by residuals: that of the function, times q / r with its weights
+    # Its 95 percent interval (Satterthwaite); NaN with too little redundancy
     interval: tuple[float, float]
 
     @classmethod
     def of(cls, each: GroupSum, value: float, factor: float) -> Self:
-        """Return the bin of a group, whose weights are those of the function."""
+        """Return the bin of a group with the weights of the function."""
         found, interval = math.nan, (math.nan, math.nan)
         if each.test is not None:
             found = factor * each.squares / each.redundancy
@@ -58,7 +58,7 @@ class VarianceFunction(Documented, Brief):
     Attributes
     ----------
     name
-        Of what: `radius` or `value`.
+        The argument: `radius` or `value`.
     largest
         R, the largest of the images.
     estimate
@@ -78,16 +78,16 @@ class VarianceFunction(Documented, Brief):
 
     @property
     def test_value(self) -> float:
-        """Of the growth: b^2 over its standard deviation."""
+        """The test value of the growth: b^2 over its standard deviation."""
         return float(self.estimate.coefficients[1] / self.estimate.sd[1])
 
     @property
     def probability(self) -> float:
-        """Of a growth as large where there is none: one side, since b^2 is not negative."""
+        """One-sided probability of a larger growth by chance, since b^2 is not negative."""
         return math.erfc(self.test_value / math.sqrt(2)) / 2
 
     def factor(self, value: float) -> float:
-        """Return by what the given variance is multiplied at a radius."""
+        """Return the factor of the given variance at a radius."""
         a, b = self.estimate.coefficients.tolist()
         return float(a + b * (value / self.largest) ** 2)
 

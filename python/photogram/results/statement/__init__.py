@@ -1,1 +1,1 @@
-"""An accuracy statement: what a surveyor hands to a client about an adjusted block and its check points."""
+"""Accuracy statements for clients on adjusted blocks and their check points."""

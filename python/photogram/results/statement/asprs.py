@@ -1,8 +1,8 @@
-"""ASPRS Positional Accuracy Standards, Edition 2 (2023; Version 2, 2024): figures, classes and what is asked.
+"""Figures and classes of the ASPRS Positional Accuracy Standards, Edition 2 (2023; Version 2, 2024).
 
-Section 2.2 of the specification of the statement, which says what further texts confirm and what is still to
-be checked against the standard. Differences hold the errors of the product and of the check survey; the
-standard adds those of the survey once more: right for errors that both share, else on the safe side.
+See section 2.2 of the specification of the statement, which lists confirmations by other texts and open
+checks against the standard. Differences contain the errors of the product and of the check survey. The
+standard adds the errors of the survey again: correct for common errors, otherwise conservative.
 """
 
 from __future__ import annotations
@@ -17,31 +17,30 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.freedom import rmse_interval
 
 ENOUGH = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
-MOST_STEPS = 10  # Of 1,000 km2, beyond which the number of check points stays
+MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant
 MEAN_SHARE, MOST_TIMES = 0.25, 3.0
-"""Of a class: a mean, and a difference, beyond which are to be investigated (7.2)."""
+"""Limits for means and differences that require an investigation, relative to a class (7.2)."""
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """A figure of the standard, with what it is made of, in the linear unit."""
+    """A figure of the standard with its components, in the linear unit."""
 
     count: int  # Check points
-    # RMSE of the differences (RMSE_1), and of the check survey as its standard deviations have it
-    # (RMSE_2)
+    # RMSE of the differences (RMSE_1), and of the check survey by its standard deviations (RMSE_2)
     found: float
     survey: float
     rmse: float  # The figure: the root of the sum of both squares
-    # Its upper end: that of the interval of the found RMSE, with the survey's; NaN where there is none
+    # Its upper limit, from the interval of the found RMSE, with the survey's; NaN if missing
     upper: float
-    # Estimate for the product alone, the root of the difference of both squares; None where differences
-    # are smaller than the survey's standard deviations
+    # Estimate for the product only, the root of the difference of both squares; None if differences are
+    # smaller than the survey's standard deviations
     product: float | None
 
 
 @dataclass(frozen=True)
 class Remark:
-    """A mean or a difference that is to be investigated before anything is stated."""
+    """A mean or difference that requires an investigation first."""
 
     kind: str  # `mean` or `difference`
     component: str  # `e`, `n` or `h`
@@ -51,9 +50,9 @@ class Remark:
 
 
 def points_asked_for(area: float) -> int:
-    """Return how many check points an area (km2) asks for, for each of NVA and VVA (7.13, table C.1).
+    """Return the required check points of an area (km2), for each of NVA and VVA (7.13, table C.1).
 
-    Ten more for every 1,000 km2. Least and most are confirmed, the steps between are not.
+    Ten more for every 1,000 km2. Minimum and maximum are confirmed, the steps between are not.
     """
     return ENOUGH + 10 * (math.ceil(min(max(area / 1000.0, 1.0), MOST_STEPS)) - 1)
 
@@ -71,7 +70,7 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
 
 
 def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
-    """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or of the VVA area.
+    """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or the VVA area.
 
     `freedom` are effective degrees of freedom of all rows together.
     """
@@ -81,11 +80,11 @@ def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accurac
 
 
 def verdict(figure: Accuracy | None, limit: float) -> str:
-    """Return what can be said of a class, in the linear unit.
+    """Return the verdict on a class in the linear unit.
 
-    `missed` where the figure is larger. Else, by the upper end of its interval, `met with confidence` or
-    `met`; with fewer than 30 points `produced to meet` or `not decided` in their places. `not tested` without
-    a figure.
+    `missed` if the figure is larger. Otherwise, by the upper limit of its interval, `met with confidence` or
+    `met`; with fewer than 30 points `produced to meet` or `not decided` instead. `not tested` without a
+    figure.
     """
     if figure is None:
         return "not tested"
@@ -104,7 +103,7 @@ def wording(count: int) -> str:
 
 
 def survey_good_enough(survey: float, limit: float) -> bool:
-    """Return whether a check survey is twice as accurate as the class at least (7.12): RMSE_2 <= N/2.
+    """Return whether a check survey is at least twice as accurate as the class (7.12): RMSE_2 <= N/2.
 
     RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
     """
@@ -114,11 +113,11 @@ def survey_good_enough(survey: float, limit: float) -> bool:
 def control_good_enough(
     plan: float, height: float, class_h: float, class_v: float | None = None
 ) -> tuple[bool, bool]:
-    """Return whether the control of a triangulation is good enough in plan and in height (7.9).
+    """Return whether the control of a triangulation is accurate enough in plan and in height (7.9).
 
     `plan` and `height` are root mean squares of its standard deviations, radial in plan, in the linear unit.
-    Half of the horizontal class holds in plan, and half of the vertical one in height; the whole horizontal
-    one where heights are no product.
+    The limits are half of the horizontal and vertical classes; the full horizontal class for height without a
+    vertical class.
     """
     return plan <= class_h / 2, height <= (class_h if class_v is None else class_v / 2)
 
@@ -126,11 +125,11 @@ def control_good_enough(
 def remarks(
     differences: Floats, class_h: float | None = None, class_v: float | None = None
 ) -> tuple[Remark, ...]:
-    """Return what is to be investigated before a class is stated (7.2); nothing is removed for it.
+    """Return necessary investigations before a class is stated (7.2); nothing is removed.
 
-    A mean beyond a quarter of the class, a difference beyond three times the class; in plan by axis, of which
-    the class is that over the root of 2. `differences` are (n, 3) east, north, height: adjusted minus given,
-    in the linear unit; NaN where nothing is given. Classes are None where none is asked for.
+    Limits are a quarter of the class for means and three times the class for differences; in plan by axis,
+    with the class divided by the root of 2. `differences` are (n, 3) east, north, height: adjusted minus
+    given, in the linear unit; NaN if not given. Classes are None unless requested.
     """
     axis = None if class_h is None else class_h / math.sqrt(2)
     limits = {"e": axis, "n": axis, "h": class_v}
@@ -143,7 +142,7 @@ def remarks(
 
 
 def _beyond(component: str, limit: float, values: Floats) -> Iterator[Remark]:
-    """Yield what is beyond the class of an axis: the mean, then single differences."""
+    """Yield values above the limits of an axis: the mean, then single differences."""
     known = np.flatnonzero(np.isfinite(values))
     mean = float(values[known].mean()) if known.size else 0.0
     if abs(mean) > MEAN_SHARE * limit:

@@ -1,9 +1,9 @@
-"""Budgets of uncertainty (GUM): what every source of error contributes to a variance.
+"""Budgets of uncertainty (GUM): the contributions of error sources to a variance.
 
 With g the gradient of f and z = Q g, t_i = ~a_i z is the effect of one standard deviation of observation i,
-and u^2(f) = s2 g' z = s2 sum of t_i^2 exactly, since Q N Q = Q. Weighted unknowns are observations of
-themselves. Correlated observations are whitened: only the sum over their group is theirs. Squares t_i^2 are
-summed by kind, strip, camera, photo, point and parameter.
+and u^2(f) = s2 g' z = s2 sum of t_i^2 exactly, since Q N Q = Q. Weighted unknowns are also observations.
+Correlated observations are decorrelated: only the sum over their group has a meaning. Squares t_i^2 are
+summed by type, strip, camera, photo, point and parameter.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Source:
 
     @property
     def name(self) -> str:
-        """Its key: that of a parameter is the name of what has it, and its own."""
+        """Its key; for a parameter its owner's name and its own name."""
         if isinstance(self.subject, str):
             return self.subject
         axis = self.subject.fields.get("axis", self.subject)
@@ -71,7 +71,7 @@ class Source:
 class Single:
     observation: tuple[str, ...]  # Kind, names, component
     sd: float  # A priori, in its unit
-    sensitivity: float  # df/dl: units of the quantity for one of the observation
+    sensitivity: float  # df/dl: units of the quantity for one unit of the observation
     # As in `Source`
     contribution: float
     share: float
@@ -122,9 +122,9 @@ def budgets(
     coverage: float = 0.95,
     components: VarianceComponents | None = None,
 ) -> list[Budget]:
-    """Return the budgets of quantities: a solution for each, and a pass over all rows.
+    """Return the budgets of quantities: one solution each, and one pass over all rows.
 
-    `components` are those whose result this is, where weights were estimated. Errors are those of
+    `components` are the variance components of the result, if weights were estimated. For errors see
     :meth:`Result.covariances`.
     """
     if not wanted:
@@ -181,7 +181,7 @@ def budget_line(texts: Texts, found: Budget) -> str:
 
 
 class _Freedoms:
-    """Effective degrees of freedom of variances, by what standard deviations rest on."""
+    """Effective degrees of freedom of variances, by the basis of standard deviations."""
 
     def __init__(self, result: Result, rows: Rows, components: VarianceComponents | None) -> None:
         self._common = result.degrees_of_freedom
@@ -205,7 +205,7 @@ class _Freedoms:
         self._covariance = np.asarray(2.0 * inverse, dtype=np.float64)
 
     def of(self, squares: Floats, variance: float) -> Freedom:
-        """Return those of a variance that is the sum of (M,) squares."""
+        """Return the degrees of freedom of a variance that is the sum of (M,) squares."""
         own = self._of >= 0
         contributions = np.bincount(self._of[own], weights=squares[own], minlength=len(self._names))
         nu = 2.0 / np.diag(self._covariance)
@@ -225,7 +225,7 @@ _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", AT
 
 
 class Rows:
-    """All M observations in G groups, an image or a control point each: what they are of, and are called."""
+    """All M observations in G groups, each an image or a control point, with items and names."""
 
     def __init__(self, result: Result, core: _photocore.NetworkSuspects) -> None:
         self.block = result.block
@@ -247,7 +247,7 @@ class Rows:
         return int(self._starts[-1])
 
     def _labels(self) -> tuple[list[str], Indices]:
-        """Return the names of kinds, and (G,) which each group is of."""
+        """Return the names of types, and the (G,) types of groups."""
         of_observation = [kind_of(each.label) for each in self._observed]
         of_unknown = [each.KIND for each in self.block.unknowns]
         found: dict[str, int] = {}
@@ -263,7 +263,7 @@ class Rows:
         return list(found), number
 
     def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return level, name, number of rows and contribution of every source, of (M,) squares."""
+        """Return level, name, number of rows and contribution of every source, from (M,) squares."""
         sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
         yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
         own, rows, photo = sums[self._images], sizes[self._images], self.suspects.photos[self._images]
@@ -288,7 +288,7 @@ class Rows:
                 yield "parameter", own, 1, float(squares[row])
 
     def named(self, row: int) -> tuple[str, ...]:
-        """Return the kind of a row, of what it is, and its component."""
+        """Return the type of a row, its items, and its component."""
         group = int(np.searchsorted(self._starts, row, "right")) - 1
         kind, subject = int(self.suspects.kinds[group]), int(self.suspects.subjects[group])
         component = int(self._component[row])
@@ -340,7 +340,7 @@ def kind_of(label: str) -> str:
 def _sums(
     level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
 ) -> Iterable[tuple[str, Phrase | str, int, float]]:
-    """Return the sums over groups that have rows, in their order; or the largest, and all others as one."""
+    """Return the sums over groups with rows in their order; or the largest, and the sum of others."""
     if of.min(initial=0) < 0:
         inside = of >= 0
         of, sums, sizes = of[inside], sums[inside], sizes[inside]

@@ -1,9 +1,9 @@
-"""Check points against an adjusted block: differences and their joint covariance, in east, north, up.
+"""Check points of an adjusted block: differences and joint covariance in east, north, up.
 
-For n check points d_i = adjusted - given, and for all together C = s2 Q + S: Q the joint cofactors of the
-adjusted points, cross blocks included, and S the covariance of the survey, which the variance of unit weight
-does not scale. In geographic and geocentric space both are turned to east, north, up at the given positions:
-d_i -> J_i d_i, C_ij -> J_i C_ij J_j'.
+For n check points d_i = adjusted - given; their joint covariance is C = s2 Q + S. Q are the joint cofactors
+of the adjusted points, including cross blocks. S is the covariance of the survey, which the variance of unit
+weight does not scale. In geographic and geocentric space both are transformed to east, north, up at the given
+positions: d_i -> J_i d_i, C_ij -> J_i C_ij J_j'.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from photogram import Result
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
-"""Components that are tested together."""
+"""Components that are tested jointly."""
 MOST = 5000  # Check points with a joint covariance; of more points every second, third ... is used
 SAME_PLACE = 0.01  # Distance of identical check and control points, metres
 
@@ -68,18 +68,18 @@ class Compared:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(3 n, 3 n) C, of the differences."""
+        """(3 n, 3 n) C, the covariance of the differences."""
         return np.asarray(self.product + self.survey)
 
     @property
     def counted(self) -> Bools:
-        """(n, 3) which differences count: heights in vegetation are stated apart."""
+        """(n, 3) used differences: heights in vegetation are separate."""
         rows = np.isfinite(self.differences)
         rows[self.vegetated, 2] = False
         return rows
 
     def rows(self, part: str) -> Indices:
-        """Return which rows of all 3 n a part has: those of points with all its components."""
+        """Return the rows of a part among 3 n: those of points with all its components."""
         components = list(PARTS[part])
         whole = self.counted[:, components].all(axis=1)
         points = np.flatnonzero(whole)
@@ -109,23 +109,23 @@ class Compared:
         )
 
     def without(self, names: Sequence[str]) -> Compared:
-        """Return all but some points; refuse what is no check point."""
+        """Return all other points; refuse names that are not check points."""
         for name in names:
             if name not in self.names:
                 raise InputError(unknown_name("check point", name, self.names))
         return self.some(~np.isin(np.array(self.names, dtype=object), list(names)))
 
     def in_vegetation(self) -> Compared:
-        """Return the points in vegetation, whose heights count here."""
+        """Return the points in vegetation; their heights count here."""
         found = self.some(self.vegetated)
         return replace(found, vegetated=np.zeros(len(found), dtype=bool))
 
 
 def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared:
-    """Return the check points of a result, by its covariances.
+    """Return the check points of a result with its covariances.
 
-    Refused are a datum that was chosen, in which nothing can be compared; a point without standard deviations
-    of its survey, with that of one axis in plan only, or that is control.
+    Refused are a chosen datum, which has no comparable coordinates, and points without standard deviations of
+    their survey, with only one plan axis, or that are control.
     """
     block, checks = result.block, result.check_points
     rows = in_order(block, checks.rows)
@@ -172,14 +172,14 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
 
 
 def in_order(block: Block, rows: Indices) -> Indices:
-    """Return points in the order in which clients look for their names."""
+    """Return points in natural order of their names."""
     return np.array(
         sorted(rows.tolist(), key=lambda row: natural_order(block.point_ids[row])), dtype=np.int64
     )
 
 
 def turned_to_east(block: Block, positions: Floats) -> Floats:
-    """Return (n, 3, 3) J: what takes differences at (n, 3) positions to east, north, up."""
+    """Return (n, 3, 3) J: the transformation of differences at (n, 3) positions to east, north, up."""
     if block.spheroid is not None:
         return np.asarray(np.eye(3) * lengths_of_units(_finite(positions), block.spheroid)[:, :, np.newaxis])
     if block.frame.kind == "geocentric":
@@ -189,14 +189,14 @@ def turned_to_east(block: Block, positions: Floats) -> Floats:
 
 
 def turned_jointly(turn: Floats, joint: Floats) -> Floats:
-    """Return J C J' of the (3 n, 3 n) joint covariance of points, J as of :func:`turned_to_east`."""
+    """Return J C J' of the (3 n, 3 n) joint covariance of points, J from :func:`turned_to_east`."""
     n = len(turn)
     blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
     return np.asarray(blocks.reshape(3 * n, 3 * n))
 
 
 def _finite(positions: Floats) -> Floats:
-    """Return positions; what is not given is where the others are in the middle."""
+    """Return positions with the mean of the others for missing ones."""
     middle = np.array(
         [np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in positions.T]
     )
@@ -204,14 +204,14 @@ def _finite(positions: Floats) -> Floats:
 
 
 def _turned(turn: Floats, differences: Floats) -> Floats:
-    """Return J d; components that J leaves alone may be missing."""
+    """Return J d; components that J does not use may be missing."""
     whole = np.einsum("iab,ib->ia", turn, np.nan_to_num(differences))
     mixed = np.einsum("iab,ib->ia", (turn != 0).astype(float), np.isnan(differences).astype(float)) > 0
     return np.where(mixed, np.nan, whole)
 
 
 def plan_positions(block: Block, positions: Floats) -> Floats:
-    """Return (n, 3) positions as east, north, height: amid the stations of blocks on the earth."""
+    """Return (n, 3) positions as east, north, height; at the centre of the stations on the earth."""
     if block.spheroid is not None:
         return local_axes(block).positions(positions)
     if block.frame.kind != "geocentric":
@@ -225,7 +225,7 @@ def plan_positions(block: Block, positions: Floats) -> Floats:
 def _survey(
     block: Block, rows: Indices, differences: Floats, names: Sequence[str], asked: tuple[float, ...] | None
 ) -> Floats:
-    """Return (n, 3) standard deviations of the survey; those of geographic blocks are angles in it."""
+    """Return (n, 3) standard deviations of the survey, which are angles in geographic blocks."""
     own = np.full((len(rows), 3), np.nan)
     if block.point_check_sd is not None:
         units = lengths_of_units(_finite(block.point_positions[rows]), block.spheroid)
@@ -245,7 +245,7 @@ def _survey(
 
 
 def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
-    """Return S: variances by point, and what all points share unless it cancels in the differences."""
+    """Return S: variances by point, and the common error unless it cancels in the differences."""
     known = np.nan_to_num(sd).ravel()
     survey = np.diag(known**2)
     if not asked.survey_common_in_control:
@@ -258,7 +258,7 @@ def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
 
 
 def _control_positions(block: Block) -> dict[str, Floats]:
-    """Return (3,) given coordinates of control points by name: held, or observed in common."""
+    """Return (3,) given coordinates of control points by name: weighted, fixed or jointly observed."""
     held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
     found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
     observed = [each for each in block.observations if isinstance(each, Control)]
@@ -266,14 +266,14 @@ def _control_positions(block: Block) -> dict[str, Floats]:
 
 
 def control_places(block: Block) -> Floats:
-    """Return (k, 3) places of control points with both coordinates in plan, as they were given."""
+    """Return (k, 3) given positions of control points with both plan coordinates."""
     found = list(_control_positions(block).values())
     places = plan_positions(block, np.array(found).reshape(-1, 3))
     return places[np.isfinite(places[:, :2]).all(axis=1)]
 
 
 def _check_apart(block: Block, rows: Indices) -> None:
-    """Refuse check points that are control points of other names."""
+    """Refuse check points that are control points with other names."""
     apart = SAME_PLACE / METRES.get(block.linear_unit, 1.0)
     control = _control_positions(block)
     if not control or not len(rows):
@@ -282,7 +282,7 @@ def _check_apart(block: Block, rows: Indices) -> None:
     held = plan_positions(block, np.array([control[name] for name in others]))
     checks = plan_positions(block, block.point_positions[rows])
     for place, row in zip(checks, rows.tolist(), strict=True):
-        near = np.linalg.norm(held - place, axis=1) < apart  # what is not given is near nothing
+        near = np.linalg.norm(held - place, axis=1) < apart  # missing coordinates are not near any point
         if near.any():
             raise InputError(
                 phrase("request.same-place", point=block.point_ids[row], control=others[near.argmax()])
@@ -342,7 +342,7 @@ def surveyed(result: Result, found: Compared, system: System | None) -> Survey:
 
 
 def _carried(system: System, positions: Floats) -> Floats:
-    """Return positions in a system; with a coordinate lacking only in the block's own axes."""
+    """Return positions in a system; missing coordinates are allowed only in the block's own axes."""
     if not system.crs:
         return system.carried(positions)
     found = np.full(positions.shape, np.nan)

@@ -78,7 +78,7 @@ _LAYOUT = {
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:
-    """Return number, redundancy and weighted sum of squares of every kind, cameras among them."""
+    """Return number, redundancy and weighted sum of squares of every type, including cameras."""
     grouping = grouped(observables(result), "kind")
     counts, squares, redundancy = sums_of(result, grouping)
     found = {

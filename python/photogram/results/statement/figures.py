@@ -1,7 +1,7 @@
-"""Figures of accuracy of check points: by component, horizontal and 3D, with intervals and radii.
+"""Accuracy figures of check points: by component, horizontal and 3D, with intervals and radii.
 
-RMSE of n differences is the root of their mean square: a bias is in it. Horizontal figures take points with
-both plan coordinates, 3D figures those with all three.
+RMSE of n differences is the root of their mean square and includes a bias. Horizontal figures use points with
+both plan coordinates, 3D figures points with all three.
 """
 
 from __future__ import annotations
@@ -99,14 +99,14 @@ class Figures:
         return math.hypot(self.rmse_h, self.rmse_v)
 
     def without_survey(self, part: str) -> float:
-        """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN below the survey's own accuracy."""
+        """Return `sqrt(RMSE_1^2 - RMSE_2^2)` of `h` or `v`; NaN if below the survey's own accuracy."""
         first, second = (self.rmse_h1, self.rmse_h2) if part == "h" else (self.rmse_v1, self.rmse_v2)
         square = first**2 - second**2
         return math.sqrt(square) if square >= 0 else math.nan
 
 
 def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
-    """Return the figures of check points, biases with expanded uncertainties; None where there are none."""
+    """Return the figures of check points, biases with expanded uncertainties; None without any."""
     if not len(found):
         return None
     k = critical_student(1.0 - coverage, found.second)
@@ -114,7 +114,7 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
     sizes = dict(zip(PARTS, (*d.T, plan, np.sqrt((d**2).sum(axis=1))), strict=True))
     in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
-    # Of the survey against the datum: what cancels in the differences counts, too.
+    # Survey relative to datum: errors that cancel in the differences also count.
     survey, own = found.survey_sd**2 + found.common_sd**2, d[in_plan, :2]
     moments = own.T @ own / len(own) if len(own) else np.full((2, 2), np.nan)
     of_moments, finite = dict[str, float](), np.isfinite(moments).all()
@@ -159,7 +159,7 @@ def _sized(values: Floats, names: tuple[str, ...], *, radial: bool = False) -> S
 
 
 def root_mean(squares: Floats) -> float:
-    """Return the root of the mean of what is known; NaN where nothing is."""
+    """Return the root mean of known values; NaN without any."""
     known = squares[np.isfinite(squares)]
     return math.sqrt(float(known.mean())) if known.size else math.nan
 

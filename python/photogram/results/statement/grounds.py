@@ -1,4 +1,4 @@
-"""What a statement rests on, and what it assumes: each a line that is filled from the run."""
+"""The basis and the assumptions of a statement, as lines with values of the run."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-MAX_FIXED_VALUES = 20  # Of a sentence
+MAX_FIXED_VALUES = 20  # Number of fixed values in a sentence
 Said = list[tuple[str, str]]  # Codes and texts
 
 
 @dataclass(frozen=True)
 class RemovedObservation:
-    """An observation that did not take part in the adjustment.
+    """An observation that was not used in the adjustment.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class RemovedObservation:
 
 
 def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tuple[RemovedObservation, ...]:
-    """Return all observations that were removed, with those that the caller has removed `earlier`."""
+    """Return all removed observations, including those removed `earlier` by the caller."""
     snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
     of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
     return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)
@@ -58,27 +58,26 @@ def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tup
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grounds:
-    """All that was found of an adjusted block and its check points, and what was asked of it.
+    """All findings on an adjusted block and its check points, with the request.
 
     Attributes
     ----------
     result, asked, texts
-        The adjusted block, what was asked for, and its words.
+        The adjusted block, the request, and its texts.
     compared
         Check points with their joint covariance.
     of_all, of_rest, of_vegetated
-        Figures of all check points, of those that are left without some, and of heights in vegetation; None
-        where there are none.
+        Figures of all check points, without excluded ones, and of heights in vegetation; None without any.
     left_out
-        Control points as the others predict them.
+        Control points predicted by the others.
     taken_apart
         Budgets of uncertainty.
     standards
-        What standards say.
+        Results by standards.
     layout
-        How check points lie; None without any.
+        The distribution of check points; None without any.
     removed
-        Observations that did not take part in the adjustment.
+        Observations that were not used in the adjustment.
     """
 
     result: Result
@@ -96,7 +95,7 @@ class Grounds:
 
 
 def assumptions(found: Grounds, assumed: Sequence[Phrase | str]) -> Said:
-    """Return what was assumed: as files were read, and of a block without what was removed."""
+    """Return the assumptions in reading files, and on removed observations."""
     asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
     said = [*_weights(found)]
     said += [texts.said("assume.read", said=each) for each in assumed]
@@ -171,7 +170,7 @@ def _survey(found: Grounds) -> Said:
 
 
 def fixed_values(texts: Texts, result: Result) -> str:
-    """Name fixed points, photos and parameters; empty without any."""
+    """Return the names of fixed points, photos and parameters; empty without any."""
     block = result.block
     points = (block.point_sd == 0).any(axis=1)
     photos = (block.photo_position_sd == 0).any(axis=1) | (block.photo_attitude_sd == 0).any(axis=1)

@@ -1,9 +1,9 @@
-"""Whether the predicted accuracy is honest: differences at check points against their joint covariance.
+"""Tests of predicted accuracy: differences at check points against their joint covariance.
 
-Whole and by component T = d' C^-1 d, chi-square with as many degrees of freedom as rows (F(m, f) for T / m
-where s2 is posterior, approximately: the survey's part of C is not estimated); bias z = n mean / sqrt(1' C_c
-1); heights on 1, x, y, x^2 + y^2 by generalised least squares; single points by T_i = d_i' C_ii^-1 d_i, and
-given all others by y_i' (C^-1)_ii^-1 y_i, y = C^-1 d.
+For all and each component T = d' C^-1 d is chi-square with the number of rows as degrees of freedom. T / m is
+approximately F(m, f) if s2 is posterior, because the survey's part of C is not estimated. The bias has z = n
+mean / sqrt(1' C_c 1). Heights are fitted by 1, x, y, x^2 + y^2 with generalised least squares. Single points
+are tested by T_i = d_i' C_ii^-1 d_i, and given all others by y_i' (C^-1)_ii^-1 y_i, y = C^-1 d.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from photogram.statistics.freedom import effective_freedom, rmse_interval
 
 LEVEL = 0.05
 LEAST = 6  # Minimum number of heights for a surface
-FLAT = 1e-6  # Width of points on a line as a part of their extent
+FLAT = 1e-6  # Width of collinear points relative to their extent
 
 
 @dataclass(frozen=True)
@@ -98,13 +98,13 @@ class Surface:
 
     @property
     def rejected(self) -> bool:
-        """Whether heights are shifted, tilted or bent by more than errors explain."""
+        """Whether heights are shifted, tilted or bent by more than their errors."""
         return self.p < LEVEL
 
 
 @dataclass(frozen=True, eq=False)
 class PointTests:
-    """Each of the n check points by itself."""
+    """Tests of each of the n check points."""
 
     # (n, 3) square roots of the diagonals of C and s2 Q
     sd_predicted: Floats
@@ -128,12 +128,12 @@ class PointTests:
 
     @property
     def wrong(self) -> Bools:
-        """(n,) whether a point is wrong, or the block is where it lies."""
+        """(n,) whether a point, or the block at this position, is wrong."""
         return np.asarray(self.least < self.limit)
 
     @property
     def limit(self) -> float:
-        """Probability below which one of the n points is wrong, or wrongly placed (Bonferroni)."""
+        """Probability below which one of the n points or its position is wrong (Bonferroni)."""
         return LEVEL / max(len(self.T), 1)
 
 
@@ -209,7 +209,7 @@ def bias(found: Compared, component: str, k: float) -> Bias | None:
 
 
 def surface(found: Compared) -> Surface | None:
-    """Fit 1, x, y, x^2 + y^2 to the differences of heights; None with fewer than 6, or all on a line."""
+    """Fit 1, x, y, x^2 + y^2 to height differences; None if fewer than 6, or all on a line."""
     d, covariance = found.of("h")
     if len(d) < LEAST:
         return None
@@ -228,7 +228,7 @@ def surface(found: Compared) -> Surface | None:
         normal = weighted.T @ weighted
         estimate = np.linalg.solve(normal, weighted.T @ right)
         sd = np.sqrt(np.diag(np.linalg.inv(normal)))
-    except np.linalg.LinAlgError:  # heights that have no error, or points on a circle
+    except np.linalg.LinAlgError:  # heights without error, or points on a circle
         return None
     statistic = float(estimate @ normal @ estimate)
     p = _photocore.chi_square(statistic, 4, upper=True)
@@ -236,7 +236,7 @@ def surface(found: Compared) -> Surface | None:
 
 
 def point_tests(found: Compared) -> PointTests:
-    """Test every point by itself, and against what all others predict for it."""
+    """Test every single point, and against the prediction by all others."""
     n = len(found)
     sd = np.sqrt(np.diag(found.covariance)).reshape(n, 3)
     adjusted = found.blocks(found.product)

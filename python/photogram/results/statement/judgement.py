@@ -1,4 +1,4 @@
-"""The one judgement of a statement: headline, exit code, sentences, assumptions and remarks."""
+"""The verdict of a statement: headline, exit code, sentences, assumptions, messages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
 NOT_USABLE = 4  # Exit code
-HEIGHT_KINDS = 10.0  # Mean difference of two kinds of heights (sd)
+HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)
 NAMED = 10
 _CASES = {
     "missed": "missed",
@@ -32,7 +32,7 @@ _CASES = {
     "produced to meet": "produced",
     "not decided": "undecided",
 }
-"""Sentences of the verdicts on a class that has check points."""
+"""Sentences of the verdicts on a class with check points."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Judged:
     # Keys and texts
     sentences: Said
     assumptions: Said
-    remarks: list[str]  # Remarks that do not change the exit code
+    remarks: list[str]  # Messages that do not change the exit code
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class _Evidence:
     strict: bool
     control: Sequence[LeftOut]  # Control points that disagree with the rest of the block
     classes: Sequence[str]  # Verdicts on accuracy classes
-    # Names of what holds: differences at check points are `high` or `low`, the required accuracy of lengths
+    # Names of true facts: differences at check points are `high` or `low`, the required accuracy of lengths
     # is `met` or `missed`, `lengths` disagree with their standard deviations; `warning` of the adjustment
     facts: frozenset[str]
 
@@ -86,11 +86,11 @@ RULES = (
     _rule("met", lambda e: bool(e.classes) or "met" in e.facts),
     _rule("found", lambda _: True),
 )
-"""The rules of a statement; the first that fits gives the headline and the exit code."""
+"""The rules of a statement; the first true one gives the headline and the exit code."""
 
 
 def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
-    """Return what the statement says of all that was found."""
+    """Return the verdict of all findings."""
     texts, asprs, lengths = found.texts, found.standards.asprs, found.standards.lengths
     test = None if lengths is None else lengths.test
     whole = None if test is None else test.together
@@ -137,7 +137,7 @@ def _rejected(of_all: Figures | None) -> tuple[bool, bool]:
 
 
 def _doubtful(of_all: Figures | None) -> bool:
-    """Return whether there are no check points, or some component, mean, surface or point does not agree."""
+    """Return whether check points are missing, or a component, mean, surface or point does not agree."""
     if of_all is None:
         return True
     parts = [each for each in of_all.prediction.values() if each is not None]
@@ -283,7 +283,7 @@ def _remarks(found: Grounds) -> list[str]:
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
     if shift is not None and heights is not None and heights.n > 2:
-        # Two kinds of heights: all differences have one sign, are far from 0, and alike.
+        # Two height systems: all differences have the same sign, are far from 0, and similar.
         signs = np.sign(found.compared.differences[found.compared.counted[:, 2], 2])
         alike = heights.sd < abs(shift.mean) / 3
         if abs(signs.sum()) == len(signs) and abs(shift.z) > HEIGHT_KINDS and alike:
@@ -319,7 +319,7 @@ def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
-            # Half a class holds; where heights are no product, the whole horizontal one.
+            # The limit is half a class; without vertical class, the full horizontal one.
             limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
             said.append(texts(f"asprs.control.{name}", sd=rmse, limit=texts.size(limit)))
     for each in own.remarks[:NAMED]:

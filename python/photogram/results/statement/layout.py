@@ -1,7 +1,7 @@
-"""How check points lie in a block: in all quadrants of it, apart, near to all of its area and heights.
+"""Distribution of check points in a block: quadrants, spacing, coverage of area and heights.
 
-Asked for are a fifth of the points in each quadrant and a spacing of a tenth of the diagonal (NSSDA,
-FGDC-STD-007.3-1998); the rest is of section 4 of the specification of the statement. Failures are remarks.
+Requirements are a fifth of the points in each quadrant and a spacing of a tenth of the diagonal (NSSDA,
+FGDC-STD-007.3-1998); others are in section 4 of the specification of the statement. Failures are messages.
 """
 
 from __future__ import annotations
@@ -16,42 +16,42 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
-FAR = 1 / 3  # Distance from check points as a part of the diagonal
+FAR = 1 / 3  # Distance from check points relative to the diagonal
 CELLS = 200  # Grid for the area far from check points, along each side
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How n check points lie in a block."""
+    """Distribution of n check points in a block."""
 
     count: int  # n
-    diagonal: float  # Of the box of the block in plan, linear unit
+    diagonal: float  # Diagonal of the block's bounding box in plan, linear unit
     # Shares of the points: x and y low, x high and y low, x low and y high, both high. Points on a middle
     # line count as low.
     quadrants: tuple[float, float, float, float]
-    least_spacing: float  # Between two points, over the diagonal; NaN for one point
-    # Share of the block's area that is farther from all points than a third of the diagonal; NaN if the
-    # block is a line
+    least_spacing: float  # Spacing of two points relative to the diagonal; NaN for one point
+    # Share of the block's area that is farther from all points than a third of the diagonal; NaN if the block
+    # is a line
     far: float
     heights: float  # Range of the heights of the points over that of the block; NaN if the block is level
     beyond_control: int  # The number of points outside the hull of the control points in plan
 
     @property
     def even(self) -> bool:
-        """Whether each quadrant has the share of points that is asked for."""
+        """Whether each quadrant has the required share of points."""
         return min(self.quadrants) >= SHARE_ASKED
 
     @property
     def apart(self) -> bool:
-        """Whether no two points are nearer than is asked for."""
+        """Whether all points have the required spacing."""
         return not self.least_spacing < SPACING_ASKED
 
 
 def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
-    """Return how check points lie in a block; None if the positions of the block are at one place in plan.
+    """Return the distribution of check points; None if all block positions are equal in plan.
 
     `points` are (n, 3) east, north, height of the check points, n at least 1, NaN for unknown heights;
-    `extent` (m, 3) are the positions of the block, whose box and hull are the block's; `control` (k, 3).
+    `extent` (m, 3) are the positions of the block, which define its box and hull; `control` (k, 3).
     """
     own, block = points[:, :2], extent[:, :2]
     low, high = block.min(axis=0), block.max(axis=0)

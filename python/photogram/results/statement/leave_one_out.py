@@ -1,9 +1,9 @@
 """Control points as check points: each predicted by all other observations.
 
-With R_g the cofactors of the residuals ~v of a control point, both over its standard deviations (statistics:
-2.3), survey - predicted = sd R_g^- ~v, its covariance is sd R_g^- sd s2, and T = ~v' R_g^- ~v / s2 is
-chi-square with the rank. The survey's own variance is in it. These are no independent check: what all control
-has in common stays hidden.
+With R_g the cofactors of the residuals ~v of a control point, both divided by its standard deviations
+(statistics: 2.3), survey - predicted = sd R_g^- ~v. Its covariance is sd R_g^- sd s2, including the survey's
+own variance, and T = ~v' R_g^- ~v / s2 is chi-square with the rank. These checks are not independent: common
+errors of all control remain undetected.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LeftOut:
     # (3,) predicted minus survey, east, north, up; linear unit; NaN if free or hardly predictable
     difference: Floats
     sd: Floats  # (3,) its standard deviations
-    covariance: Floats  # (3, 3); zero if there is none
+    covariance: Floats  # (3, 3); zero if missing
     # Test, number of predictable directions, upper probability
     T: float
     rank: int
@@ -43,7 +43,7 @@ class LeftOut:
 
 
 def leave_one_out(result: Result) -> list[LeftOut]:
-    """Return every control point that took part as the others predict it, in the order of their names."""
+    """Return every used control point predicted by the others, in the order of their names."""
     block, found = result.block, []
     observed = {each.point: each for each in block.observations if isinstance(each, Control)}
     held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
@@ -64,7 +64,7 @@ def leave_one_out(result: Result) -> list[LeftOut]:
             continue
         held = np.flatnonzero(np.isfinite(block.point_sd[row]) & (block.point_sd[row] > 0))
         if len(held):
-            # Held along the axes of the block; those of geocentric blocks are turned together.
+            # Weighted along the axes of the block; all axes of geocentric blocks are transformed together.
             sd, v = block.point_sd[row, held], residuals[row, held]
             if len(held) == 3:
                 whole = turn @ np.diag(sd)
@@ -82,7 +82,7 @@ def limit_of(found: Sequence[LeftOut]) -> float:
 
 
 def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats, result: Result) -> LeftOut:
-    """Return a point: residuals v of held components, a root F of their covariance, cofactors q."""
+    """Return a point from residuals v of its components, a root F of their covariance, cofactors q."""
     inverse = np.linalg.inv(factor)
     residual, redundancy = inverse @ v, np.eye(len(v)) - inverse @ q @ inverse.T
     values, vectors = np.linalg.eigh((redundancy + redundancy.T) / 2)
@@ -90,7 +90,7 @@ def _predicted(name: str, held: np.ndarray, v: Floats, factor: Floats, q: Floats
     pseudo = (vectors[:, shown] / values[shown]) @ vectors[:, shown].T
     statistic = float(residual @ pseudo @ residual) / result.covariance_scale
     rank = int(shown.sum())
-    # Components that lie mostly along directions that the rest does not predict.
+    # Components that are mostly along directions that the rest does not predict.
     blind = (vectors[:, ~shown] ** 2).sum(axis=1) > 0.5
     difference, sd, covariance = np.full(3, np.nan), np.full(3, np.nan), np.zeros((3, 3))
     own = factor @ pseudo @ factor.T * result.covariance_scale

@@ -1,8 +1,8 @@
-"""Measured lengths against calibrated ones: VDI/VDE 2634 part 1, optical measuring systems by single points.
+"""Tests of measured lengths against calibrated ones (VDI/VDE 2634 part 1).
 
-Section 2.5 of the specification of the statement: in at least seven lines with at least five lengths each,
-every error stays within E = A + K L, no more than B, of which the user decides; the longest length is two
-thirds of the diagonal of the volume at least, and a line runs along a diagonal.
+See section 2.5 of the specification of the statement: at least seven lines with at least five lengths each.
+Every error is within E = A + K L, at most the user's limit B. The longest length is at least two thirds of
+the diagonal of the volume, and a line is along a diagonal.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
-"""Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
+"""Requirements: lines, lengths on each, and the longest of all over the diagonal of the volume."""
 ALONG = math.radians(15.0)  # Largest angle between a line and a diagonal of the volume
 REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The largest error allowed of a length L: A + K L, no more than B; A, B and L of one unit."""
+    """The error limit of a length L: A + K L, at most B; A, B and L in the same unit."""
 
     # A, K and B; B may be infinite
     constant: float
@@ -34,7 +34,7 @@ class Limit:
     most: float = math.inf
 
     def of(self, lengths: Floats) -> Floats:
-        """Return (m,) largest errors allowed of lengths, in their unit."""
+        """Return (m,) error limits of lengths, in their unit."""
         return np.minimum(self.constant + self.slope * lengths, self.most)
 
 
@@ -66,27 +66,27 @@ class LengthTest:
 
     @property
     def within(self) -> Bools | None:
-        """(m,) whether errors are within their limits; None where none were given."""
+        """(m,) whether errors are within their limits; None without limits."""
         return None if self.limits is None else np.asarray(np.abs(self.errors) <= self.limits)
 
     @property
     def met(self) -> bool | None:
-        """Whether every error is within its limit; None where none were given."""
+        """Whether every error is within its limit; None without limits."""
         return None if self.within is None else bool(self.within.all())
 
     @property
     def enough(self) -> bool:
-        """Whether there are as many lines and lengths on each as are asked for."""
+        """Whether there are enough lines, and lengths on each."""
         return self.lines >= LINES and self.least >= LENGTHS
 
     @property
     def long_enough(self) -> bool:
-        """Whether the longest length is two thirds of the diagonal at least, as far as that is known."""
+        """Whether the longest length is at least two thirds of the diagonal, if known."""
         return not self.longest < LONGEST * (1 - 1e-9)
 
     @property
     def along_diagonal(self) -> bool:
-        """Whether a line runs along a diagonal of the volume, as far as that is known."""
+        """Whether a line is along a diagonal of the volume, if known."""
         return not self.off_diagonal > ALONG
 
 
@@ -94,7 +94,7 @@ def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[
     """Return (m,) distances between points, and their (m, m) joint covariance J C J'.
 
     `positions` are (p, 3), `joint` is their (3 p, 3 p) covariance, `pairs` are (m, 2) rows of the points of
-    each length. Two points at one place are refused.
+    each length. Two points at one position are refused.
     """
     first, second = pairs.T
     steps = positions[second] - positions[first]
@@ -110,20 +110,17 @@ def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[
 
 
 def angle_to_diagonal(steps: Floats, extent: Floats) -> float:
-    """Return the smallest angle between (m, 3) steps and the four diagonals of a box of (3,) extent, radians.
-
-    No step is zero.
-    """
+    """Return the smallest angle (radians) between (m, 3) non-zero steps and the diagonals of a (3,) box."""
     sizes = np.linalg.norm(steps, axis=1) * float(np.linalg.norm(extent))
-    # Of the four diagonals the one whose components have the signs of the step is the nearest.
+    # The nearest of the four diagonals has the component signs of the step.
     return math.acos(min(float((np.abs(steps) @ np.abs(extent) / sizes).max()), 1.0))
 
 
 def at_reference(lengths: Floats, temperatures: Floats, expansion: float) -> Floats:
-    """Return what (m,) lengths of a body at some temperatures (deg C) are at 20 degrees Celsius.
+    """Return the (m,) lengths of a body at 20 degrees Celsius from other temperatures (deg C).
 
-    `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 of steel. One that makes a length
-    of zero is refused.
+    `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 for steel. A coefficient that
+    gives a length of zero is refused.
     """
     grown = 1 + expansion * (temperatures - REFERENCE)
     if not (np.isfinite(grown) & (grown > 0)).all():
@@ -145,9 +142,9 @@ def length_test(
 ) -> LengthTest:
     """Test (m,) measured lengths against calibrated ones, both at 20 degrees (:func:`at_reference`).
 
-    `covariance` is the (m, m) joint one of the measured ones (:func:`measured_lengths`), `sd` are (m,)
+    `covariance` is the (m, m) matrix of the measured lengths (:func:`measured_lengths`), `sd` are (m,)
     standard deviations of the calibrated ones, `lines` (m,) names of their lines. `diagonal` and
-    `off_diagonal` are of the measured volume: its diagonal, and the smallest angle between a length and it
+    `off_diagonal` belong to the measured volume: its diagonal, and the smallest angle between a length and it
     (:func:`angle_to_diagonal`); NaN if unknown. `freedom` are degrees of freedom of the estimated unit weight
     of the covariance.
     """

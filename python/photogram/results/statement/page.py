@@ -37,9 +37,9 @@ from photogram.show.quantity import Axis, Quantity, Table
 if TYPE_CHECKING:
     from photogram import Statement
 
-MAX_FINE_SOURCES = 12  # Of a budget, besides the kinds of observations
+MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11
-BLANK = " "  # Head of a column without a name
+BLANK = " "  # Header of a column without a name
 
 
 def annexes(statement: Statement) -> list[Section]:
@@ -261,7 +261,7 @@ def _measured(texts: Texts, value: Any) -> str:
 
 
 def _features(texts: Texts, features: Features) -> Table:
-    """Return the quantities of features: two figures of the smallest deviation among those of one unit."""
+    """Return the quantities of features, with two figures of the smallest deviation per unit."""
     columns = Columns(texts)
     every = [(feature, own) for feature in features for own in feature.quantities]
     names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
@@ -334,7 +334,7 @@ def _figures(statement: Statement) -> list[Part]:
         " – ".join(texts.number(limit, decimals) for limit in predicted.rmse_interval)
         for *_, predicted in shown
     ]
-    # Of parts that standards have: RMSE of the survey, and combined with that of the differences.
+    # Parts in standards: RMSE of the survey, and combined with the RMSE of the differences.
     of_parts = {"plan": (own.rmse_h2, own.rmse_h), "h": (own.rmse_v2, own.rmse_v)}
     of_parts["all"] = math.hypot(own.rmse_h2, own.rmse_v2), own.rmse_3d
     surveys = [of_parts.get(part, (math.nan, math.nan)) for part, *_ in shown]
@@ -364,7 +364,7 @@ def _figures(statement: Statement) -> list[Part]:
 
 
 def _notes(statement: Statement) -> list[Text]:
-    """Return what the sum of squares of the ASPRS means."""
+    """Return notes on the sum of squares of the ASPRS."""
     texts, of_all, asprs = statement.texts, statement.of_all, statement.standards.asprs
     if of_all is None or asprs is None:
         return []

@@ -1,4 +1,4 @@
-"""Quantities of an adjusted block whose uncertainty is taken apart."""
+"""Quantities of an adjusted block with a budget of uncertainty."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ if TYPE_CHECKING:
     from photogram import Result
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
-"""What coordinates may be called, beside the names that they have in the block."""
+"""Alternative names of coordinates, in addition to those of the block."""
 PRINCIPAL = ("f", "fx", "c")  # Names of principal distances
-TOGETHER = 256  # Points of one block of distances
+TOGETHER = 256  # Number of points in a block of distances
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    name: str  # As it was asked for: `point C08 z`
-    subject: Phrase  # The same as a message
-    items: tuple[Item, ...]  # What it is a function of: see :class:`photogram.results.Covariances`
-    function: Callable[..., Any]  # Takes an array for each item; complex ones too
-    unit: str  # Of its value; empty for plain numbers
+    name: str  # The requested name: `point C08 z`
+    subject: Phrase  # Its name as a message
+    items: tuple[Item, ...]  # Its arguments: see :class:`photogram.results.Covariances`
+    function: Callable[..., Any]  # Its arguments are an array for each item, complex ones too
+    unit: str  # Unit of its value; empty for plain numbers
 
 
 def wanted(result: Result, asked: Any) -> Wanted:
-    """Return a quantity as it is asked for; refuse what is not there, and points that took no part.
+    """Return a requested quantity; refuse unknown items and unused points.
 
     `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping of
-    items to gradients, `{("point", "C08"): [0, 0, 1]}`, which is linear.
+    items to gradients of a linear function, `{("point", "C08"): [0, 0, 1]}`.
     """
     if isinstance(asked, Mapping):
         return _linear(result, asked)
@@ -77,8 +77,8 @@ def component_of(name: str, axis: Phrase) -> Phrase:
 def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
     """Return three quantities for the first page.
 
-    The check point, else tie point, with the median standard deviation of its height; the longest distance
-    between these points; the principal distance where it was estimated.
+    The check point, or tie point, with the median standard deviation of height; the longest distance between
+    these points; the principal distance if it was estimated.
     """
     block = result.block
     own = set(checks)
@@ -113,7 +113,7 @@ def _farthest(result: Result, rows: Indices) -> tuple[str, str]:
 
 
 def _two(block: Block, words: Sequence[str]) -> tuple[str, str]:
-    """Return the names of two points, which may have blanks in them."""
+    """Return the names of two points; names may contain blanks."""
     known = set(block.point_ids)
     for cut in range(1, len(words)):
         names = " ".join(words[:cut]), " ".join(words[cut:])
@@ -140,7 +140,7 @@ def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
 
 
 def _geocentric(x: Any, a: float, b: float) -> Any:
-    """Return geocentric coordinates of longitude, latitude, height; for complex numbers too."""
+    """Return geocentric coordinates of longitude, latitude, height; also for complex numbers."""
     sp, cp = np.sin(x[1]), np.cos(x[1])
     across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
     level = (across + x[2]) * cp

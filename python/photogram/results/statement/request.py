@@ -1,4 +1,4 @@
-"""What is asked of an accuracy statement."""
+"""The options of an accuracy statement."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from photogram.words import phrase
 __all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "invalid", "length_of", "lengths_in"]
 
 STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
-INDEPENDENT = ("yes", "same-base", "no")  # Of the survey of check points from the block
+INDEPENDENT = ("yes", "same-base", "no")  # Independence of the survey of check points from the block
 METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 METRES["us-ft"] = 1200 / 3937  # Metres of the units of length
 _UNPAIRED = re.compile("[\ud800-\udfff]")
@@ -28,46 +28,47 @@ _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a statement; lengths in the linear unit of the block, areas in its square.
+    """The options of a statement; lengths in the linear unit of the block, areas in its square.
 
     Attributes
     ----------
     standards
-        Which of `plain`, `asprs-2023`, `nssda`, `vdi-2634`, `iso-19157`.
+        Some of `plain`, `asprs-2023`, `nssda`, `vdi-2634`, `iso-19157`.
     classes
-        Accuracy classes that are to be met: by `h` (horizontal), `v` (vertical), `3d`.
+        Required accuracy classes: by `h` (horizontal), `v` (vertical), `3d`.
     area
-        Of the product; None: the hull of all adjusted points in plan.
+        Area of the product; None: the hull of all adjusted points in plan.
     sd
-        Standard deviations (east, north, up) of the survey of check points that have none; None: that is
-        refused.
+        Standard deviations (east, north, up) of the survey of check points without their own; None: they are
+        required.
     without
-        Check points without which figures are given beside those of all, with the reason of each.
+        Check points that additional figures exclude, with the reason of each.
     independent
         Whether the survey of check points is independent of the block: a declaration, `yes`, `same-base`,
         `no`.
     vegetated
-        Check points in vegetation: their heights are stated apart (VVA).
+        Check points in vegetation: their heights have separate figures (VVA).
     survey_common_sd
-        Of an error that all check points share, east, north, up (a base station, a levelling datum).
+        Standard deviations of a common error of all check points, east, north, up (a base station, a
+        levelling datum).
     survey_common_in_control
         Whether control has the same error: it then cancels in differences.
     language, text
-        Of the sentences, and sentences that stand for those of the language.
+        The language of the sentences, and sentences that replace those of the language.
     budgets
-        Quantities whose uncertainty is taken apart, such as `point C08 z`; None: three are chosen.
+        Quantities with a budget of uncertainty, such as `point C08 z`; None: three are chosen.
     coverage
         Probability of expanded uncertainties.
     components
-        The :class:`photogram.VarianceComponents` whose result it is, where weights were estimated.
+        The :class:`photogram.VarianceComponents` with this result, if weights were estimated.
     lengths
         Calibrated lengths: mappings of `line`, `from`, `to` (names of points), `length`, `sd`, `temperature`
-        (deg C, may be left out).
+        (deg C, optional).
     limit, expansion
-        (A, K, B) of the limit A + K L <= B of their errors, and what takes measured lengths to 20 deg C: of
-        the object, per kelvin.
+        (A, K, B) of the limit A + K L <= B of their errors, and the thermal expansion of the object per
+        kelvin for the reduction to 20 deg C.
     title, project, client, firm, surveyor, date
-        What the head of the page says.
+        The entries at the top of the page.
     """
 
     standards: tuple[str, ...] = ("asprs-2023", "plain")
@@ -96,12 +97,12 @@ class Asked:
 
     @classmethod
     def checked(cls, **options: Any) -> Asked:
-        """Return the options, checked.
+        """Return the checked options.
 
         Raises
         ------
         InputError
-            An unknown option, or a value that is not allowed.
+            If an option is unknown, or a value is not allowed.
         """
         known = [each.name for each in fields(cls)]
         for name in options:
@@ -135,7 +136,7 @@ class Asked:
 
 
 def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
-    """Return the error that a value is not allowed."""
+    """Return the error for an invalid value."""
     return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
 
 
@@ -161,7 +162,7 @@ def _mapping(name: str, value: object) -> Mapping[Any, Any]:
 
 
 def _by_name(check: Callable[[str, Any], Any]) -> Callable[[str, Any], dict[str, Any]]:
-    """Return the check of a mapping whose values have a check."""
+    """Return the check of a mapping from the check of its values."""
     return lambda name, value: {
         _text(name, key): check(f"{name} {key}", own) for key, own in _mapping(name, value).items()
     }
@@ -234,12 +235,12 @@ _CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
 
 
 def lengths_in(unit: str) -> float:
-    """Return how many metres a linear unit has.
+    """Return the length of a linear unit in metres.
 
     Raises
     ------
     InputError
-        A unit that nobody knows.
+        If the unit is unknown.
     """
     if unit not in METRES:
         raise InputError(unknown_name("unit of length", unit, METRES))
@@ -252,7 +253,7 @@ def length_of(given: str, unit: str, *, area: bool = False) -> float:
     Raises
     ------
     InputError
-        No length, or one without its unit.
+        If the text is not a length with a unit.
     """
     found = _LENGTH.fullmatch(given)
     try:

@@ -1,9 +1,9 @@
-"""What standards say of the figures of a statement: those that were asked for.
+"""Figures of a statement by the requested standards.
 
-Sections 2.3 and 2.6 of the specification of the statement. The factors of the National Standard for Spatial
-Data Accuracy (FGDC-STD-007.3-1998) hold for axes of nearly equal RMSE; beyond, and beside, the radius stands
-that holds 95 % of errors with the matrix of mean products that was found. Numbers of measures of ISO 19157
-are those of the edition of 2013, annex D; names as the same table in GeoAPI has them.
+See sections 2.3 and 2.6 of the specification of the statement. The factors of the National Standard for
+Spatial Data Accuracy (FGDC-STD-007.3-1998) are valid for axes of nearly equal RMSE. In all cases the
+statement gives the radius of 95 % of errors with the matrix of mean products. Numbers of measures of ISO
+19157 are from annex D of the edition of 2013; names are from the same table in GeoAPI.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ ENOUGH = 20  # Required check points
 VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
 """Factors of RMSE_z, of the radial RMSE, and of the mean of the RMSE of both axes."""
 LEAST_RATIO = 0.6  # Ratio of the RMSE of the axes below which the factors are not valid
-ABSOLUTE = "absolute (external) positional accuracy"  # Of check points
-RELATIVE = "relative (internal) positional accuracy"  # Of lengths, and of differences between points
+ABSOLUTE = "absolute (external) positional accuracy"  # For check points
+RELATIVE = "relative (internal) positional accuracy"  # For lengths, and for differences between points
 MEASURES = {
     "bias": (128, "bias of positions"),
     "le90": (35, "linear map accuracy at 90 % significance level"),
@@ -99,12 +99,12 @@ class Asprs:
 
 @dataclass(frozen=True)
 class Nssda:
-    """Accuracy of n check points at 95 %, in the linear unit; None where there is no figure."""
+    """Accuracy of n check points at 95 %, in the linear unit; missing figures are None."""
 
     count: int  # n
-    ratio: float | None  # Of the smaller RMSE of an axis to the larger
+    ratio: float | None  # Smaller RMSE of an axis over the larger
     accuracy_r: float | None  # Horizontal, by the mean RMSE of the axes; None if the ratio is below 0.6
-    accuracy_r_equal: float | None  # Horizontal, by the radial RMSE, as if both axes had the same
+    accuracy_r_equal: float | None  # Horizontal, by the radial RMSE, for equal RMSE of both axes
     # Radius of 95 % from the mean products of differences, for any ratio
     ce95: float | None
     accuracy_z: float | None  # Vertical
@@ -130,7 +130,7 @@ class Lengths:
 
 @dataclass(frozen=True, eq=False)
 class Standards:
-    """What standards say; None for those that were not asked for, or that have nothing to say."""
+    """Results by standards; None if not requested or not applicable."""
 
     asprs: Asprs | None = None
     nssda: Nssda | None = None
@@ -153,7 +153,7 @@ def asprs_figures(
     of_vegetated: Figures | None,
     left_out: Sequence[LeftOut],
 ) -> Asprs:
-    """Return the figures of the ASPRS, and the verdicts on the classes that were asked for."""
+    """Return the figures of the ASPRS, and the verdicts on the requested classes."""
     metre = lengths_in(result.block.linear_unit)
     area = asked.area
     if area is None:
@@ -222,7 +222,7 @@ def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
     """Return the accuracy of `count` check points at 95 %.
 
     `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
-    on its diagonal. `rmse_z` is that of the heights, in the linear unit. Both are NaN if there are none.
+    on its diagonal. `rmse_z` belongs to the heights, in the linear unit. Missing values are NaN.
     """
     vertical = VERTICAL * rmse_z if math.isfinite(rmse_z) else None
     if not np.isfinite(moments).all():
@@ -236,7 +236,7 @@ def nssda(moments: Floats, rmse_z: float, count: int) -> Nssda:
 
 
 def tested_lengths(result: Result, asked: Asked) -> Lengths:
-    """Return calibrated lengths with their test; refuse lengths between points that are not there."""
+    """Return calibrated lengths with their test; refuse unknown points."""
     block = result.block
     names = list(dict.fromkeys(end for each in asked.lengths for end in (each["from"], each["to"])))
     places = {name: row for row, name in enumerate(block.point_ids)}
@@ -319,7 +319,7 @@ def measures(
 
 
 def _ellipse(moments: Floats) -> list[float] | None:
-    """Return half-axes, and the azimuth of the larger one (rad, from north to east), of errors in plan."""
+    """Return semi-axes, and the azimuth of the larger one (rad, from north to east), of errors in plan."""
     if not np.isfinite(moments).all():
         return None
     values, vectors = np.linalg.eigh(moments)

@@ -1,4 +1,4 @@
-"""An accuracy statement of an adjusted block: figures, sentences, assumptions, and their forms."""
+"""Accuracy statement of an adjusted block: figures, sentences, assumptions, files."""
 
 from __future__ import annotations
 
@@ -50,19 +50,19 @@ from photogram.words import Phrase, phrase
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Statement(Grounds, Brief):
-    """What a surveyor hands to a client: how accurate, by whose standard, found how, assuming what.
+    """An accuracy statement for a client: figures, standards, methods, assumptions.
 
-    It has what it rests on, :class:`photogram.results.statement.grounds.Grounds`. Lengths are in the linear
+    It includes its basis, :class:`photogram.results.statement.grounds.Grounds`. Lengths are in the linear
     unit of the block, along east, north and up.
 
     Attributes
     ----------
     judged
-        Headline, sentences, assumptions, remarks and exit code: one judgement for all that is written.
+        Headline, sentences, assumptions, messages and exit code: one verdict for all outputs.
     survey
-        Control and check points as they were given, in the system in which they are shown.
+        Control and check points as given, in the displayed coordinate system.
     inputs, command
-        What it was made of, where a command has made it.
+        Input files and command, if a command made the statement.
     """
 
     judged: Judged
@@ -72,32 +72,33 @@ class Statement(Grounds, Brief):
 
     @property
     def exit(self) -> int:
-        """0: nothing speaks against it; 4: it must not be handed over as it is.
+        """The exit code. 0: without objections; 4: the statement must not be used as it is.
 
-        A class is missed, differences are larger than predicted, or the verdict of the adjustment says so;
-        with `strict` also where that verdict is a warning, differences are smaller than predicted, a control
-        point disagrees with the others, or calibrated lengths disagree with their standard deviations.
+        The code is 4 if a class is missed, differences are larger than predicted, or the verdict of the
+        adjustment requires it. With `strict` it is also 4 for a warning of that verdict, smaller
+        differences than predicted, a disagreeing control point, or calibrated lengths that disagree with
+        their standard deviations.
         """
         return self.judged.exit
 
     @property
     def headline(self) -> str:
-        """What the page says first."""
+        """The first sentence of the page."""
         return self.judged.headline
 
     @property
     def figures(self) -> dict[str, Any] | None:
-        """All figures, by the names that they have in the JSON document; None without check points."""
+        """All figures by their names in the JSON document; None without check points."""
         return figures_member(self.of_all, self.standards.nssda_member)
 
     @property
     def sentences(self) -> list[dict[str, str]]:
-        """What is stated: a key of the table of words and a text each."""
+        """The statements: a key of the table of texts and a text each."""
         return [{"key": key, "text": text} for key, text in self.judged.sentences]
 
     @property
     def assumptions(self) -> list[dict[str, str]]:
-        """What was assumed, likewise."""
+        """The assumptions: a key and a text each."""
         return [{"key": key, "text": text} for key, text in self.judged.assumptions]
 
     @property
@@ -107,11 +108,11 @@ class Statement(Grounds, Brief):
 
     @property
     def leave_one_out(self) -> list[dict[str, Any]]:
-        """Control points predicted by the others, likewise."""
+        """Control points predicted by the others, as in the JSON document."""
         return records(left_out_points(self.texts, self.left_out).columns)
 
     def budget(self, quantity: str | Mapping[Any, Sequence[float]]) -> dict[str, Any]:
-        """Return the budget of a quantity: one of the page, or any other.
+        """Return the budget of a quantity of the page, or of any other.
 
         Parameters
         ----------
@@ -122,9 +123,9 @@ class Statement(Grounds, Brief):
         Raises
         ------
         InputError
-            A quantity that there is not.
+            If the quantity does not exist.
         AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-            As :meth:`photogram.Result.covariances`.
+            As in :meth:`photogram.Result.covariances`.
         """
         for each in self.taken_apart:
             if each.quantity == quantity:
@@ -146,7 +147,7 @@ class Statement(Grounds, Brief):
         raise InputError(unknown_name("budget", name, names))
 
     def brief(self) -> tuple[str, Rows]:
-        """Return the statement in a few lines."""
+        """Return a summary of the statement."""
         rows = [("headline", self.headline), *((key, text) for key, text in self.judged.sentences)]
         return "Accuracy statement", [
             *rows,
@@ -160,7 +161,7 @@ class Statement(Grounds, Brief):
         return statement_document(self)
 
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
-        """Return the page as one HTML file that needs nothing else, and write it where a path is given.
+        """Return the page as a self-contained HTML file; optionally write it to a path.
 
         Needs jinja2 (`pip install 'photogram[report]'`).
         """
@@ -169,7 +170,7 @@ class Statement(Grounds, Brief):
         return _written(page_html(self.document()), path)
 
     def to_pdf(self, path: str | PathLike[str] | None = None) -> bytes:
-        """Return the page as a PDF document, and write it where a path is given.
+        """Return the page as a PDF document; optionally write it to a path.
 
         Needs typst (`pip install 'photogram[pdf]'`).
         """
@@ -180,7 +181,7 @@ class Statement(Grounds, Brief):
         return _written(page_pdf(self.document(), author=self.asked.firm), path)
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
-        """Return everything as a JSON document (UTF-8), and write it where a path is given."""
+        """Return all data as a JSON document (UTF-8); optionally write it to a path."""
         return _written(json.to_json(statement_members(self)), path)
 
 
@@ -210,16 +211,16 @@ def statement(
     result
         The adjusted block, with covariances.
     strict
-        Whether what is a remark otherwise has the exit code 4.
+        Whether some messages also have the exit code 4.
     assumed
-        What was assumed when the files were read, in sentences.
+        Assumptions in reading the files, as sentences.
     removed
-        Names of observations that you removed before the adjustment. The statement lists them together with
-        those that the result itself knows: of data snooping and of first values.
+        Names of observations that you removed before the adjustment. The statement also lists those that data
+        snooping and the initial values removed.
     system
-        In which coordinates are shown; None: the axes of the block.
+        The displayed coordinate system; None: the axes of the block.
     inputs, command
-        What it was made of, for annex G.
+        Input files and command, for annex G.
     asked
         `standards`, `classes`, `area`, `sd`, `without`, `independent`, `language`, `text`, `budgets`,
         `coverage`, `client` ...: see :class:`photogram.results.statement.request.Asked`.
@@ -227,12 +228,12 @@ def statement(
     Raises
     ------
     InputError
-        Options that cannot be; check points without standard deviations of their survey, or that are control;
-        quantities that there are not.
+        If options are invalid, quantities do not exist, or check points are without standard deviations of
+        their survey or are control.
     AdjustmentError
-        The adjustment has not converged, or has no covariances.
+        If the adjustment has not converged, or is without covariances.
     OutOfMemoryError, KeyboardInterrupt
-        As :meth:`photogram.Result.covariances`.
+        As in :meth:`photogram.Result.covariances`.
     """
     options = Asked.checked(**asked)
     if not result.converged:
@@ -258,7 +259,7 @@ def statement(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
     lengths = tested_lengths(result, options) if options.lengths else None
-    # As they were given, those with both coordinates in plan.
+    # Given positions with both plan coordinates.
     checks = found.given_places[np.isfinite(found.given[:, :2]).all(axis=1)]
     control = control_places(result.block)
     grounds = Grounds(

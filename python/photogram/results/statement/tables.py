@@ -1,4 +1,4 @@
-"""Tables of a statement: each is declared once, for the page, JSON and files with commas."""
+"""Tables of a statement, declared once for the page, JSON and CSV files."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from photogram import Statement
 
 DIRECTIONS = ("e", "n", "h")
-MAX_REMOVED_OBSERVATIONS = 1000  # Of the page; the file lists all
+MAX_REMOVED_OBSERVATIONS = 1000  # Limit of the page; the file lists all
 decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
 
 
 class Columns:
-    """Columns with heads in the language of a statement; a name in files is also that in JSON documents."""
+    """Columns with headers in the language of a statement; names in files are those in JSON documents."""
 
     def __init__(self, texts: Texts) -> None:
         self.texts = texts
 
     def head(self, key: str) -> str:
-        """Return the head of a column; text without a sentence stays."""
+        """Return the header of a column; texts without a sentence are unchanged."""
         return self.texts(f"column.{key}") if self.texts.has(f"column.{key}") else key
 
     def text(self, key: str, values: Sequence[str], name: str | None = None, **more: Any) -> Quantity:
@@ -156,7 +156,7 @@ def test_lengths(texts: Texts, own: Lengths) -> Table:
 
 
 def files_of_statement(statement: Statement) -> dict[str, bytes]:
-    """Return the tables of a statement as text of commas, by the names of files."""
+    """Return the tables of a statement as CSV text, by the names of files."""
     unit = statement.result.block.linear_unit
     columns = frame(check_points(statement).columns)
     for name, reason in statement.compared.not_usable:

@@ -1,4 +1,4 @@
-"""The words of a statement: sentences and numbers in a language, and a firm's own sentences."""
+"""Texts of a statement: sentences and numbers in a language, and user sentences."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class Texts(Words):
                 raise InputError(phrase("request.form", code=key))
         super().__init__(language, own)
         own = table_of(language)
-        families = {key.partition(".")[0] for key in own}  # The others are of no statement
+        families = {key.partition(".")[0] for key in own}  # Other families do not belong to statements
         self.missing = sorted(key for key in set(english) - set(own) if key.partition(".")[0] in families)
-        """Keys that are said in English for want of a sentence in the language."""
+        """Keys that use English because the language has no sentence."""
 
     def __call__(self, code: str, **fields: Any) -> str:
         """Return the sentence of a code; numbers have the forms of :data:`FORMS`."""
@@ -77,7 +77,7 @@ class Texts(Words):
         return self.numeral(fixed(value, decimals))
 
     def significant(self, value: float, figures: int = 3) -> str:
-        """Return a number with so many significant figures, at least."""
+        """Return a number with at least a number of significant figures."""
         if not math.isfinite(value) or value == 0:
             return self.number(value, 0)
         return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
@@ -86,7 +86,7 @@ class Texts(Words):
         return self.numeral(probability_written(value))
 
     def numeral(self, written: str) -> str:
-        """Return a number that is written with a point as the language writes it."""
+        """Return a number in the notation of the language."""
         sign = written[:1] if written[:1] in "-+" else ""
         whole, point, decimals = written.removeprefix(sign).partition(".")
         group = self._table["number.group"]
@@ -96,17 +96,17 @@ class Texts(Words):
         return sign.replace("-", "−") + whole + head + (point and self._table["number.decimal"]) + decimals
 
     def length(self, value: float, figures: int = 2) -> str:
-        """Return a length with its unit: centimetres where it is less than a metre, millimetres for less."""
+        """Return a length with its unit: centimetres if less than a metre, millimetres for less."""
         unit, factor = self.small(value)
         return f"{self.significant(value * factor, figures)} {unit}"
 
     def size(self, value: float) -> str:
-        """Return a class as it was asked for: `5 cm`."""
+        """Return a class as in the request: `5 cm`."""
         unit, factor = self.small(value)
         return f"{self.numeral(f'{value * factor:.6g}')} {unit}"
 
     def small(self, value: float) -> tuple[str, float]:
-        """Return the unit in which people read a length of this size, and what leads to it."""
+        """Return the display unit of a length of this size, and its factor."""
         if self.unit != "m" or not math.isfinite(value):
             return self.unit, 1.0
         size = abs(value)
@@ -120,7 +120,7 @@ class Texts(Words):
         return self.numeral(f"{percent:.1f}".removesuffix(".0"))
 
     def day(self, given: str) -> str:
-        """Return a date (ISO) as the language writes it; anything else as it is."""
+        """Return a date (ISO) in the notation of the language; other texts are unchanged."""
         try:
             day = date.fromisoformat(given)
         except ValueError:
@@ -128,11 +128,11 @@ class Texts(Words):
         return self._table["date"].format(year=day.year, month=f"{day.month:02}", day=f"{day.day:02}")
 
     def word(self, family: str, name: str) -> str:
-        """Return what a word of another module is called in the language; one without a key as it is."""
+        """Return a word of another module in the language; without a key unchanged."""
         return self.text(Phrase(f"{family}.{name}"))
 
     def kind(self, name: str) -> str:
-        """Return the name of a kind in the plural: `images`, `prior, lever arm`, `.., 4 coefficients`."""
+        """Return the name of a type in the plural: `images`, `prior, lever arm`, `.., 4 coefficients`."""
         names = []
         for part in name.split(", "):
             count, blank, rest = part.partition(" ")
@@ -141,7 +141,7 @@ class Texts(Words):
         return ", ".join(names)
 
     def observation(self, parts: Sequence[str]) -> str:
-        """Return the name of an observation from its kind, the names of its things, and its component."""
+        """Return the name of an observation from its type, the names of its items, and its component."""
         kind, *things, component = parts
         one = ", ".join(self.word("one", part) for part in kind.split(", "))
         return " ".join([one, *things, self.word("axis", component)])
